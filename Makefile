@@ -1,0 +1,67 @@
+# make reproduce: the experiments of the paper, out/index.html
+# make test:      all tests
+#
+# Everything is installed into .venv, in the versions of constraints.txt. What was installed is remembered in
+# .venv/.installed-*; only a change of pyproject.toml or constraints.txt installs again.
+
+VENV := .venv
+PY := $(VENV)/bin/python
+WORKERS ?= 2
+
+export MPLBACKEND := Agg
+# One thread per process: the matrices are small, and the workers use the cores already.
+export OPENBLAS_NUM_THREADS := 1
+
+.PHONY: help reproduce test lint clean
+.NOTPARALLEL:
+.DELETE_ON_ERROR:
+
+help:
+	@echo "make reproduce   run every experiment of the paper and write out/index.html"
+	@echo "make test        run all tests (WORKERS=$(WORKERS) at a time)"
+	@echo "make lint        check style (ruff) and types (mypy)"
+	@echo "make clean       remove out/, built packages and caches; .venv stays"
+	@echo "PYTHON=...       the Python 3.11 or newer that .venv is made with"
+
+reproduce: $(VENV)/.installed-core
+	@$(PY) scripts/reproduce.py
+
+test: $(VENV)/.installed-test
+	@$(PY) -m pytest -q -n $(WORKERS) --dist loadfile
+
+lint: $(VENV)/.installed-dev
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+	$(PY) -m mypy
+
+clean:
+	rm -rf out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -path ./$(VENV) -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(VENV)/.installed-core: WHAT := .
+$(VENV)/.installed-test: WHAT := .[test,notebooks,compiled,mujoco,sweep,tune]
+$(VENV)/.installed-dev:  WHAT := .[dev]
+
+$(VENV)/.installed-%: $(VENV)/.made pyproject.toml constraints.txt
+	@echo "Installing $(WHAT) into $(VENV): once, a minute or two."
+	@$(PY) -m pip install -qq --disable-pip-version-check -c constraints.txt -e '$(WHAT)'
+	@touch $@
+
+# PYTHON, or the first of these that runs and is new enough; then it must be able to make an environment.
+$(VENV)/.made:
+	@for python in $(or $(PYTHON),python3.11 python3); do \
+	    if "$$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
+	        found=$$python; break; \
+	    fi; \
+	done; \
+	if [ -z "$$found" ]; then \
+	    echo "synctrl needs Python 3.11 or newer; $(or $(PYTHON),python3.11 and python3) found: $$($(or $(PYTHON),python3) --version 2>&1)." \
+	         "Name another one: make PYTHON=/path/to/python3.11 ..." >&2; exit 1; \
+	fi; \
+	if ! "$$found" -c 'import ensurepip, venv' 2>/dev/null; then \
+	    echo "$$found cannot make a virtual environment: its modules venv and ensurepip are missing" \
+	         "(on Debian: apt-get install python3-venv)." >&2; exit 1; \
+	fi; \
+	echo "Making $(VENV) with $$("$$found" --version)."; \
+	"$$found" -m venv $(VENV)
+	@touch $@
