@@ -1,0 +1,40 @@
+"""Adaptive synchronized control of multi-robot cells, after Sun and Mills (2002)."""
+
+from .control.controller import Controller
+from .control.gains import Gains
+from .errors import SynctrlError
+from .robots.friction import Friction
+from .robots.parameters import FullParameters, LinearParameters
+from .robots.robot import Robot, load_robot
+from .simulation.disturbances import Disturbance
+from .simulation.result import Result
+from .simulation.simulate import Experiment, simulate
+from .tasks.cell import Cell, Member
+from .tasks.coupling import Coupling
+from .tasks.spaces import CartesianSpace, JointSpace
+from .tasks.trajectories import Circle, Cubic, ExponentialApproach, FunctionTrajectory, Hold
+
+__all__ = [
+    "CartesianSpace",
+    "Cell",
+    "Circle",
+    "Controller",
+    "Coupling",
+    "Cubic",
+    "Disturbance",
+    "Experiment",
+    "ExponentialApproach",
+    "Friction",
+    "FullParameters",
+    "FunctionTrajectory",
+    "Gains",
+    "Hold",
+    "JointSpace",
+    "LinearParameters",
+    "Member",
+    "Result",
+    "Robot",
+    "SynctrlError",
+    "load_robot",
+    "simulate",
+]

@@ -1,0 +1,78 @@
+"""Checks of numbers that come from outside: one place, one wording."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .errors import InputError
+
+
+def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | None = None) -> np.ndarray:
+    """`value` as a read-only float array of the given shape (None in `shape` stands for any length).
+
+    Raises:
+        InputError: not numbers, another shape, or not finite.
+    """
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name}: expected numbers, found {value!r}") from error
+    if shape is not None and not _fits(array.shape, shape):
+        raise InputError(f"{name}: expected shape {_show(shape)}, found {_show(array.shape)}")
+    if not np.isfinite(array).all():
+        where = np.argwhere(~np.isfinite(array))[0]
+        entry = f" at index {tuple(int(k) for k in where)}" if array.ndim else ""
+        raise InputError(f"{name}: expected finite numbers, found {array[tuple(where)]}{entry}")
+    array.flags.writeable = False
+    return array
+
+
+def finite_number(name: str, value: object) -> float:
+    """`value` as a finite float."""
+    if isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{name}: expected a number, found {value!r}")
+    return float(finite_array(name, value, ()))  # type: ignore[arg-type]
+
+
+def positive_number(name: str, value: object) -> float:
+    """`value` as a finite float above zero."""
+    number = finite_number(name, value)
+    if number <= 0:
+        raise InputError(f"{name}: expected a number above 0, found {number:g}")
+    return number
+
+
+def non_negative_number(name: str, value: object) -> float:
+    """`value` as a finite float that is not below zero."""
+    number = finite_number(name, value)
+    if number < 0:
+        raise InputError(f"{name}: expected a number of at least 0, found {number:g}")
+    return number
+
+
+def instance(name: str, value: object, kind: type | tuple[type, ...], expected: str) -> None:
+    """Refuse a value of another type.
+
+    Raises:
+        InputError: `value` is no instance of `kind`.
+    """
+    if not isinstance(value, kind):
+        raise InputError(f"{name}: expected {expected}, found {type(value).__name__}")
+
+
+def choice(name: str, value: object, known: tuple[str, ...]) -> str:
+    """`value` if it is one of the known words."""
+    if value not in known:
+        raise InputError(f"{name}: expected one of {', '.join(map(repr, known))}, found {value!r}")
+    return str(value)
+
+
+def _fits(found: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:
+    return len(found) == len(expected) and all(
+        e is None or e == f for f, e in zip(found, expected, strict=True)
+    )
+
+
+def _show(shape: tuple[int | None, ...]) -> str:
+    return "(" + ", ".join("any" if k is None else str(k) for k in shape) + ("," * (len(shape) == 1)) + ")"

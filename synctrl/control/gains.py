@@ -1,0 +1,85 @@
+"""Gains of the controller, with the paper's symbols."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..checks import finite_array
+from ..errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class Gains:
+    """Diagonal gains, each a number or a vector of diagonal entries.
+
+    K_r and Gamma may differ between robots: give one row per robot. Lambda, beta and K_eps are the same for all
+    robots of a cell, as the proof requires.
+
+    Args:
+        Lambda: convergence rate on the sliding surface, (m,), 1/s, above 0.
+        beta: weight of the integrated synchronization error, (m,), 1/s, 0 for independent control.
+        K_r: damping, (nv,) or (n, nv), N·m·s/rad, above 0; (m,) if it acts in task space.
+        K_eps: stiffness of the coupling, (m,), N·m/rad when c has no unit, 0 for independent control.
+        Gamma: adaptation rate, (P,) or (n, P), above 0; 0 switches the adaptation off.
+
+    Raises:
+        InputError: not numbers, not finite, or of the wrong sign.
+    """
+
+    Lambda: Any
+    beta: Any
+    K_r: Any
+    K_eps: Any
+    Gamma: Any
+
+    def __post_init__(self) -> None:
+        for name, positive in _SIGNS.items():
+            array = finite_array(name, getattr(self, name))
+            low = array.min() if array.size else 0.0
+            if low < 0 or (positive and low == 0):
+                bound = "above 0" if positive else "of at least 0"
+                raise InputError(f"{name}: expected entries {bound}, found {low:g}")
+            object.__setattr__(self, name, array)
+
+    def independent(self) -> Self:
+        """The same controller without synchronization, beta = K_eps = 0: Slotine and Li's law."""
+        return replace(self, beta=np.zeros_like(self.beta), K_eps=np.zeros_like(self.K_eps))
+
+    def replace(self, **changes: ArrayLike) -> Self:
+        """These gains with some of them changed."""
+        unknown = set(changes) - set(_SIGNS)
+        if unknown:
+            raise InputError(f"gains: expected some of {', '.join(_SIGNS)}, found {', '.join(sorted(unknown))}")
+        return replace(self, **changes)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain numbers and lists under the gains' names."""
+        return {field.name: getattr(self, field.name).tolist() for field in fields(self)}
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Gains) and self.as_dict() == other.as_dict()
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+#: which gains must be above zero; the others may be zero
+_SIGNS = {"Lambda": True, "beta": False, "K_r": True, "K_eps": False, "Gamma": False}
+
+
+def spread(name: str, gain: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """A gain as an array of the given shape.
+
+    Raises:
+        InputError: the gain has other dimensions.
+    """
+    fits = gain.ndim <= len(shape) and all(
+        g == s for g, s in zip(gain.shape[::-1], shape[::-1], strict=False)
+    )
+    if not fits:
+        expected = " or ".join(str(tuple(shape[k:])) for k in range(len(shape), -1, -1))
+        raise InputError(f"{name}: expected a shape of {expected}, found {gain.shape}")
+    return np.broadcast_to(gain, shape).copy()

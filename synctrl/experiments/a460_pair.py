@@ -1,0 +1,69 @@
+"""Two CRS A460 arms that move a payload, section V-A of the paper: figures 2 to 7.
+
+Joint angles and gains are the paper's. Masses, inertias and friction of the A460 were never published: the ones
+used here are synthetic. The time of the motion, the initial estimate and the place of the second base are our
+choices as well; with these the two wrists carry a level payload 0.5 m long across its direction of travel.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..control.gains import Gains
+from ..robots.friction import Friction
+from ..robots.robot import Robot, load_robot
+from ..simulation.simulate import Experiment
+from ..tasks.cell import Cell, Member
+from ..tasks.coupling import Coupling
+from ..tasks.spaces import JointSpace
+from ..tasks.trajectories import Cubic
+
+INITIAL = np.deg2rad([[73.3340, 60.3330, -169.8120], [15.2520, 71.6830, -181.9800]])  # Table I
+FINAL = np.deg2rad([[90.0, 63.6090, -174.7290], [-2.9730, 74.1070, -185.1080]])
+MOTION_TIME, DURATION = 2.0, 4.0  # s
+BASES = (((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), ((0.026, 1.334, -0.020), (0.0, 0.0, -np.pi / 2)))  # m, rad
+GAINS = Gains(Lambda=8.0, beta=8.0, K_r=(80.0, 80.0, 100.0), K_eps=10.0, Gamma=0.3)
+#: share of the true parameters that the controller starts with
+KNOWN = 0.7
+#: synthetic; the controller does not know it
+FRICTION = Friction(viscous=(5.0, 6.0, 4.0), coulomb=(4.0, 6.0, 4.0), smoothing=0.01)
+
+
+def a460_pair(
+    synchronized: bool = True,
+    friction: bool = True,
+    gains: Gains | None = None,
+    reference_acceleration: str = "exact",
+    k_r_space: str = "joint",
+) -> Experiment:
+    """The two-arm cell of section V-A, in joint space with epsilon = e_1 - e_2, eq. (45).
+
+    Args:
+        synchronized: False sets beta = K_eps = 0, the paper's independent adaptive control.
+        friction: whether the plant has friction, which is outside the controller's model.
+        gains: by default the paper's.
+        reference_acceleration, k_r_space: see `Controller`.
+    """
+    robot = load_robot("a460")
+    members = [_member(robot, i, FRICTION if friction else Friction()) for i in range(2)]
+    gains = GAINS if gains is None else gains
+    kind = "synchronized" if synchronized else "independent"
+    return Experiment(
+        Cell(members, Coupling.pair(c=(1.0, -1.0)), JointSpace(), name="A460 pair"),
+        gains if synchronized else gains.independent(),
+        DURATION,
+        (),
+        reference_acceleration,
+        k_r_space,
+        title=f"A460 pair, {kind}{'' if friction else ', without friction'}",
+    )
+
+
+def _member(robot: Robot, i: int, friction: Friction) -> Member:
+    placed = robot.placed(*BASES[i], name=f"A460 {i + 1}")
+    return Member(
+        placed,
+        Cubic(INITIAL[i], FINAL[i], MOTION_TIME),
+        theta_hat0=KNOWN * placed.inertial_parameters,
+        friction=friction,
+    )

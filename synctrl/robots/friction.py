@@ -1,0 +1,41 @@
+"""Joint friction of the true plant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..checks import finite_array, positive_number
+from ..errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class Friction:
+    """Viscous and smoothed Coulomb friction: viscous v + coulomb tanh(v / smoothing).
+
+    Args:
+        viscous: number or (nv,), N·m·s/rad.
+        coulomb: number or (nv,), N·m.
+        smoothing: velocity at which Coulomb friction reaches tanh(1) of its value, rad/s.
+
+    Raises:
+        InputError: not finite, negative, or a smoothing velocity that is not positive.
+    """
+
+    viscous: Any = 0.0
+    coulomb: Any = 0.0
+    smoothing: float = 0.01
+
+    def __post_init__(self) -> None:
+        for name in ("viscous", "coulomb"):
+            array = finite_array(name, getattr(self, name))
+            if array.size and array.min() < 0:
+                raise InputError(f"{name}: expected coefficients of at least 0, found {array.min():g}")
+            object.__setattr__(self, name, array)
+        object.__setattr__(self, "smoothing", positive_number("smoothing", self.smoothing))
+
+    def torque(self, v: np.ndarray) -> np.ndarray:
+        """Torque by which friction opposes the velocities v, (..., nv), in N·m."""
+        return self.viscous * v + self.coulomb * np.tanh(v / self.smoothing)

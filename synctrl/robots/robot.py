@@ -1,0 +1,275 @@
+"""Robot: a fixed-base mechanism and its rigid-body algorithms, the only owner of a Pinocchio model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from ..checks import finite_array
+from ..errors import FrameNotFound, InputError, RobotError
+from .catalog import load_description
+
+
+class Robot:
+    """A fixed-base robot with nv joints and one tip frame, placed in the world.
+
+    Joint positions q, (nv,), are angles in rad (or m for a sliding joint), also for joints that turn without
+    end, which Pinocchio stores as cosine and sine. Everything Cartesian is in world axes.
+
+    The model is never changed after construction; methods share scratch memory, so one Robot must not be used
+    from two threads at once.
+
+    Args:
+        model: rigid-body model, with a fixed base.
+        tip: name of the frame whose motion is controlled in Cartesian space.
+        visual: shapes for display, or None.
+        name: what error messages and legends call it.
+
+    Raises:
+        FrameNotFound: `tip` is not a frame of the model.
+        RobotError: the model has a floating base or another joint with several velocities.
+    """
+
+    def __init__(
+        self,
+        model: pin.Model,
+        tip: str,
+        *,
+        visual: pin.GeometryModel | None = None,
+        name: str | None = None,
+    ):
+        self.model = model
+        self.name = name or model.name
+        self.visual = visual
+        for joint, joint_name in zip(model.joints[1:], model.names[1:], strict=False):
+            if joint.nv != 1:
+                raise RobotError(
+                    f"robot '{self.name}': joint '{joint_name}' has {joint.nv} degrees of freedom; "
+                    "expected joints with one (fixed-base arms of revolute and prismatic joints)"
+                )
+        self.tip, self.tip_id = tip, self._frame_id(tip)
+        self.nv: int = model.nv
+        self.joint_names: tuple[str, ...] = tuple(model.names)[1:]
+        self.body_count: int = model.njoints - 1
+        self._data = model.createData()
+        self._weightless = pin.Model(model)
+        self._weightless.gravity.setZero()
+        self._weightless_data = self._weightless.createData()
+        self._neutral = pin.neutral(model)
+        self._plain_q = model.nq == model.nv
+        self._zero = np.zeros(model.nv)
+
+    # -- making robots ------------------------------------------------------------------------------------
+
+    def placed(self, xyz: ArrayLike = (0, 0, 0), rpy: ArrayLike = (0, 0, 0), name: str | None = None) -> Self:
+        """This robot with its base moved: a new Robot.
+
+        Args:
+            xyz: displacement in the world, (3,), m.
+            rpy: rotation about the fixed world axes x, y, z in that order, (3,), rad.
+            name: name of the new robot.
+        """
+        shift = finite_array("xyz", xyz, (3,))
+        angles = finite_array("rpy", rpy, (3,))
+        base = pin.SE3(pin.rpy.rpyToMatrix(*angles), np.array(shift))
+        model = pin.Model(self.model)
+        for joint in range(1, model.njoints):
+            if model.parents[joint] == 0:
+                model.jointPlacements[joint] = base * model.jointPlacements[joint]
+        for frame in model.frames:
+            if frame.parentJoint == 0 and frame.name != "universe":
+                frame.placement = base * frame.placement
+        return type(self)(model, self.tip, visual=_moved(self.visual, base), name=name or self.name)
+
+    def with_tip(self, tip: str) -> Self:
+        """This robot controlled at another frame."""
+        return type(self)(self.model, tip, visual=self.visual, name=self.name)
+
+    def with_parameters(self, pi: ArrayLike) -> Self:
+        """This robot with other true inertial parameters.
+
+        Args:
+            pi: (10 bodies,) in Pinocchio's order, see `inertial_parameters`.
+
+        Raises:
+            RobotError: a body would have no positive mass or no positive definite inertia.
+        """
+        rows = finite_array("pi", pi, (10 * self.body_count,)).reshape(-1, 10)
+        model = pin.Model(self.model)
+        for joint, row in enumerate(rows, start=1):
+            _check_inertia(self.name, self.joint_names[joint - 1], row)
+            model.inertias[joint] = pin.Inertia.FromDynamicParameters(np.array(row))
+        return type(self)(model, self.tip, visual=self.visual, name=self.name)
+
+    # -- what it is ---------------------------------------------------------------------------------------
+
+    @property
+    def inertial_parameters(self) -> np.ndarray:
+        """True inertial parameters, (10 bodies,).
+
+        Per moving body m, m c_x, m c_y, m c_z, I_xx, I_xy, I_yy, I_xz, I_yz, I_zz, inertia about the joint
+        origin, in kg, kg·m and kg·m^2.
+        """
+        return np.concatenate([self.model.inertias[j].toDynamicParameters() for j in self._moving()])
+
+    @property
+    def inertial_parameter_names(self) -> tuple[str, ...]:
+        """Names of `inertial_parameters`, for example `joint1.m`."""
+        kinds = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
+        return tuple(f"{joint}.{kind}" for joint in self.joint_names for kind in kinds)
+
+    @property
+    def gravity_vector(self) -> np.ndarray:
+        """Acceleration of gravity in the world, (3,), m/s^2."""
+        return self.model.gravity.linear.copy()
+
+    def configuration(self, q: ArrayLike) -> np.ndarray:
+        """Pinocchio's configuration vector, (nq,), of joint positions q, (nv,)."""
+        q = np.asarray(q, dtype=float)
+        return q if self._plain_q else pin.integrate(self.model, self._neutral, q)
+
+    # -- dynamics -----------------------------------------------------------------------------------------
+
+    def mass_matrix(self, q: ArrayLike) -> np.ndarray:
+        """M(q), (nv, nv), kg·m^2."""
+        return pin.crba(self.model, self._data, self.configuration(q)).copy()
+
+    def coriolis_matrix(self, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+        """C(q, v) from Christoffel symbols, (nv, nv): M' - 2C is skew-symmetric."""
+        return pin.computeCoriolisMatrix(self.model, self._data, self.configuration(q), _vector(v)).copy()
+
+    def gravity(self, q: ArrayLike) -> np.ndarray:
+        """g(q), (nv,), N·m."""
+        return pin.computeGeneralizedGravity(self.model, self._data, self.configuration(q)).copy()
+
+    def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> np.ndarray:
+        """Torque M a + C v + g, (nv,), N·m."""
+        return pin.rnea(self.model, self._data, self.configuration(q), _vector(v), _vector(a)).copy()
+
+    def forward_dynamics(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike) -> np.ndarray:
+        """Acceleration under joint torques tau, (nv,), rad/s^2."""
+        return pin.aba(self.model, self._data, self.configuration(q), _vector(v), _vector(tau)).copy()
+
+    def regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
+        """Slotine-Li regressor Y, (nv, 10 bodies).
+
+        Y pi = M(q) a_ref + C(q, v) v_ref + g(q) for the inertial parameters pi. Pinocchio's regressor knows
+        one velocity only; because C(q, .) is linear and symmetric in its two velocities,
+        C(v) v_ref = C(a) a - C(b) b with a = (v + v_ref)/2 and b = (v - v_ref)/2.
+
+        Args:
+            q, v: joint positions and velocities, (nv,).
+            v_ref, a_ref: reference velocity and acceleration, (nv,).
+        """
+        q = self.configuration(q)
+        mean = 0.5 * (v + v_ref)
+        forward = pin.computeJointTorqueRegressor(self.model, self._data, q, mean, a_ref)
+        forward -= pin.computeJointTorqueRegressor(
+            self._weightless, self._weightless_data, q, v - mean, self._zero
+        )
+        return forward
+
+    def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
+        """`forward_dynamics` for arrays that are known to be right; scratch memory, valid until the next call."""
+        return pin.aba(self.model, self._data, self.configuration(q), v, tau)
+
+    # -- kinematics ---------------------------------------------------------------------------------------
+
+    def tip_pose(self, q: ArrayLike) -> pin.SE3:
+        """Placement of the tip frame in the world."""
+        pin.forwardKinematics(self.model, self._data, self.configuration(q))
+        return pin.updateFramePlacement(self.model, self._data, self.tip_id).copy()
+
+    def tip_position(self, q: ArrayLike) -> np.ndarray:
+        """Position of the tip in the world, (3,), m."""
+        return self.tip_pose(q).translation.copy()
+
+    def jacobian(self, q: ArrayLike) -> np.ndarray:
+        """Jacobian of the tip, (6, nv): linear velocity of the tip, then angular, in world axes."""
+        return pin.computeFrameJacobian(
+            self.model, self._data, self.configuration(q), self.tip_id, pin.LOCAL_WORLD_ALIGNED
+        ).copy()
+
+    def jacobian_dot(self, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+        """Time derivative of `jacobian` along v, (6, nv)."""
+        return self.tip_kinematics(np.asarray(q, dtype=float), _vector(v))[2].copy()
+
+    def tip_kinematics(self, q: np.ndarray, v: np.ndarray) -> tuple[pin.SE3, np.ndarray, np.ndarray]:
+        """Pose of the tip, its Jacobian and the Jacobian's derivative, from one pass over the mechanism.
+
+        The pose is scratch memory, valid until the next call.
+        """
+        model, data, tip = self.model, self._data, self.tip_id
+        pin.computeJointJacobiansTimeVariation(model, data, self.configuration(q), v)
+        pose = pin.updateFramePlacement(model, data, tip)
+        J = pin.getFrameJacobian(model, data, tip, pin.LOCAL_WORLD_ALIGNED)
+        J_dot = pin.getFrameJacobianTimeVariation(model, data, tip, pin.LOCAL_WORLD_ALIGNED)
+        return pose, J, J_dot
+
+    # -- internals ----------------------------------------------------------------------------------------
+
+    def _moving(self) -> range:
+        return range(1, self.model.njoints)
+
+    def _frame_id(self, frame: str) -> int:
+        if not self.model.existFrame(frame):
+            raise FrameNotFound(self.name, frame, [f.name for f in self.model.frames])
+        return int(self.model.getFrameId(frame))
+
+    def __repr__(self) -> str:
+        return f"Robot('{self.name}', {self.nv} joints, tip '{self.tip}')"
+
+
+def load_robot(name_or_path: str | Path, tip: str | None = None) -> Robot:
+    """A robot from the catalogue, or from a URDF file.
+
+    Args:
+        name_or_path: a catalogue name such as "a460", or the path of a URDF file.
+        tip: frame to control in Cartesian space; by default the catalogue's, or the last link's.
+
+    Raises:
+        RobotError: no such file or name, or a description that is refused, with the reason.
+        FrameNotFound: no such frame.
+    """
+    if not isinstance(name_or_path, (str, Path)):
+        raise InputError(f"robot: expected a name or a path, found {type(name_or_path).__name__}")
+    description = load_description(name_or_path)
+    return Robot(
+        description.model, tip or description.tip, visual=description.visual, name=description.name
+    )
+
+
+def _vector(value: ArrayLike) -> np.ndarray:
+    return np.asarray(value, dtype=float)
+
+
+def _moved(visual: pin.GeometryModel | None, base: pin.SE3) -> pin.GeometryModel | None:
+    """Shapes with those fixed to the world moved along with the base."""
+    if visual is None:
+        return None
+    moved = visual.copy()
+    for shape in moved.geometryObjects:
+        if shape.parentJoint == 0:
+            shape.placement = base * shape.placement
+    return moved
+
+
+def _check_inertia(robot: str, joint: str, row: np.ndarray) -> None:
+    m, h = row[0], row[1:4]
+    ixx, ixy, iyy, ixz, iyz, izz = row[4:]
+    about_joint = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+    if m <= 0:
+        raise RobotError(
+            f"robot '{robot}', body of '{joint}': expected a mass above 0 kg, found {m:g}"
+        )
+    S = np.array([[0, -h[2], h[1]], [h[2], 0, -h[0]], [-h[1], h[0], 0]])
+    lowest = np.linalg.eigvalsh(about_joint + S @ S / m)[0]
+    if lowest <= 0:
+        raise RobotError(
+            f"robot '{robot}', body of '{joint}': expected a positive definite inertia about the centre of "
+            f"mass, found a smallest eigenvalue of {lowest:g} kg·m^2"
+        )

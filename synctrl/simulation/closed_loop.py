@@ -1,0 +1,59 @@
+"""Controller and plant as one differential equation over one flat state vector."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..control.controller import Controller, Signals
+from ..tasks.cell import Reference
+from .plant import Plant
+
+
+class ClosedLoop:
+    """y' = f(t, y) with y = (q, v, theta_hat, integrals of epsilon).
+
+    Args:
+        controller: the controller of a cell.
+        plant: the true cell.
+    """
+
+    def __init__(self, controller: Controller, plant: Plant):
+        self.controller, self.plant = controller, plant
+        cell = self.cell = controller.cell
+        self._shapes = [(cell.n, cell.nv)] * 2 + [cell.theta.shape, (cell.coupling.pairs, cell.m)]
+        ends = np.cumsum([0] + [rows * columns for rows, columns in self._shapes])
+        self._slices = [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        self.size = int(ends[-1])
+
+    def initial_state(self) -> np.ndarray:
+        """y at t = 0."""
+        cell = self.cell
+        integral = np.zeros(self._shapes[3])
+        return np.concatenate([part.ravel() for part in (cell.q0, cell.v0, cell.theta_hat0, integral)])
+
+    def split(self, y: np.ndarray) -> list[np.ndarray]:
+        """Views of q, v, theta_hat and the integrals in y."""
+        return [y[part].reshape(shape) for part, shape in zip(self._slices, self._shapes, strict=True)]
+
+    def evaluate(
+        self, reference: Reference, y: np.ndarray, disturbance: np.ndarray
+    ) -> tuple[np.ndarray, Signals]:
+        """y' and everything the controller computed on the way.
+
+        Args:
+            reference: what is desired at this instant.
+            y: state.
+            disturbance: torque from outside, (n, nv), N·m.
+        """
+        q, v, theta_hat, integral = self.split(y)
+        signals = self.controller.evaluate(reference, q, v, theta_hat, integral)
+        tau = signals.tau - self.plant.friction(v) + disturbance
+        y_dot = np.concatenate(
+            (
+                v.ravel(),
+                self.plant.acceleration(q, v, tau).ravel(),
+                signals.theta_hat_dot.ravel(),
+                signals.epsilon.ravel(),
+            )
+        )
+        return y_dot, signals

@@ -1,0 +1,81 @@
+"""Torques from outside, acting in windows of time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..checks import finite_array, finite_number
+from ..errors import InputError
+from ..tasks.cell import Cell
+
+
+@dataclass(frozen=True, eq=False)
+class Disturbance:
+    """A constant joint torque on one robot for start <= t < stop.
+
+    Args:
+        robot: index of the robot, counted from 0.
+        torque: (nv,), or one number for every joint, N·m.
+        start, stop: s.
+
+    Raises:
+        InputError: not finite, or a window that is empty or starts before 0.
+    """
+
+    robot: int
+    torque: Any
+    start: float
+    stop: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "torque", finite_array("disturbance, torque", self.torque))
+        start = finite_number("disturbance, start", self.start)
+        stop = finite_number("disturbance, stop", self.stop)
+        if not 0 <= start < stop:
+            raise InputError(f"disturbance: expected 0 <= start < stop, found {start:g} and {stop:g} s")
+
+
+class DisturbanceSchedule:
+    """Torques of all disturbances together, piecewise constant in time.
+
+    Args:
+        cell: the cell they act on.
+        disturbances: the disturbances.
+
+    Raises:
+        InputError: a robot that is not in the cell, or a torque of the wrong size.
+    """
+
+    def __init__(self, cell: Cell, disturbances: Sequence[Disturbance]):
+        for disturbance in disturbances:
+            _check(cell, disturbance)
+        self.edges = tuple(sorted({edge for d in disturbances for edge in (d.start, d.stop)}))
+        bounds = (0.0, *self.edges, np.inf)
+        self._torques = []
+        for begin in bounds[:-1]:
+            torque = np.zeros((cell.n, cell.nv))
+            for d in disturbances:
+                if d.start <= begin < d.stop:
+                    torque[d.robot, : cell.robots[d.robot].nv] += d.torque
+            self._torques.append(torque)
+
+    def torque(self, t: float) -> np.ndarray:
+        """Torque on every joint, (n, nv), N·m; at an edge the value from the right."""
+        return self._torques[int(np.searchsorted(self.edges, t, side="right"))]
+
+
+def _check(cell: Cell, disturbance: Disturbance) -> None:
+    if not isinstance(disturbance, Disturbance):
+        raise InputError(f"disturbances: expected Disturbance objects, found {type(disturbance).__name__}")
+    robot = disturbance.robot
+    if isinstance(robot, bool) or not isinstance(robot, (int, np.integer)) or not 0 <= robot < cell.n:
+        raise InputError(f"disturbance, robot: expected an index from 0 to {cell.n - 1}, found {robot!r}")
+    nv = cell.robots[robot].nv
+    if disturbance.torque.shape not in ((), (nv,)):
+        raise InputError(
+            f"disturbance, torque: expected a number or shape ({nv},), found {disturbance.torque.shape}"
+        )

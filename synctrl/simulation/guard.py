@@ -1,0 +1,74 @@
+"""Watches a run and stops it when its numbers no longer mean anything."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import NonFiniteError, SingularJacobianError
+from ..tasks.cell import Cell
+from .closed_loop import ClosedLoop
+from .integrators import Sample
+
+
+class Guard:
+    """Checks every logged instant for non-finite states and singular Jacobians.
+
+    A Jacobian is also singular when its determinant has changed sign since the instant before: the arm has
+    jumped across a singular configuration in between.
+    """
+
+    def __init__(self, loop: ClosedLoop):
+        self._loop = loop
+        self._limit = getattr(loop.cell.space, "max_condition", np.inf)
+        self._sign: np.ndarray | None = None
+        self._condition = np.ones(loop.cell.n)
+
+    def check(self, sample: Sample) -> None:
+        """Raises:
+        NonFiniteError: a part of the state is infinite or not a number.
+        SingularJacobianError: a robot cannot follow its reference because its Jacobian is singular.
+        """
+        if not np.isfinite(sample.y).all():
+            raise self._non_finite(sample)
+        task = sample.signals.task
+        if task.J is not None and task.J_inv is not None:
+            self._check_jacobians(sample.t, task.J, task.J_inv)
+
+    def _check_jacobians(self, t: float, J: np.ndarray, J_inv: np.ndarray) -> None:
+        condition = np.sqrt((J * J).sum((1, 2)) * (J_inv * J_inv).sum((1, 2)))
+        if not (condition < self._limit).all():
+            i = int(np.argmax(~(condition < self._limit)))
+            raise singular(self._loop.cell, t, i, f"its condition number is {condition[i]:.3g}")
+        self._condition = condition
+        sign = np.sign(np.linalg.det(J))
+        if self._sign is not None and (sign != self._sign).any():
+            i = int(np.argmax(sign != self._sign))
+            raise singular(self._loop.cell, t, i, "its determinant changed sign since the instant before")
+        self._sign = sign
+
+    def _non_finite(self, sample: Sample) -> NonFiniteError:
+        names = ("position", "velocity", "parameter estimate", "integral of the synchronization error")
+        for name, part in zip(names, self._loop.split(sample.y), strict=True):
+            rows = np.flatnonzero(~np.isfinite(part).all(axis=1))
+            if rows.size:
+                break
+        k = int(rows[0])
+        i = k if name != names[3] else int(self._loop.cell.coupling.edges[k, 0])
+        hint = "the gains may be too high for the step, or the closed loop unstable"
+        if self._condition[i] > 100:
+            hint = f"its Jacobian was near a singularity before, with condition number {self._condition[i]:.3g}"
+        return NonFiniteError(
+            f"the {name} of {self._loop.cell.names[i]} is no longer finite at t = {sample.t:g} s; {hint}",
+            time=sample.t,
+            robot=i,
+        )
+
+
+def singular(cell: Cell, t: float, robot: int, cause: str) -> SingularJacobianError:
+    """The error of a robot that met a singular configuration."""
+    return SingularJacobianError(
+        f"the Jacobian of {cell.names[robot]} is singular at t = {t:g} s: {cause}; "
+        "move the path away from the border of the workspace, or start in another configuration",
+        time=t,
+        robot=robot,
+    )

@@ -1,0 +1,96 @@
+"""Collects samples of a run into the arrays of a Result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from .closed_loop import ClosedLoop
+from .integrators import Sample
+from .result import LAYOUT, Result
+
+
+class Recorder:
+    """Preallocated arrays for all logged instants of a run."""
+
+    def __init__(self, loop: ClosedLoop, instants: int):
+        self._loop = loop
+        self._sizes = {"time": instants, **sizes(loop)}
+        self._arrays = {
+            name: np.zeros([self._sizes[d] for d in dimensions]) for name, (dimensions, _) in LAYOUT.items()
+        }
+        self._rows = tuple(self._arrays.values())
+        self.count = 0
+
+    def add(self, sample: Sample) -> None:
+        """Log one instant."""
+        q, v, theta_hat, integral = self._loop.split(sample.y)
+        s = sample.signals
+        values = (
+            sample.t, s.task.x, s.reference.xd, s.e, s.epsilon, integral, s.e_star,
+            q, v, s.s_q, s.tau, sample.disturbance, theta_hat,
+        )  # fmt: skip
+        for array, value in zip(self._rows, values, strict=True):
+            array[self.count] = value
+        self.count += 1
+
+    def result(self, status: str, info: Mapping[str, Any], experiment: Any) -> Result:
+        """What was logged until now."""
+        arrays = {name: array[: self.count].copy() for name, array in self._arrays.items()}
+        described = {"status": status, **describe(self._loop), **info}
+        return Result(**arrays, info=described, experiment=experiment)
+
+
+def sizes(loop: ClosedLoop) -> dict[str, int]:
+    """Lengths of all dimensions but time."""
+    cell = loop.cell
+    return {
+        "robot": cell.n,
+        "pair": cell.coupling.pairs,
+        "axis": cell.m,
+        "joint": cell.nv,
+        "parameter": cell.theta.shape[1],
+    }
+
+
+def describe(loop: ClosedLoop) -> dict[str, Any]:
+    """Names, units, gains and options, as plain data."""
+    cell, controller = loop.cell, loop.controller
+    return {
+        "title": cell.name,
+        "robots": [
+            {
+                "name": name,
+                "model": robot.name,
+                "joints": list(robot.joint_names),
+                "parameters": list(parameters.names),
+                "theta": [float(value) for value in parameters.theta],
+            }
+            for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True)
+        ],
+        "axes": list(cell.labels),
+        "task_unit": cell.space.unit,
+        "weighted_unit": cell.weighted_unit,
+        "coupling": cell.coupling.name,
+        "pairs": cell.coupling.edges.tolist(),
+        "signs": cell.coupling.signs.tolist(),
+        "sizes": sizes(loop),
+        "gains": controller.gains.as_dict(),
+        "reference_acceleration": controller.reference_acceleration,
+        "k_r_space": controller.k_r_space,
+        "versions": versions(),
+    }
+
+
+def versions() -> dict[str, str]:
+    """Versions of the packages that determine the numbers."""
+    found = {}
+    for package in ("synctrl", "pin", "numpy", "scipy"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed as a package"
+    return found

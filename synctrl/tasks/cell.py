@@ -1,0 +1,176 @@
+"""A cell: robots, each with its desired motion, in one task space and under one coupling."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..checks import finite_array, instance
+from ..errors import InputError
+from ..robots.friction import Friction
+from ..robots.parameters import FullParameters, Parameters
+from ..robots.robot import Robot
+from .coupling import Coupling
+from .spaces import JointSpace, Space
+from .trajectories import Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """One robot of a cell and what it starts from.
+
+    Args:
+        robot: the robot, placed in the world.
+        trajectory: its desired motion in the cell's space.
+        q0: joint positions at t = 0, (nv,), rad. In joint space, by default, on the path.
+        v0: joint velocities at t = 0, (nv,), rad/s; by default at rest.
+        parameters: what is adapted; by default all inertial parameters.
+        theta_hat0: estimate at t = 0, (P,); by default zeros, which is to know nothing.
+        friction: friction of the true plant, which the controller does not know; by default none.
+        name: for legends and messages.
+    """
+
+    robot: Robot
+    trajectory: Trajectory
+    q0: ArrayLike | None = None
+    v0: ArrayLike | None = None
+    parameters: Parameters | None = None
+    theta_hat0: ArrayLike | None = None
+    friction: Friction = field(default_factory=Friction)
+    name: str | None = None
+
+
+class Reference(NamedTuple):
+    """Desired motion, (n, m), and weights, (n, m, m), at one instant."""
+
+    xd: np.ndarray
+    xd_dot: np.ndarray
+    xd_ddot: np.ndarray
+    c: np.ndarray
+    c_dot: np.ndarray
+    c_ddot: np.ndarray
+    c_inv: np.ndarray
+
+
+class Cell:
+    """n robots that perform one task.
+
+    Robots with fewer joints or parameters than the largest have their rows padded with zeros.
+
+    Args:
+        members: the robots, at least two.
+        coupling: which of them are compared.
+        space: where the task is given; joint space by default.
+        name: for titles.
+
+    Raises:
+        InputError: sizes that do not fit together; the message names the member.
+        CouplingError: a coupling for another number of robots.
+    """
+
+    def __init__(
+        self, members: Sequence[Member], coupling: Coupling, space: Space | None = None, name: str = "cell"
+    ):
+        self.members = tuple(members)
+        self.coupling = coupling
+        self.space = JointSpace() if space is None else space
+        self.name = name
+        for member in self.members:
+            instance("members", member, Member, "Member objects")
+            instance("robot", member.robot, Robot, "a Robot, for example from load_robot")
+        instance("coupling", coupling, Coupling, "a Coupling")
+        if coupling.robots != len(self.members):
+            raise InputError(
+                f"coupling: made for {coupling.robots} robots, but the cell has {len(self.members)}"
+            )
+        self.robots = tuple(member.robot for member in self.members)
+        self.names = tuple(m.name or f"robot {i}" for i, m in enumerate(self.members, start=1))
+        self.labels = self.space.labels(self.robots)
+        self.task = self.space.bind(self.robots)
+        self._set_parameters()
+        self._set_initial_state()
+        self._check_trajectories()
+
+    # -- sizes --------------------------------------------------------------------------------------------
+
+    @property
+    def n(self) -> int:
+        """Number of robots."""
+        return len(self.members)
+
+    @property
+    def m(self) -> int:
+        """Dimension of the task."""
+        return len(self.labels)
+
+    @property
+    def nv(self) -> int:
+        """Largest number of joints."""
+        return max(robot.nv for robot in self.robots)
+
+    @property
+    def weighted_unit(self) -> str:
+        """Unit of c e, and so of the synchronization errors."""
+        unit = self.coupling.unit
+        return {"": self.space.unit, self.space.unit: f"{unit}²"}.get(unit, f"{unit}·{self.space.unit}")
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Instants at which a desired motion is not smooth, s."""
+        return tuple(sorted({b for m in self.members for b in m.trajectory.breaks}))
+
+    # -- desired motion -----------------------------------------------------------------------------------
+
+    def references(self, times: np.ndarray) -> list[Reference]:
+        """What is desired at each of the times, (T,)."""
+        motions = [member.trajectory(times) for member in self.members]
+        desired = [np.stack(part, axis=1) for part in zip(*motions, strict=True)]
+        weights = self.coupling.weights(times, self.m)
+        return [Reference(*row) for row in zip(*desired, *weights, strict=True)]
+
+    # -- internals ----------------------------------------------------------------------------------------
+
+    def _set_parameters(self) -> None:
+        self.parameters = tuple(m.parameters or FullParameters(m.robot) for m in self.members)
+        self.theta = _pad([p.theta for p in self.parameters])
+
+    def _set_initial_state(self) -> None:
+        q0, v0, theta_hat0 = [], [], []
+        for name, member, parameters in zip(self.names, self.members, self.parameters, strict=True):
+            nv = member.robot.nv
+            q0.append(finite_array(f"{name}, q0", self._start(name, member), (nv,)))
+            v0.append(finite_array(f"{name}, v0", np.zeros(nv) if member.v0 is None else member.v0, (nv,)))
+            size = len(parameters.theta)
+            guess = np.zeros(size) if member.theta_hat0 is None else member.theta_hat0
+            theta_hat0.append(finite_array(f"{name}, theta_hat0", guess, (size,)))
+        self.q0, self.v0, self.theta_hat0 = _pad(q0), _pad(v0), _pad(theta_hat0)
+
+    def _start(self, name: str, member: Member) -> ArrayLike:
+        if member.q0 is not None:
+            return member.q0
+        if isinstance(self.space, JointSpace):
+            return member.trajectory(0.0).x
+        raise InputError(f"{name}, q0: expected joint positions to start from, found none")
+
+    def _check_trajectories(self) -> None:
+        for name, member in zip(self.names, self.members, strict=True):
+            if member.trajectory.dimension != self.m:
+                raise InputError(
+                    f"{name}, trajectory: expected {self.m} coordinates ({', '.join(self.labels)}), "
+                    f"found {member.trajectory.dimension}"
+                )
+
+    def __repr__(self) -> str:
+        return f"Cell('{self.name}', {self.n} robots, {self.space!r}, {self.coupling!r})"
+
+
+def _pad(rows: Sequence[np.ndarray]) -> np.ndarray:
+    """Rows of different lengths as one array, filled up with zeros."""
+    padded = np.zeros((len(rows), max(len(row) for row in rows)))
+    for target, row in zip(padded, rows, strict=True):
+        target[: len(row)] = row
+    return padded
