@@ -264,9 +264,8 @@ def test_a_right_package_passes(checker: Callable[[Path], list[str]], tmp_path: 
 def libraries_after(statement: str) -> set[str]:
     """Top-level modules outside the standard library that a fresh interpreter holds after a statement."""
     code = f"{statement}\nimport sys\nprint(*{{m.partition('.')[0] for m in sys.modules}})"
-    run = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True, timeout=60
-    )
+    run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert run.returncode == 0, run.stderr
     return set(run.stdout.split()) - sys.stdlib_module_names
 
 
