@@ -1,0 +1,1 @@
+"""How it is done: the law, its gains, the controller."""

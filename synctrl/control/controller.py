@@ -116,8 +116,9 @@ class Controller:
         v_ref, a_ref = self.cell.task.to_joints(task, xref_dot, xref_ddot)
         s_q = v_ref - v
         Y = self._regressor(q, v, v_ref, a_ref)
-        force = law.synchronizing_force(c, sigma, self.K_eps)
-        tau = law.torque(Y, theta_hat, self._damping(task, s_q, c_inv, r), self.cell.task.to_torque(task, force))
+        damping = self._damping(task, s_q, c_inv, r)
+        coupling_torque = self.cell.task.to_torque(task, law.synchronizing_force(c, sigma, self.K_eps))
+        tau = law.torque(Y, theta_hat, damping, coupling_torque)
         theta_hat_dot = law.adaptation(Y, s_q, self.Gamma)
         return Signals(
             reference, task, e, e_dot, epsilon, epsilon_dot, E, sigma, e_star, u, u_dot, r,

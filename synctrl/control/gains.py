@@ -16,8 +16,8 @@ from ..errors import InputError
 class Gains:
     """Diagonal gains, each a number or a vector of diagonal entries.
 
-    K_r and Gamma may differ between robots: give one row per robot. Lambda, beta and K_eps are the same for all
-    robots of a cell, as the proof requires.
+    K_r and Gamma may differ between robots: give one row per robot. Lambda, beta and K_eps are the same for
+    all robots of a cell, as the proof requires.
 
     Args:
         Lambda: convergence rate on the sliding surface, (m,), 1/s, above 0.
@@ -53,7 +53,8 @@ class Gains:
         """These gains with some of them changed."""
         unknown = set(changes) - set(_SIGNS)
         if unknown:
-            raise InputError(f"gains: expected some of {', '.join(_SIGNS)}, found {', '.join(sorted(unknown))}")
+            known, found = ", ".join(_SIGNS), ", ".join(sorted(unknown))
+            raise InputError(f"gains: expected some of {known}, found {found}")
         return replace(self, **changes)
 
     def as_dict(self) -> dict[str, Any]:

@@ -1,8 +1,9 @@
 """Two CRS A460 arms that move a payload, section V-A of the paper: figures 2 to 7.
 
-Joint angles and gains are the paper's. Masses, inertias and friction of the A460 were never published: the ones
-used here are synthetic. The time of the motion, the initial estimate and the place of the second base are our
-choices as well; with these the two wrists carry a level payload 0.5 m long across its direction of travel.
+Joint angles and gains are the paper's. Masses, inertias and friction of the A460 were never published: the
+ones used here are synthetic. The time of the motion, the initial estimate and the place of the second base
+are our choices as well; with these the two wrists carry a level payload 0.5 m long across its direction of
+travel.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Four planar two-link arms, section V-B of the paper: figures 8 to 16.
 
-The numbers are those of Tables II and III and the text. Two choices the paper leaves open are arguments: phi of
-Table II is never given, and Table II contradicts the text on which robots move on the larger circle.
+The numbers are those of Tables II and III and the text. Two choices the paper leaves open are arguments: phi
+of Table II is never given, and Table II contradicts the text on which robots move on the larger circle.
 """
 
 from __future__ import annotations
@@ -52,7 +52,8 @@ def planar_four(
         synchronized: False sets beta = K_eps = 0, the paper's independent adaptive control.
         disturbance: "torque" for the paper's, or own disturbances.
         phi: initial angle of all arms on their circles, rad.
-        radii: "text" puts robots 2 and 3 on the larger circle as (46) and (47) do, "table" 2 and 4 as Table II.
+        radii: "text" puts robots 2 and 3 on the larger circle as (46) and (47) do, "table" 2 and 4 as
+            Table II.
         gains: by default the paper's.
         reference_acceleration, k_r_space: see `Controller`.
 
@@ -99,12 +100,11 @@ def _member(arm: Robot, i: int, phi: float, radius: float) -> Member:
 def _disturbances(disturbance: str | Disturbance | Sequence[Disturbance] | None) -> Sequence[Disturbance]:
     if disturbance is None:
         return ()
-    if isinstance(disturbance, str):
-        choice("disturbance", disturbance, ("torque",))
+    if disturbance == "torque":
         return (TORQUE_DISTURBANCE,)
     if isinstance(disturbance, Disturbance):
         return (disturbance,)
-    if isinstance(disturbance, Sequence):
+    if isinstance(disturbance, Sequence) and not isinstance(disturbance, str):
         return tuple(disturbance)
     raise InputError(f"disturbance: expected None, 'torque' or Disturbance objects, found {disturbance!r}")
 

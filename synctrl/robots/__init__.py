@@ -1,0 +1,1 @@
+"""Who moves: descriptions, rigid-body algorithms, parameters, friction."""

@@ -174,7 +174,7 @@ class Robot:
         return forward
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """`forward_dynamics` for arrays that are known to be right; scratch memory, valid until the next call."""
+        """`forward_dynamics` of arrays that are known to fit; scratch memory, valid until the next call."""
         return pin.aba(self.model, self._data, self.configuration(q), v, tau)
 
     # -- kinematics ---------------------------------------------------------------------------------------
@@ -238,9 +238,7 @@ def load_robot(name_or_path: str | Path, tip: str | None = None) -> Robot:
     if not isinstance(name_or_path, (str, Path)):
         raise InputError(f"robot: expected a name or a path, found {type(name_or_path).__name__}")
     description = load_description(name_or_path)
-    return Robot(
-        description.model, tip or description.tip, visual=description.visual, name=description.name
-    )
+    return Robot(description.model, tip or description.tip, visual=description.visual, name=description.name)
 
 
 def _vector(value: ArrayLike) -> np.ndarray:
@@ -263,9 +261,7 @@ def _check_inertia(robot: str, joint: str, row: np.ndarray) -> None:
     ixx, ixy, iyy, ixz, iyz, izz = row[4:]
     about_joint = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
     if m <= 0:
-        raise RobotError(
-            f"robot '{robot}', body of '{joint}': expected a mass above 0 kg, found {m:g}"
-        )
+        raise RobotError(f"robot '{robot}', body of '{joint}': expected a mass above 0 kg, found {m:g}")
     S = np.array([[0, -h[2], h[1]], [h[2], 0, -h[0]], [-h[1], h[0], 0]])
     lowest = np.linalg.eigvalsh(about_joint + S @ S / m)[0]
     if lowest <= 0:

@@ -1,0 +1,1 @@
+"""Let me see: figures, animations, pages."""

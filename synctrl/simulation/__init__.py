@@ -1,0 +1,1 @@
+"""What then happens: the plant, the closed loop in time, results."""

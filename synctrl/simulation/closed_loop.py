@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from ..control.controller import Controller, Signals
@@ -22,7 +24,7 @@ class ClosedLoop:
         cell = self.cell = controller.cell
         self._shapes = [(cell.n, cell.nv)] * 2 + [cell.theta.shape, (cell.coupling.pairs, cell.m)]
         ends = np.cumsum([0] + [rows * columns for rows, columns in self._shapes])
-        self._slices = [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        self._slices = [slice(a, b) for a, b in pairwise(ends)]
         self.size = int(ends[-1])
 
     def initial_state(self) -> np.ndarray:

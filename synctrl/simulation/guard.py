@@ -9,6 +9,9 @@ from ..tasks.cell import Cell
 from .closed_loop import ClosedLoop
 from .integrators import Sample
 
+#: parts of the state, in order
+PARTS = ("position", "velocity", "parameter estimate", "integral of the synchronization error")
+
 
 class Guard:
     """Checks every logged instant for non-finite states and singular Jacobians.
@@ -24,9 +27,11 @@ class Guard:
         self._condition = np.ones(loop.cell.n)
 
     def check(self, sample: Sample) -> None:
-        """Raises:
-        NonFiniteError: a part of the state is infinite or not a number.
-        SingularJacobianError: a robot cannot follow its reference because its Jacobian is singular.
+        """Stop the run if its numbers at this instant mean nothing.
+
+        Raises:
+            NonFiniteError: a part of the state is infinite or not a number.
+            SingularJacobianError: a robot cannot follow its reference because its Jacobian is singular.
         """
         if not np.isfinite(sample.y).all():
             raise self._non_finite(sample)
@@ -47,16 +52,12 @@ class Guard:
         self._sign = sign
 
     def _non_finite(self, sample: Sample) -> NonFiniteError:
-        names = ("position", "velocity", "parameter estimate", "integral of the synchronization error")
-        for name, part in zip(names, self._loop.split(sample.y), strict=True):
-            rows = np.flatnonzero(~np.isfinite(part).all(axis=1))
-            if rows.size:
-                break
-        k = int(rows[0])
-        i = k if name != names[3] else int(self._loop.cell.coupling.edges[k, 0])
+        parts = zip(PARTS, self._loop.split(sample.y), strict=True)
+        name, rows = next((name, bad) for name, part in parts if (bad := _non_finite_rows(part)).size)
+        i = int(rows[0]) if name != PARTS[3] else int(self._loop.cell.coupling.edges[rows[0], 0])
         hint = "the gains may be too high for the step, or the closed loop unstable"
         if self._condition[i] > 100:
-            hint = f"its Jacobian was near a singularity before, with condition number {self._condition[i]:.3g}"
+            hint = f"its Jacobian was nearly singular before, with condition number {self._condition[i]:.3g}"
         return NonFiniteError(
             f"the {name} of {self._loop.cell.names[i]} is no longer finite at t = {sample.t:g} s; {hint}",
             time=sample.t,
@@ -72,3 +73,7 @@ def singular(cell: Cell, t: float, robot: int, cause: str) -> SingularJacobianEr
         time=t,
         robot=robot,
     )
+
+
+def _non_finite_rows(part: np.ndarray) -> np.ndarray:
+    return np.flatnonzero(~np.isfinite(part).all(axis=1))

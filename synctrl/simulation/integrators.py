@@ -8,6 +8,7 @@ step everything is smooth.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -65,11 +66,12 @@ def adaptive(
 
     y = loop.initial_state()
     borders = np.concatenate(([clock.logged[0]], clock.jumps, [clock.logged[-1]]))
-    for t0, t1 in zip(borders[:-1], borders[1:], strict=True):
+    for t0, t1 in pairwise(borders):
         disturbance = schedule.torque(0.5 * (t0 + t1))
         rhs = _right_hand_side(loop, disturbance, t1)
         inside = clock.logged[(clock.logged >= t0) & (clock.logged < t1)]
-        solution = solve_ivp(rhs, (t0, t1), y, method=method, t_eval=np.append(inside, t1), rtol=rtol, atol=atol)
+        instants = np.append(inside, t1)
+        solution = solve_ivp(rhs, (t0, t1), y, method=method, t_eval=instants, rtol=rtol, atol=atol)
         for t, state in zip(solution.t, solution.y.T, strict=True):
             if t < t1:
                 yield _sample(loop, t, state, disturbance)

@@ -29,7 +29,7 @@ class Recorder:
         """Log one instant."""
         q, v, theta_hat, integral = self._loop.split(sample.y)
         s = sample.signals
-        values = (
+        values: tuple[Any, ...] = (
             sample.t, s.task.x, s.reference.xd, s.e, s.epsilon, integral, s.e_star,
             q, v, s.s_q, s.tau, sample.disturbance, theta_hat,
         )  # fmt: skip

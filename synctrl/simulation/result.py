@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self
@@ -82,7 +82,7 @@ class Result:
 
     @property
     def status(self) -> str:
-        """"completed", or why the run stopped."""
+        """`completed`, or why the run stopped."""
         return str(self.info["status"])
 
     @property
@@ -165,5 +165,3 @@ def _check_content(path: Path, info: Any, arrays: dict[str, np.ndarray]) -> None
                 f"'{path}': array '{name}': expected float64 of shape {expected}, "
                 f"found {arrays[name].dtype} of shape {arrays[name].shape}"
             )
-
-

@@ -80,7 +80,8 @@ class Experiment:
         Args:
             duration: s; by default the experiment's.
             dt: step of "rk4" and interval of the log, s.
-            integrator: "rk4", or a method of SciPy's solve_ivp: "RK45", "RK23", "DOP853", "Radau", "BDF", "LSODA".
+            integrator: "rk4", or a method of SciPy's solve_ivp: "RK45", "RK23", "DOP853", "Radau", "BDF",
+                "LSODA".
             rtol, atol: tolerances of SciPy's methods.
             progress: called with the time reached, s, at every logged instant.
 

@@ -1,0 +1,1 @@
+"""What is asked: spaces, desired motion, couplings, cells."""

@@ -165,7 +165,7 @@ class FunctionTrajectory:
         breaks: instants at which a derivative jumps, s.
 
     Raises:
-        TrajectoryError: at t = 0 the three do not return finite vectors of one size, or a later call does not.
+        TrajectoryError: the three do not return finite vectors of one size, at t = 0 or in a later call.
     """
 
     def __init__(
