@@ -49,13 +49,21 @@ class ClosedLoop:
         """
         q, v, theta_hat, integral = self.split(y)
         signals = self.controller.evaluate(reference, q, v, theta_hat, integral)
-        tau = signals.tau - self.plant.friction(v) + disturbance
-        y_dot = np.concatenate(
-            (
-                v.ravel(),
-                self.plant.acceleration(q, v, tau).ravel(),
-                signals.theta_hat_dot.ravel(),
-                signals.epsilon.ravel(),
-            )
-        )
-        return y_dot, signals
+        v_dot = self.plant.acceleration(q, v, signals.tau + disturbance)
+        parts = (v, v_dot, signals.theta_hat_dot, signals.epsilon)
+        return np.concatenate([part.ravel() for part in parts]), signals
+
+    def coast(self, y: np.ndarray, held: np.ndarray, tau: np.ndarray) -> np.ndarray:
+        """y' while the controller is not asked: only the plant moves on.
+
+        Args:
+            y: state.
+            held: y' at the last sample, of which the parts of the controller's state are kept.
+            tau: torque on the joints, (n, nv), N·m.
+        """
+        q, v, _, _ = self.split(y)
+        y_dot = held.copy()
+        moved, accelerated, _, _ = self.split(y_dot)
+        moved[:] = v
+        accelerated[:] = self.plant.acceleration(q, v, tau)
+        return y_dot

@@ -39,7 +39,7 @@ def rk4(loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule) -> Iterat
     y = loop.initial_state()
     logged = np.isin(clock.times, clock.logged)
     disturbance = schedule.torque(0.0)
-    for k, (t, t_next, references) in enumerate(_steps(loop, clock.times)):
+    for k, (t, t_next, references) in enumerate(steps(loop, clock.times)):
         start, middle, end = references
         disturbance = schedule.torque(0.5 * (t + t_next))
         h = t_next - t
@@ -50,7 +50,7 @@ def rk4(loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule) -> Iterat
         k3, _ = loop.evaluate(middle, y + 0.5 * h * k2, disturbance)
         k4, _ = loop.evaluate(end, y + h * k3, disturbance)
         y = y + (h / 6) * (k1 + 2 * (k2 + k3) + k4)
-    yield _final(loop, clock, y, disturbance)
+    yield final(loop, clock, y, disturbance)
 
 
 def adaptive(
@@ -79,13 +79,13 @@ def adaptive(
             reached = solution.t[-1] if solution.t.size else t0
             raise NonFiniteError(f"{method} stopped near t = {reached:g} s: {solution.message}", time=reached)
         y = solution.y[:, -1].copy()
-    yield _final(loop, clock, y, disturbance)
+    yield final(loop, clock, y, disturbance)
 
 
-def _steps(
+def steps(
     loop: ClosedLoop, times: np.ndarray
 ) -> Iterator[tuple[float, float, tuple[Reference, Reference, Reference]]]:
-    """Every step with what is desired at its start, in its middle, and just before its end."""
+    """Every step of the clock with what is desired at its start, in its middle, and just before its end."""
     for k in range(0, len(times) - 1, BLOCK):
         starts, ends = times[k : k + BLOCK + 1][:-1], times[k : k + BLOCK + 1][1:]
         tables = (
@@ -113,5 +113,6 @@ def _sample(loop: ClosedLoop, t: float, y: np.ndarray, disturbance: np.ndarray) 
     return Sample(float(t), y, disturbance, loop.evaluate(reference, y, disturbance)[1])
 
 
-def _final(loop: ClosedLoop, clock: Clock, y: np.ndarray, disturbance: np.ndarray) -> Sample:
+def final(loop: ClosedLoop, clock: Clock, y: np.ndarray, disturbance: np.ndarray) -> Sample:
+    """The sample at the end of the run."""
     return _sample(loop, float(clock.times[-1]), y, disturbance)

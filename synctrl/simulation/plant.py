@@ -28,7 +28,8 @@ class Plant:
         self.friction = self._friction if self.viscous.any() or self.coulomb.any() else _frictionless
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """v', (n, nv), under joint torques tau, (n, nv), that already include friction."""
+        """v', (n, nv), under joint torques tau, (n, nv), and friction."""
+        tau = tau - self.friction(v)
         for i, robot, nv in self._robots:
             self._v_dot[i, :nv] = robot.acceleration(q[i, :nv], v[i, :nv], tau[i, :nv])
         return self._v_dot

@@ -11,7 +11,7 @@ import numpy as np
 from ..checks import choice, instance, positive_number
 from ..control.controller import Controller
 from ..control.gains import Gains
-from ..errors import SimulationError
+from ..errors import InputError, SimulationError
 from ..tasks.cell import Cell
 from ..tasks.reachability import check_reachable
 from .clock import Clock, make_clock
@@ -22,6 +22,7 @@ from .integrators import ADAPTIVE, Sample, adaptive, rk4
 from .plant import Plant
 from .recorder import Recorder
 from .result import Result
+from .sampled import sampled_rk4, steps_per_sample
 
 Progress = Callable[[float], Any]
 
@@ -71,6 +72,7 @@ class Experiment:
         dt: float = 1e-3,
         integrator: str = "rk4",
         *,
+        control_period: float | None = None,
         rtol: float = 1e-9,
         atol: float = 1e-11,
         progress: Progress | None = None,
@@ -82,11 +84,14 @@ class Experiment:
             dt: step of "rk4" and interval of the log, s.
             integrator: "rk4", or a method of SciPy's solve_ivp: "RK45", "RK23", "DOP853", "Radau", "BDF",
                 "LSODA".
+            control_period: None for continuous control; otherwise torque and adaptation are held for this
+                long, a multiple of dt, s. Only with "rk4".
             rtol, atol: tolerances of SciPy's methods.
             progress: called with the time reached, s, at every logged instant.
 
         Raises:
-            InputError: a duration, step or tolerance that is not positive, or an unknown integrator.
+            InputError: a duration, step, period or tolerance that is not positive, an unknown integrator, or
+                sampled control with another integrator than "rk4".
             UnreachableError: a robot cannot reach its desired positions; raised before anything runs.
             NonFiniteError, SingularJacobianError: the run had to stop; the error carries what was computed.
         """
@@ -100,12 +105,28 @@ class Experiment:
         info["title"] = self.title or self.cell.name
         info["disturbances"] = [_describe(d) for d in self.disturbances]
         loop = self.closed_loop()
-        if integrator == "rk4":
+        if control_period is not None:
+            info["control_period"] = control_period
+            samples = _sampled(loop, clock, schedule, integrator, control_period, dt)
+        elif integrator == "rk4":
             samples = rk4(loop, clock, schedule)
         else:
             samples = adaptive(loop, clock, schedule, integrator, *tolerances)
             info["rtol"], info["atol"] = tolerances
         return _run(self, loop, clock, samples, info, progress)
+
+
+def _sampled(
+    loop: ClosedLoop,
+    clock: Clock,
+    schedule: DisturbanceSchedule,
+    integrator: str,
+    period: float,
+    dt: float,
+) -> Iterator[Sample]:
+    if integrator != "rk4":
+        raise InputError(f"control_period: sampled control needs the integrator 'rk4', found {integrator!r}")
+    return sampled_rk4(loop, clock, schedule, steps_per_sample(period, dt) * dt)
 
 
 def simulate(

@@ -1,0 +1,65 @@
+"""Sampled control: torque and adaptation are held between samples, as a digital controller does.
+
+This is another problem than the continuous law: its error falls with the first power of the period, and too
+long a period makes the closed loop unstable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ..checks import positive_number
+from ..errors import InputError
+from .clock import Clock
+from .closed_loop import ClosedLoop
+from .disturbances import DisturbanceSchedule
+from .integrators import Sample, final, steps
+
+
+def steps_per_sample(period: float, dt: float) -> int:
+    """How many steps a sample lasts.
+
+    Raises:
+        InputError: the period is not positive, or no multiple of dt.
+    """
+    period = positive_number("control_period", period)
+    count = round(period / dt)
+    if count < 1 or abs(count * dt - period) > 1e-9 * period:
+        raise InputError(f"control_period: expected a multiple of dt = {dt:g} s, found {period:g} s")
+    return count
+
+
+def sampled_rk4(
+    loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule, period: float
+) -> Iterator[Sample]:
+    """The plant by the classical Runge-Kutta method, under a controller that acts every `period` seconds.
+
+    Within a period torque, theta_hat' and the integrands of the synchronization errors keep their values, so
+    the estimates and integrals advance as in x_{k+1} = x_k + period x'_k.
+    """
+    y = loop.initial_state()
+    logged = np.isin(clock.times, clock.logged)
+    due = 0.0
+    held, tau = np.zeros(loop.size), np.zeros((loop.cell.n, loop.cell.nv))
+    for k, (t, t_next, (start, _, _)) in enumerate(steps(loop, clock.times)):
+        disturbance = schedule.torque(0.5 * (t + t_next))
+        if logged[k]:
+            y_dot, signals = loop.evaluate(start, y, disturbance)
+            if t >= due - 1e-9 * period:
+                held, tau = y_dot, signals.tau
+                due += period
+            yield Sample(t, y, disturbance, replace(signals, tau=tau))
+        y = _rk4_step(loop, y, t_next - t, held, tau + disturbance)
+    last = final(loop, clock, y, disturbance)
+    yield last._replace(signals=replace(last.signals, tau=tau))
+
+
+def _rk4_step(loop: ClosedLoop, y: np.ndarray, h: float, held: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    k1 = loop.coast(y, held, tau)
+    k2 = loop.coast(y + 0.5 * h * k1, held, tau)
+    k3 = loop.coast(y + 0.5 * h * k2, held, tau)
+    k4 = loop.coast(y + h * k3, held, tau)
+    return y + (h / 6) * (k1 + 2 * (k2 + k3) + k4)
