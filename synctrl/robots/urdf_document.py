@@ -1,0 +1,184 @@
+"""A URDF as plain frozen data: what this package reads, checks, changes and writes.
+
+A `Document` holds links, joints and shapes and no more. Everything else in a file (transmissions, simulator
+plugins, textures, sensors) is left behind when it is read, so what is checked is all there is.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+import pinocchio as pin
+
+Vector = tuple[float, ...]
+
+ZERO: Vector = (0.0, 0.0, 0.0)
+MOVING_TYPES = ("revolute", "continuous", "prismatic")
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Placement in a parent frame: `xyz` in m, `rpy` in rad about the fixed axes x, y, z in that order."""
+
+    xyz: Vector = ZERO
+    rpy: Vector = ZERO
+
+    @property
+    def se3(self) -> pin.SE3:
+        """The rigid transformation."""
+        return pin.SE3(pin.rpy.rpyToMatrix(*self.rpy), np.array(self.xyz))
+
+    @classmethod
+    def of(cls, placement: pin.SE3) -> Self:
+        """The pose that writes a rigid transformation, to rounding at every orientation.
+
+        Near a pitch of 90 deg roll and yaw are ill-conditioned one by one; roll is therefore taken from what
+        yaw leaves of the rotation, so that the product is right whatever yaw was.
+        """
+        R = placement.rotation
+        pitch = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
+        yaw = math.atan2(R[1, 0], R[0, 0])
+        s, c = math.sin(yaw), math.cos(yaw)
+        roll = math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
+        return cls(tuple(map(float, placement.translation)), (roll, pitch, yaw))
+
+
+@dataclass(frozen=True)
+class Inertial:
+    """Mass in kg, centre of mass and inertia axes, and (ixx, ixy, ixz, iyy, iyz, izz) in kg·m^2 about it."""
+
+    mass: float
+    inertia: Vector
+    origin: Pose = Pose()
+    line: int = 0
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """Inertia about the centre of mass in the axes of `origin`, (3, 3)."""
+        ixx, ixy, ixz, iyy, iyz, izz = self.inertia
+        return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+
+    def parameters(self, placement: pin.SE3) -> np.ndarray:
+        """The ten inertial parameters in a frame in which the link has this placement, Pinocchio's order."""
+        place = placement * self.origin.se3
+        com, R = place.translation, place.rotation
+        return pin.Inertia(self.mass, com, R @ self.matrix @ R.T).toDynamicParameters()
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A geometric primitive or a mesh.
+
+    `size` is (x, y, z) of a box, (radius, length) of a cylinder or capsule, (radius,) of a sphere, all in m,
+    and the scale (x, y, z) of a mesh, whose `filename` is as the file names it.
+    """
+
+    kind: str
+    size: Vector
+    filename: str | None = None
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """A shape on a link, for display or collision. `color` is red, green, blue, alpha from 0 to 1."""
+
+    shape: Shape
+    origin: Pose = Pose()
+    color: Vector | None = None
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class Link:
+    """A link. `line` is where it stands in its file, 0 if in none."""
+
+    name: str
+    inertial: Inertial | None = None
+    visuals: tuple[Geometry, ...] = ()
+    collisions: tuple[Geometry, ...] = ()
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Limits of a joint: torque in N·m (or N), speed in rad/s (or m/s), and the range in rad (or m)."""
+
+    effort: float
+    velocity: float
+    lower: float | None = None
+    upper: float | None = None
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint. `axis` is of unit length; `mimics` names the joint that a mimic joint follows."""
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    origin: Pose = Pose()
+    axis: Vector = (1.0, 0.0, 0.0)
+    limit: Limit | None = None
+    damping: float = 0.0
+    friction: float = 0.0
+    mimics: str | None = None
+    line: int = 0
+
+    @property
+    def moves(self) -> bool:
+        """Whether the joint has a degree of freedom."""
+        return self.type in MOVING_TYPES
+
+    def fixed(self, position: float) -> Joint:
+        """This joint held at a position, in rad or m: a fixed joint."""
+        axis = np.array(self.axis)
+        motion = (
+            pin.SE3(np.eye(3), position * axis)
+            if self.type == "prismatic"
+            else pin.SE3(pin.exp3(position * axis), np.zeros(3))
+        )
+        origin = self.origin if position == 0 else Pose.of(self.origin.se3 * motion)
+        return replace(self, type="fixed", origin=origin, limit=None, damping=0.0, friction=0.0, mimics=None)
+
+
+@dataclass(frozen=True)
+class Document:
+    """A robot as a URDF describes it. `file` is where it was read from, or None."""
+
+    name: str
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+    file: Path | None = None
+
+    @property
+    def source(self) -> str:
+        """What messages call it."""
+        return str(self.file) if self.file else f"robot '{self.name}'"
+
+    @property
+    def moving_joints(self) -> tuple[Joint, ...]:
+        """The joints with a degree of freedom, in the order of the document."""
+        return tuple(joint for joint in self.joints if joint.moves)
+
+    @property
+    def root(self) -> str:
+        """Name of the link that is nobody's child."""
+        children = {joint.child for joint in self.joints}
+        return next(link.name for link in self.links if link.name not in children)
+
+    @property
+    def last_link(self) -> str:
+        """Name of the last link, in the order of the document, that carries no other."""
+        parents = {joint.parent for joint in self.joints}
+        return [link.name for link in self.links if link.name not in parents][-1]
+
+    def where(self, item: Link | Joint, line: int | None = None) -> str:
+        """File, line and name of a link or joint, as messages begin; `line` is that of a part of it."""
+        line = line or item.line
+        kind = "link" if isinstance(item, Link) else "joint"
+        return f"{self.source}{f':{line}' if line else ''}: {kind} '{item.name}'"
