@@ -1,0 +1,138 @@
+"""Visual shapes of a robot: Pinocchio's geometry objects and their mesh files, whole and in colour."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import RobotError
+from .shapes import Color, Shape, box, capsule, cylinder, ellipsoid, mesh
+
+if TYPE_CHECKING:
+    import pinocchio as pin
+
+FORMATS = (".dae", ".glb", ".obj", ".ply", ".stl")
+
+
+class MeshLibrary:
+    """Mesh files, each read once."""
+
+    def __init__(self) -> None:
+        self._files: dict[Path, list[tuple[Shape, Color | None]]] = {}
+
+    def shapes(self, visual: pin.GeometryObject) -> list[Shape]:
+        """What to draw for one visual of a robot, in the frame of the joint that carries it.
+
+        A mesh gives one shape for each colour of its file. The colour of the robot description, where it has
+        one, replaces them. A file whose colours cannot be read is drawn in grey, with a warning.
+
+        Raises:
+            RobotError: the shape cannot be drawn (a plane, for instance).
+        """
+        color: Color = tuple(float(c) for c in visual.meshColor)  # type: ignore[assignment]
+        placement = visual.placement.homogeneous
+        path = Path(visual.meshPath)
+        if not path.suffix:
+            return [_placed(_primitive(visual, color), placement)]
+        stretch = placement @ np.diag([*visual.meshScale, 1.0])
+        try:
+            parts = self._read(path)
+        except _UnreadableMesh as error:
+            warnings.warn(f"visual '{visual.name}': {error}; it is drawn without its colours", stacklevel=2)
+            return [_placed(_triangles(visual.geometry, color), placement)]
+        keep = not visual.overrideMaterial
+        return [
+            _placed(replace(shape, color=own if own and keep else color), stretch) for shape, own in parts
+        ]
+
+    def _read(self, path: Path) -> list[tuple[Shape, Color | None]]:
+        if path not in self._files:
+            self._files[path] = _read_mesh(path)
+        return self._files[path]
+
+
+class _UnreadableMesh(Exception):
+    """A mesh file that Pinocchio could read and trimesh cannot."""
+
+
+def _placed(shape: Shape, placement: np.ndarray) -> Shape:
+    return replace(shape, matrix=placement @ shape.matrix)
+
+
+def _primitive(visual: pin.GeometryObject, color: Color) -> Shape:
+    shape = visual.geometry
+    match type(shape).__name__:
+        case "Box":
+            return box(2 * shape.halfSide, color)
+        case "Sphere":
+            return ellipsoid(np.full(3, shape.radius), color)
+        case "Ellipsoid":
+            return ellipsoid(shape.radii, color)
+        case "Cylinder":
+            return cylinder(shape.radius, 2 * shape.halfLength, color)
+        case "Cone":
+            return cylinder(shape.radius, 2 * shape.halfLength, color, top=0)
+        case "Capsule":
+            return capsule(shape.radius, 2 * shape.halfLength, color)
+        case kind if hasattr(shape, "tri_indices"):
+            return _triangles(shape, color)
+    raise RobotError(
+        f"visual '{visual.name}' is a {kind}, which cannot be drawn; expected a box, sphere, ellipsoid, "
+        "cylinder, cone, capsule or a mesh"
+    )
+
+
+def _triangles(shape: Any, color: Color) -> Shape:
+    """The triangles that Pinocchio itself holds, already scaled."""
+    triangles = [shape.tri_indices(k) for k in range(shape.num_tris)]
+    return mesh(shape.vertices(), np.array([[t[0], t[1], t[2]] for t in triangles]), color)
+
+
+def _read_mesh(path: Path) -> list[tuple[Shape, Color | None]]:
+    """One shape for each colour of a mesh file; the colour is None where the file gives none."""
+    import trimesh
+
+    groups: dict[Color | None, list[Any]] = {}
+    for part in _load(path):
+        bare = trimesh.Trimesh(part.vertices, part.faces, process=False)
+        groups.setdefault(_color(part), []).append(bare)
+    return [(_merged(parts), color) for color, parts in groups.items()]
+
+
+def _load(path: Path) -> list[Any]:
+    import trimesh
+
+    suffix = path.suffix.lower()
+    if suffix not in FORMATS:
+        raise _UnreadableMesh(f"mesh format of {path} is unknown; expected {', '.join(FORMATS)}")
+    try:
+        harmless = suffix != ".dae" or b"<!ENTITY" not in path.read_bytes()
+        parts = trimesh.load_scene(path, process=False).dump() if harmless else []
+    except Exception as error:  # each format has its own library, and each library its own errors
+        raise _UnreadableMesh(f"mesh {path} cannot be read ({type(error).__name__}: {error})") from error
+    if not harmless:
+        raise _UnreadableMesh(f"mesh {path} defines XML entities, which are refused")
+    return [part for part in parts if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+
+
+def _color(part: Any) -> Color | None:
+    visual = part.visual
+    if visual.kind is None:
+        return None
+    rgb = visual.material.main_color[:3] if visual.kind == "texture" else visual.main_color[:3]
+    r, g, b = (float(c) / 255 for c in rgb)
+    # Opaque: exporters disagree on whether 0 or 1 means transparent in a DAE file.
+    return r, g, b, 1.0
+
+
+def _merged(parts: list[Any]) -> Shape:
+    """One mesh of equal vertices merged; the page computes its normals."""
+    import trimesh
+
+    whole = trimesh.util.concatenate(parts)
+    whole.merge_vertices(merge_norm=True, merge_tex=True)
+    return mesh(whole.vertices, whole.faces)
