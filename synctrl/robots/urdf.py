@@ -92,7 +92,7 @@ def read_urdf(
     """
     document = read_document(existing_file(path))
     check_tree(document)
-    return describe(lock(document, locked or {}), package_dirs, tip=tip, locked=tuple(locked or ()))
+    return describe(lock_joints(document, locked or {}), package_dirs, tip=tip, locked=tuple(locked or ()))
 
 
 def describe(
@@ -114,7 +114,7 @@ def describe(
     return Description(document.name, model, visual, tip, document, locked)
 
 
-def lock(document: Document, positions: Mapping[str, float]) -> Document:
+def lock_joints(document: Document, positions: Mapping[str, float]) -> Document:
     """The document with joints held at positions, in rad or m: they become fixed joints.
 
     Raises:
