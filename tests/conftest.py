@@ -1,12 +1,12 @@
-"""What all tests share: no display needed, repeatable random inputs, and a browser where there is one."""
+"""What all tests share: figures without a display, and repeatable random inputs."""
 
 from __future__ import annotations
 
 import os
-import shutil
 
-import pytest
 from hypothesis import HealthCheck, settings
+
+from synctrl.experiments import a460_pair, planar_four
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
@@ -22,10 +22,12 @@ settings.load_profile("synctrl")
 
 
 @pytest.fixture(scope="session")
-def chromium() -> str:
-    """Path of Chromium. Without one the test is skipped, except under CI, where it fails."""
-    path = shutil.which("chromium") or shutil.which("chromium-browser")
-    if path is None:
-        report = pytest.fail if os.environ.get("CI") else pytest.skip
-        report("no Chromium on this machine (Debian: apt-get install chromium)")
-    return path
+def planar_run():
+    """Full runs of the four arms, each computed once: `planar_run(synchronized, disturbance)`."""
+    return cache(lambda synchronized=True, disturbance=None: planar_four(synchronized, disturbance).simulate())
+
+
+@pytest.fixture(scope="session")
+def a460_run():
+    """Full runs of the two A460, each computed once: `a460_run(synchronized, friction)`."""
+    return cache(lambda synchronized=True, friction=True: a460_pair(synchronized, friction).simulate())
