@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from functools import cache
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 from synctrl.experiments import a460_pair, planar_four
