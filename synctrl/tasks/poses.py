@@ -1,0 +1,194 @@
+"""Desired motion of a full pose: a position trajectory together with an orientation trajectory.
+
+The Motion of a pose has x = (position, rotation vector log R), x_dot = (velocity, angular velocity w) and
+x_ddot = (acceleration, w'), all in world axes: w is the angular velocity itself, R' = [w] R, and not the
+derivative of the rotation vector.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..checks import finite_array, finite_number, instance, positive_number
+from ..errors import InputError, TrajectoryError
+from . import rotations
+from .trajectories import Cubic, FunctionTrajectory, Hold, Motion, Trajectory
+
+
+class Turning(NamedTuple):
+    """Orientation, (..., 3, 3), angular velocity and acceleration in world axes, (..., 3), rad/s, rad/s^2."""
+
+    R: np.ndarray
+    w: np.ndarray
+    w_dot: np.ndarray
+
+
+class Orientation(Protocol):
+    """A desired orientation over time, smooth except at the instants in `breaks`."""
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Instants at which a derivative jumps, in s."""
+
+    def __call__(self, t: ArrayLike) -> Turning:
+        """Orientation at t, in s."""
+
+
+class AxisRotation:
+    """R(t) = exp(angle(t) axis) start: a turn about a fixed axis of the world.
+
+    Args:
+        start: orientation at angle 0, (3, 3).
+        axis: any length but 0, (3,).
+        angle: trajectory of one number, the angle, rad.
+
+    Raises:
+        InputError: `start` is no rotation matrix, the axis is zero, or `angle` has another dimension.
+    """
+
+    def __init__(self, start: ArrayLike, axis: ArrayLike, angle: Trajectory):
+        self.start = rotations.rotation_matrix("start", start)
+        self.axis = _unit("axis", axis)
+        if angle.dimension != 1:
+            raise InputError(f"angle: expected a trajectory of 1 number, found one of {angle.dimension}")
+        self.angle = angle
+        self.breaks = tuple(angle.breaks)
+
+    @classmethod
+    def fixed(cls, orientation: ArrayLike) -> Self:
+        """An orientation that does not change."""
+        return cls(orientation, (0, 0, 1), Hold([0.0]))
+
+    @classmethod
+    def between(cls, start: ArrayLike, end: ArrayLike, duration: float) -> Self:
+        """The shortest way from one orientation to another, as a cubic polynomial from rest to rest."""
+        R0, R1 = rotations.rotation_matrix("start", start), rotations.rotation_matrix("end", end)
+        phi = rotations.log(R1 @ R0.T)
+        size = float(np.linalg.norm(phi))
+        axis = phi if size > 0 else np.array([0.0, 0.0, 1.0])
+        return cls(R0, axis, Cubic([0.0], [size], duration))
+
+    @classmethod
+    def steady(cls, start: ArrayLike, axis: ArrayLike, speed: float) -> Self:
+        """A turn at constant speed, rad/s."""
+        w = finite_number("speed", speed)
+        return cls(start, axis, FunctionTrajectory(lambda t: [w * t], lambda t: [w], lambda t: [0.0]))
+
+    def __call__(self, t: ArrayLike) -> Turning:
+        angle, speed, growth = self.angle(t)
+        return Turning(rotations.exp(angle * self.axis) @ self.start, speed * self.axis, growth * self.axis)
+
+
+class FunctionOrientation:
+    """A desired orientation given by Python functions of one time.
+
+    Args:
+        rotation: function of t returning a rotation matrix, (3, 3).
+        velocity, acceleration: functions of t returning w and w' in world axes, (3,), rad/s and rad/s^2.
+        breaks: instants at which a derivative jumps, s.
+
+    Raises:
+        TrajectoryError: not a rotation matrix, or not three finite numbers, at t = 0 or in a later call.
+    """
+
+    def __init__(
+        self,
+        rotation: Callable[[float], ArrayLike],
+        velocity: Callable[[float], ArrayLike],
+        acceleration: Callable[[float], ArrayLike],
+        breaks: tuple[float, ...] = (),
+    ):
+        self._functions = (rotation, velocity, acceleration)
+        self.breaks = tuple(finite_number("breaks", b) for b in breaks)
+        self(0.0)
+
+    def __call__(self, t: ArrayLike) -> Turning:
+        times = np.asarray(t, dtype=float)
+        rows = [self._at(float(tk)) for tk in times.ravel()]
+        R, w, w_dot = (np.array(part) for part in zip(*rows, strict=True))
+        shape = times.shape
+        return Turning(R.reshape(*shape, 3, 3), w.reshape(*shape, 3), w_dot.reshape(*shape, 3))
+
+    def _at(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        rotation, velocity, acceleration = self._functions
+        try:
+            return (
+                rotations.rotation_matrix("rotation", rotation(t)),
+                finite_array("velocity", velocity(t), (3,)),
+                finite_array("acceleration", acceleration(t), (3,)),
+            )
+        except InputError as error:
+            raise TrajectoryError(f"orientation at t = {t:g} s: {error}") from error
+
+
+class PoseTrajectory:
+    """Desired motion of a full pose.
+
+    Args:
+        position: trajectory of the position, 3 numbers, m.
+        orientation: trajectory of the orientation; by default that of the world's axes.
+
+    Raises:
+        InputError: a position trajectory of another dimension.
+    """
+
+    dimension = 6
+
+    def __init__(self, position: Trajectory, orientation: Orientation | None = None):
+        if position.dimension != 3:
+            raise InputError(
+                f"position: expected a trajectory of 3 numbers, found one of {position.dimension}"
+            )
+        self.position = position
+        self.orientation = AxisRotation.fixed(np.eye(3)) if orientation is None else orientation
+        self.breaks = tuple(sorted({*position.breaks, *self.orientation.breaks}))
+
+    def __call__(self, t: ArrayLike) -> Motion:
+        return _pose_motion(self.position(t), self.orientation(t))
+
+
+class Attached:
+    """Desired motion of a frame that sits on a moving body, for example a hand that holds a payload.
+
+    With p, R of the body and the frame's place d, G on it: position p + R d, orientation R G.
+
+    Args:
+        body: desired motion of the body.
+        xyz: place of the frame in the body's axes, (3,), m.
+        rotation: orientation of the frame in the body's axes, (3, 3); by default the body's own.
+
+    Raises:
+        InputError: `body` is no PoseTrajectory, or `rotation` no rotation matrix.
+    """
+
+    dimension = 6
+
+    def __init__(self, body: PoseTrajectory, xyz: ArrayLike = (0, 0, 0), rotation: ArrayLike | None = None):
+        instance("body", body, PoseTrajectory, "a PoseTrajectory")
+        self.body = body
+        self.xyz = finite_array("xyz", xyz, (3,))
+        self.rotation = rotations.rotation_matrix("rotation", np.eye(3) if rotation is None else rotation)
+        self.breaks = body.breaks
+
+    def __call__(self, t: ArrayLike) -> Motion:
+        p, p_dot, p_ddot = self.body.position(t)
+        R, w, w_dot = self.body.orientation(t)
+        arm = R @ self.xyz
+        speed = np.cross(w, arm)
+        position = Motion(p + arm, p_dot + speed, p_ddot + np.cross(w_dot, arm) + np.cross(w, speed))
+        return _pose_motion(position, Turning(R @ self.rotation, w, w_dot))
+
+
+def _pose_motion(position: Motion, turning: Turning) -> Motion:
+    parts = (rotations.log(turning.R), turning.w, turning.w_dot)
+    return Motion(*(np.concatenate(pair, axis=-1) for pair in zip(position, parts, strict=True)))
+
+
+def _unit(name: str, vector: ArrayLike) -> np.ndarray:
+    v = finite_array(name, vector, (3,))
+    length = positive_number(f"length of {name}", np.linalg.norm(v))
+    return v / length
