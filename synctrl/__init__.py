@@ -11,30 +11,42 @@ from .simulation.result import Result
 from .simulation.simulate import Experiment, simulate
 from .tasks.cell import Cell, Member
 from .tasks.coupling import Coupling
+from .tasks.pose import PoseSpace
+from .tasks.poses import Attached, AxisRotation, FunctionOrientation, PoseTrajectory
+from .tasks.reachability import inverse_kinematics
+from .tasks.redundancy import Damping, Redundancy
 from .tasks.spaces import CartesianSpace, JointSpace
 from .tasks.trajectories import Circle, Cubic, ExponentialApproach, FunctionTrajectory, Hold
 
 __all__ = [
+    "Attached",
+    "AxisRotation",
     "CartesianSpace",
     "Cell",
     "Circle",
     "Controller",
     "Coupling",
     "Cubic",
+    "Damping",
     "Disturbance",
     "Experiment",
     "ExponentialApproach",
     "Friction",
     "FullParameters",
+    "FunctionOrientation",
     "FunctionTrajectory",
     "Gains",
     "Hold",
     "JointSpace",
     "LinearParameters",
     "Member",
+    "PoseSpace",
+    "PoseTrajectory",
+    "Redundancy",
     "Result",
     "Robot",
     "SynctrlError",
+    "inverse_kinematics",
     "load_robot",
     "simulate",
 ]

@@ -47,6 +47,10 @@ class CouplingError(SynctrlError):
     """A coupling that cannot synchronize: no inverse of a weight, a disconnected graph, ..."""
 
 
+class CouplingWarning(UserWarning):
+    """A coupling for which the theorem holds, but which does not do what its name suggests."""
+
+
 class SynchronizationError(CouplingError):
     """A synchronization function outside the theorem, or not satisfied by the desired motion."""
 
@@ -88,8 +92,16 @@ class SingularJacobianError(SimulationError):
     """A robot met a singular configuration in Cartesian control."""
 
 
+class OrientationError(SimulationError):
+    """An orientation error close to half a turn, where its direction is not defined."""
+
+
 class ResultError(SynctrlError):
     """A result file that is missing, damaged, or of another kind."""
+
+
+class CompilationError(SynctrlError):
+    """Generated code that could not be compiled, kept, or trusted."""
 
 
 class MissingDependencyError(SynctrlError, ImportError):

@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import UnreachableError
 from ..robots.robot import Robot
 from .cell import Cell
-from .spaces import CartesianSpace
+from .spaces import CartesianSpace, TipSpace
 
 SAMPLES = 60
 RESTARTS = 20
@@ -15,57 +15,61 @@ TOLERANCE = 1e-6
 
 
 def check_reachable(cell: Cell, times: np.ndarray) -> None:
-    """Follow every desired path by inverse kinematics.
+    """Follow every desired path by inverse kinematics, in position or full pose.
+
+    Joint limits are not part of this: a path counts as reachable if joint positions for it exist at all.
 
     Raises:
-        UnreachableError: a desired position that the tip does not come within a micrometre of, from the path
-            before it or from twenty other configurations. The message names the robot and the time.
+        UnreachableError: a desired position or pose that the tip does not come within a micrometre (and a
+            microradian) of, from the path before it or from twenty other configurations. The message names
+            the robot and the time.
     """
-    if not isinstance(cell.space, CartesianSpace):
+    if not isinstance(cell.space, TipSpace):
         return
     times = np.unique(times[np.linspace(0, len(times) - 1, SAMPLES).astype(int)])
     for name, member, q in zip(cell.names, cell.members, cell.q0, strict=True):
         robot = member.robot
         q = q[: robot.nv]
         for t, target in zip(times, member.trajectory(times).x, strict=True):
-            found = inverse_kinematics(robot, target, q, cell.space.rows)
+            found = inverse_kinematics(robot, target, q, cell.space)
             if found is None:
-                raise _unreachable(name, robot, t, target, cell.space.axes)
+                raise _unreachable(name, robot, t, target, cell)
             q = found
 
 
 def inverse_kinematics(
-    robot: Robot, target: np.ndarray, q: np.ndarray, rows: list[int] | None = None
+    robot: Robot, target: np.ndarray, q: np.ndarray, space: TipSpace | None = None
 ) -> np.ndarray | None:
     """Joint positions, (nv,), that bring the tip to a target, or None if none were found.
 
-    Damped least squares from q, and then from other configurations drawn with a fixed seed.
+    Damped least squares from q, and then from other configurations drawn with a fixed seed. A redundant arm
+    stays close to the configuration it started from. Joint limits are not regarded.
 
     Args:
         robot: the robot.
-        target: desired coordinates of the tip in the world, (len(rows),), m.
+        target: task coordinates in the world, (m,): a position, m, or a position and a rotation vector.
         q: joint positions to start from, (nv,).
-        rows: which of x, y, z are prescribed; by default all.
+        space: what the coordinates mean; by default the position along x, y, z.
     """
-    rows = [0, 1, 2] if rows is None else rows
+    space = CartesianSpace() if space is None else space
     rng = np.random.default_rng(0)
     for _ in range(1 + RESTARTS):
-        found = _descend(robot, target, q, rows)
+        found = _descend(space, robot, target, q)
         if found is not None:
             return found
         q = rng.uniform(-np.pi, np.pi, robot.nv)
     return None
 
 
-def _descend(robot: Robot, target: np.ndarray, q: np.ndarray, rows: list[int]) -> np.ndarray | None:
+def _descend(space: TipSpace, robot: Robot, target: np.ndarray, q: np.ndarray) -> np.ndarray | None:
     """Levenberg-Marquardt: the damping shrinks with every step that helps, and grows otherwise."""
-    still, damping = np.zeros(robot.nv), 1e-6
-    error, J = _miss(robot, target, q, still, rows)
+    damping = 1e-6
+    error, J = space.miss(robot, target, q)
     for _ in range(60):
         if np.abs(error).max() < TOLERANCE:
             return q
-        step = J.T @ np.linalg.solve(J @ J.T + damping * np.eye(len(rows)), error)
-        new_error, new_J = _miss(robot, target, q + step, still, rows)
+        step = J.T @ np.linalg.solve(J @ J.T + damping * np.eye(space.m), error)
+        new_error, new_J = space.miss(robot, target, q + step)
         if np.linalg.norm(new_error) < np.linalg.norm(error):
             q, error, J, damping = q + step, new_error, new_J, max(damping / 10, 1e-12)
         else:
@@ -73,16 +77,13 @@ def _descend(robot: Robot, target: np.ndarray, q: np.ndarray, rows: list[int]) -
     return None
 
 
-def _miss(
-    robot: Robot, target: np.ndarray, q: np.ndarray, still: np.ndarray, rows: list[int]
-) -> tuple[np.ndarray, np.ndarray]:
-    pose, J, _ = robot.tip_kinematics(q, still)
-    return target - pose.translation[rows], J[rows].copy()
-
-
-def _unreachable(name: str, robot: Robot, t: float, target: np.ndarray, axes: str) -> UnreachableError:
-    position = ", ".join(f"{axis} = {value:.4g} m" for axis, value in zip(axes, target, strict=True))
+def _unreachable(name: str, robot: Robot, t: float, target: np.ndarray, cell: Cell) -> UnreachableError:
+    units = ("m",) * 3 + ("rad",) * 3
+    wanted = ", ".join(
+        f"{label} = {value:.4g} {unit}"
+        for label, value, unit in zip(cell.labels, target, units, strict=False)
+    )
     return UnreachableError(
-        f"{name} ('{robot.name}') cannot reach its desired position at t = {t:g} s: {position}; "
+        f"{name} ('{robot.name}') cannot reach its desired position at t = {t:g} s: {wanted}; "
         "expected a path inside the workspace of its tip"
     )

@@ -11,9 +11,11 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ..checks import positive_number
+from ..checks import choice, instance, positive_number
 from ..errors import InputError
 from ..robots.robot import Robot
+from .redundancy import Damping, InverseMap, Inversion, Redundancy, inverse_map
+from .tips import Tips
 
 AXES = "xyz"
 
@@ -22,7 +24,8 @@ class Measurement(NamedTuple):
     """Task coordinates of all robots and their desired motion, such that e' = xd_dot - x_dot.
 
     x, e, x_dot, xd_dot, xd_ddot are (n, m); J, J_inv and J_dot are (n, m, nv), (n, nv, m) and (n, m, nv), or
-    None in joint space.
+    None in joint space. J_inv is J^-1, or a right inverse of a redundant arm's J. `inversion` has how it was
+    found.
     """
 
     x: np.ndarray
@@ -33,6 +36,7 @@ class Measurement(NamedTuple):
     J: np.ndarray | None = None
     J_inv: np.ndarray | None = None
     J_dot: np.ndarray | None = None
+    inversion: Inversion | None = None
 
 
 class BoundSpace(Protocol):
@@ -109,24 +113,76 @@ class BoundJointSpace:
         return force
 
 
-class CartesianSpace:
-    """Position of the tip along some axes of the world, for arms with as many joints as axes.
+class TipSpace:
+    """What position and pose of the tip have in common: how joint motion follows from task motion.
+
+    Args:
+        m: number of task coordinates.
+        max_condition: a Jacobian with a larger condition number counts as singular.
+        singularity: "stop" ends a run at a singular Jacobian with an error. "damped", or a `Damping`, goes
+            on with damped least squares; the result's `info["damping"]` then says when and how much.
+        redundancy: what arms do with joints that the task leaves free.
+
+    Raises:
+        InputError: another word, or a limit that is not positive.
+    """
+
+    def __init__(
+        self, m: int, max_condition: float, singularity: str | Damping, redundancy: Redundancy | None
+    ):
+        self.m = m
+        self.redundancy = Redundancy() if redundancy is None else redundancy
+        instance("redundancy", self.redundancy, Redundancy, "a Redundancy")
+        self.damping = _damping(singularity)
+        limit = positive_number("max_condition", max_condition)
+        self.max_condition = limit if self.damping is None else np.inf
+
+    def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Error e, (m,), of one robot against a target, (m,), and the J, (m, nv), with e' = -J v."""
+        raise NotImplementedError
+
+    def inverse_map(self, robots: Sequence[Robot]) -> InverseMap:
+        """The way to the joints of these robots.
+
+        Raises:
+            InputError: a robot with fewer joints than there are task coordinates.
+        """
+        for robot in robots:
+            if robot.nv < self.m:
+                raise InputError(
+                    f"{self!r}: expected robots with at least {self.m} joints, "
+                    f"found robot '{robot.name}' with {robot.nv}"
+                )
+        return inverse_map(robots, self.m, self.redundancy, self.damping)
+
+
+class CartesianSpace(TipSpace):
+    """Position of the tip along some axes of the world.
 
     Args:
         axes: which axes, for example "xy" or "xyz".
         max_condition: a Jacobian with a larger condition number counts as singular.
+        singularity: "stop" ends a run at a singular Jacobian with an error. "damped", or a `Damping`, goes
+            on with damped least squares; the result's `info["damping"]` then says when and how much.
+        redundancy: what arms with more joints than axes do with the rest.
 
     Raises:
-        InputError: axes other than x, y, z, or a limit that is not positive.
+        InputError: axes other than x, y, z, a limit that is not positive, or an unknown word.
     """
 
     unit = "m"
 
-    def __init__(self, axes: str = "xyz", max_condition: float = 1e4):
+    def __init__(
+        self,
+        axes: str = "xyz",
+        max_condition: float = 1e4,
+        singularity: str | Damping = "stop",
+        redundancy: Redundancy | None = None,
+    ):
         if not isinstance(axes, str) or not axes or set(axes) - set(AXES) or len(set(axes)) != len(axes):
             raise InputError(f"axes: expected different letters out of x, y, z, found {axes!r}")
+        super().__init__(len(axes), max_condition, singularity, redundancy)
         self.axes = axes
-        self.max_condition = positive_number("max_condition", max_condition)
         self.rows = [AXES.index(a) for a in axes]
 
     def labels(self, robots: Sequence[Robot]) -> tuple[str, ...]:
@@ -137,58 +193,51 @@ class CartesianSpace:
         """Cartesian space of these robots.
 
         Raises:
-            InputError: a robot has more or fewer joints than there are axes.
+            InputError: a robot has fewer joints than there are axes, or a redundancy that does not fit.
         """
-        for robot in robots:
-            if robot.nv != len(self.axes):
-                raise InputError(
-                    f"Cartesian space of axes '{self.axes}': expected robots with {len(self.axes)} joints, "
-                    f"found robot '{robot.name}' with {robot.nv}"
-                )
-        return BoundCartesianSpace(robots, self.rows)
+        return BoundCartesianSpace(Tips(robots), self.inverse_map(robots), self.rows)
+
+    def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        pose, J, _ = robot.tip_kinematics(q, np.zeros(robot.nv))
+        return target - pose.translation[self.rows], J[self.rows]
 
     def __repr__(self) -> str:
         return f"CartesianSpace('{self.axes}')"
 
 
-class BoundCartesianSpace:
-    """Tip positions: x' = J v, so v_ref = J^-1 xref' and a_ref = J^-1 (xref'' - J' v_ref)."""
+class BoundTipSpace:
+    """Task coordinates that move with x' = J v; an inverse of J leads from the task to the joints."""
 
-    def __init__(self, robots: Sequence[Robot], rows: list[int]):
-        n, m = len(robots), len(rows)
-        self._robots, self._rows = robots, rows
-        self._x = np.empty((n, 3))
-        self._J = np.empty((n, 6, m))
-        self._J_dot = np.empty((n, 6, m))
-
-    def measure(
-        self, q: np.ndarray, v: np.ndarray, xd: np.ndarray, xd_dot: np.ndarray, xd_ddot: np.ndarray
-    ) -> Measurement:
-        for i, robot in enumerate(self._robots):
-            pose, self._J[i], self._J_dot[i] = robot.tip_kinematics(q[i], v[i])
-            self._x[i] = pose.translation
-        x = self._x.take(self._rows, 1)
-        J = self._J.take(self._rows, 1)
-        J_dot = self._J_dot.take(self._rows, 1)
-        return Measurement(x, xd - x, np.matvec(J, v), xd_dot, xd_ddot, J, _inverse(J), J_dot)
+    def __init__(self, tips: Tips, inverse: InverseMap):
+        self._tips, self._inverse = tips, inverse
 
     def to_joints(
         self, task: Measurement, xref_dot: np.ndarray, xref_ddot: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        v_ref = np.matvec(task.J_inv, xref_dot)
-        a_ref = np.matvec(task.J_inv, xref_ddot - np.matvec(task.J_dot, v_ref))
-        return v_ref, a_ref
+        return self._inverse.to_joints(task.J, task.J_dot, task.inversion, xref_dot, xref_ddot)  # type: ignore[arg-type]
 
     def to_torque(self, task: Measurement, force: np.ndarray) -> np.ndarray:
-        return np.vecmat(force, task.J)
+        return np.vecmat(force, task.J)  # type: ignore[arg-type]
 
 
-def _inverse(J: np.ndarray) -> np.ndarray:
-    """J^-1 row by row; not-a-number where there is none, so that the run's guard can name the robot."""
-    try:
-        return np.linalg.inv(J)
-    except np.linalg.LinAlgError:
-        regular = np.linalg.det(J) != 0
-        inverse = np.full_like(J, np.nan)
-        inverse[regular] = np.linalg.inv(J[regular])
-        return inverse
+class BoundCartesianSpace(BoundTipSpace):
+    """Tip positions along some axes."""
+
+    def __init__(self, tips: Tips, inverse: InverseMap, rows: list[int]):
+        super().__init__(tips, inverse)
+        self._rows = rows
+
+    def measure(
+        self, q: np.ndarray, v: np.ndarray, xd: np.ndarray, xd_dot: np.ndarray, xd_ddot: np.ndarray
+    ) -> Measurement:
+        tips, rows = self._tips, self._rows
+        tips.update(q, v)
+        x, J, J_dot = (part.take(rows, 1) for part in (tips.position, tips.J, tips.J_dot))
+        inversion = self._inverse.invert(J, J_dot, q, v)
+        return Measurement(x, xd - x, np.matvec(J, v), xd_dot, xd_ddot, J, inversion.J_inv, J_dot, inversion)
+
+
+def _damping(singularity: str | Damping) -> Damping | None:
+    if isinstance(singularity, Damping):
+        return singularity
+    return Damping() if choice("singularity", singularity, ("stop", "damped")) == "damped" else None
