@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import NonFiniteError, SingularJacobianError
+from ..errors import NonFiniteError, OrientationError, SingularJacobianError
 from ..tasks.cell import Cell
+from ..tasks.pose import MAX_ANGLE, PoseSpace
 from .closed_loop import ClosedLoop
 from .integrators import Sample
 
@@ -14,15 +15,17 @@ PARTS = ("position", "velocity", "parameter estimate", "integral of the synchron
 
 
 class Guard:
-    """Checks every logged instant for non-finite states and singular Jacobians.
+    """Checks every logged instant for non-finite states, singular Jacobians and orientation errors near pi.
 
-    A Jacobian is also singular when its determinant has changed sign since the instant before: the arm has
-    jumped across a singular configuration in between.
+    A square Jacobian is also singular when its determinant has changed sign since the instant before: the arm
+    has jumped across a singular configuration in between. A space with damping may be singular.
     """
 
     def __init__(self, loop: ClosedLoop):
         self._loop = loop
         self._limit = getattr(loop.cell.space, "max_condition", np.inf)
+        self._square = [i for i, robot in enumerate(loop.cell.robots) if robot.nv == loop.cell.m]
+        self._pose = isinstance(loop.cell.space, PoseSpace)
         self._sign: np.ndarray | None = None
         self._condition = np.ones(loop.cell.n)
 
@@ -32,11 +35,14 @@ class Guard:
         Raises:
             NonFiniteError: a part of the state is infinite or not a number.
             SingularJacobianError: a robot cannot follow its reference because its Jacobian is singular.
+            OrientationError: an orientation error is so large that its direction is about to be undefined.
         """
         if not np.isfinite(sample.y).all():
             raise self._non_finite(sample)
         task = sample.signals.task
-        if task.J is not None and task.J_inv is not None:
+        if self._pose:
+            self._check_orientations(sample.t, task.e[:, 3:])
+        if task.J is not None and task.J_inv is not None and np.isfinite(self._limit):
             self._check_jacobians(sample.t, task.J, task.J_inv)
 
     def _check_jacobians(self, t: float, J: np.ndarray, J_inv: np.ndarray) -> None:
@@ -45,11 +51,23 @@ class Guard:
             i = int(np.argmax(~(condition < self._limit)))
             raise singular(self._loop.cell, t, i, f"its condition number is {condition[i]:.3g}")
         self._condition = condition
-        sign = np.sign(np.linalg.det(J))
+        sign = np.sign(np.linalg.det(J[self._square, :, : J.shape[1]]))
         if self._sign is not None and (sign != self._sign).any():
-            i = int(np.argmax(sign != self._sign))
+            i = self._square[int(np.argmax(sign != self._sign))]
             raise singular(self._loop.cell, t, i, "its determinant changed sign since the instant before")
         self._sign = sign
+
+    def _check_orientations(self, t: float, e: np.ndarray) -> None:
+        angle = np.linalg.norm(e, axis=1)
+        if (angle > MAX_ANGLE).any():
+            i = int(np.argmax(angle))
+            raise OrientationError(
+                f"the orientation error of {self._loop.cell.names[i]} is {angle[i]:.3g} rad at t = {t:g} s; "
+                f"expected at most {MAX_ANGLE:g} rad, because at pi its direction is not defined: start "
+                "closer to the desired orientation, or turn more slowly",
+                time=t,
+                robot=i,
+            )
 
     def _non_finite(self, sample: Sample) -> NonFiniteError:
         parts = zip(PARTS, self._loop.split(sample.y), strict=True)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .closed_loop import ClosedLoop
+from .damping import DampingLog
 from .integrators import Sample
 from .result import LAYOUT, Result
 
@@ -23,6 +24,7 @@ class Recorder:
             name: np.zeros([self._sizes[d] for d in dimensions]) for name, (dimensions, _) in LAYOUT.items()
         }
         self._rows = tuple(self._arrays.values())
+        self._damping = DampingLog(instants, loop.cell.n)
         self.count = 0
 
     def add(self, sample: Sample) -> None:
@@ -35,12 +37,14 @@ class Recorder:
         )  # fmt: skip
         for array, value in zip(self._rows, values, strict=True):
             array[self.count] = value
+        self._damping.add(self.count, s)
         self.count += 1
 
     def result(self, status: str, info: Mapping[str, Any], experiment: Any) -> Result:
         """What was logged until now."""
         arrays = {name: array[: self.count].copy() for name, array in self._arrays.items()}
         described = {"status": status, **describe(self._loop), **info}
+        described["damping"] = self._damping.report(arrays["t"])
         return Result(**arrays, info=described, experiment=experiment)
 
 
