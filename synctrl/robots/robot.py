@@ -31,7 +31,8 @@ class Robot:
 
     Raises:
         FrameNotFound: `tip` is not a frame of the model.
-        RobotError: the model has a floating base or another joint with several velocities.
+        RobotError: a floating base or another joint with several velocities, or joints that are not
+            numbered branch after branch.
     """
 
     def __init__(
@@ -51,6 +52,7 @@ class Robot:
                     f"robot '{self.name}': joint '{joint_name}' has {joint.nv} degrees of freedom; "
                     "expected joints with one (fixed-base arms of revolute and prismatic joints)"
                 )
+        _check_numbering(self.name, model)
         self.tip, self.tip_id = tip, self._frame_id(tip)
         self.nv: int = model.nv
         self.joint_names: tuple[str, ...] = tuple(model.names)[1:]
@@ -171,7 +173,7 @@ class Robot:
         forward -= pin.computeJointTorqueRegressor(
             self._weightless, self._weightless_data, q, v - mean, self._zero
         )
-        return forward
+        return forward.reshape(self.nv, -1)
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """`forward_dynamics` of arrays that are known to fit; scratch memory, valid until the next call."""
@@ -190,9 +192,9 @@ class Robot:
 
     def jacobian(self, q: ArrayLike) -> np.ndarray:
         """Jacobian of the tip, (6, nv): linear velocity of the tip, then angular, in world axes."""
-        return pin.computeFrameJacobian(
-            self.model, self._data, self.configuration(q), self.tip_id, pin.LOCAL_WORLD_ALIGNED
-        ).copy()
+        model, data = self.model, self._data
+        J = pin.computeFrameJacobian(model, data, self.configuration(q), self.tip_id, pin.LOCAL_WORLD_ALIGNED)
+        return J.reshape(6, self.nv).copy()
 
     def jacobian_dot(self, q: ArrayLike, v: ArrayLike) -> np.ndarray:
         """Time derivative of `jacobian` along v, (6, nv)."""
@@ -208,7 +210,8 @@ class Robot:
         pose = pin.updateFramePlacement(model, data, tip)
         J = pin.getFrameJacobian(model, data, tip, pin.LOCAL_WORLD_ALIGNED)
         J_dot = pin.getFrameJacobianTimeVariation(model, data, tip, pin.LOCAL_WORLD_ALIGNED)
-        return pose, J, J_dot
+        # Pinocchio hands out the matrices of a single joint as vectors
+        return pose, J.reshape(6, self.nv), J_dot.reshape(6, self.nv)
 
     # -- internals ----------------------------------------------------------------------------------------
 
@@ -243,6 +246,17 @@ def load_robot(name_or_path: str | Path, tip: str | None = None) -> Robot:
 
 def _vector(value: ArrayLike) -> np.ndarray:
     return np.asarray(value, dtype=float)
+
+
+def _check_numbering(robot: str, model: pin.Model) -> None:
+    """Refuse joints not numbered branch after branch: Pinocchio's C(q, v) would be silently wrong."""
+    for joint in range(1, model.njoints):
+        carried = list(model.subtrees[joint])
+        if carried != list(range(joint, joint + len(carried))):
+            raise RobotError(
+                f"robot '{robot}': expected joints numbered branch after branch, found joint "
+                f"'{model.names[joint]}' to carry the joints {carried}"
+            )
 
 
 def _moved(visual: pin.GeometryModel | None, base: pin.SE3) -> pin.GeometryModel | None:
