@@ -26,10 +26,12 @@ settings.load_profile("synctrl")
 @pytest.fixture(scope="session")
 def planar_run():
     """Full runs of the four arms, each computed once: `planar_run(synchronized, disturbance)`."""
-    return cache(lambda synchronized=True, disturbance=None: planar_four(synchronized, disturbance).simulate())
+    run = cache(lambda *arguments: planar_four(*arguments).simulate())
+    return lambda synchronized=True, disturbance=None: run(synchronized, disturbance)
 
 
 @pytest.fixture(scope="session")
 def a460_run():
     """Full runs of the two A460, each computed once: `a460_run(synchronized, friction)`."""
-    return cache(lambda synchronized=True, friction=True: a460_pair(synchronized, friction).simulate())
+    run = cache(lambda *arguments: a460_pair(*arguments).simulate())
+    return lambda synchronized=True, friction=True: run(synchronized, friction)
