@@ -1,8 +1,8 @@
 """Pages as a browser shows them: headless Chromium, driven over a pair of pipes with the DevTools protocol.
 
     with open_page(path) as page:
-        page.wait_for("viewer && viewer.animator.playing")
-        assert page.requests == [] and page.errors == []
+        page.check_plays()
+        page.screenshot("picture.png")
 
 No name can be resolved by this browser, so a page that needs the network cannot pass for one that does not.
 """
@@ -104,6 +104,15 @@ class Page:
             f"{expression} stayed false for {timeout:g} s; errors of the page: {self.errors}"
         )
 
+    def check_plays(self) -> None:
+        """An animation of MeshCat that runs by itself, in a page without errors that asks for nothing."""
+        self.wait_for("typeof viewer === 'object' && viewer.animator.playing")
+        start = self.evaluate("viewer.animator.time")
+        self.wait_for(f"viewer.animator.time !== {start}")
+        assert self.evaluate("viewer.animator.playing")
+        assert self.requests == [], f"the page asked the network for {self.requests}"
+        assert self.errors == [], f"the page reported {self.errors}"
+
     def screenshot(self, path: str | Path) -> Path:
         """A PNG picture of the page."""
         picture = self.call("Page.captureScreenshot", format="png")
@@ -131,13 +140,15 @@ class Page:
 @contextmanager
 def open_page(path: str | Path, size: tuple[int, int] = (1200, 800)) -> Iterator[Page]:
     """A local HTML file, opened in a fresh browser without network; skips or fails where there is none."""
-    command = [require_browser(), *FLAGS, f"--window-size={size[0]},{size[1]}"]
+    command = [require_browser(), *FLAGS]
     folder = tempfile.TemporaryDirectory(prefix="browser-", ignore_cleanup_errors=True)
     with folder as profile, _pipe([*command, f"--user-data-dir={profile}", "about:blank"]) as pipe:
         target = pipe.ask("Target.createTarget", url="about:blank")["targetId"]
         page = Page(pipe, pipe.ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"])
         for domain in ("Network", "Runtime", "Log", "Page"):
             page.call(f"{domain}.enable")
+        screen = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
+        page.call("Emulation.setDeviceMetricsOverride", **screen)
         page.call("Page.navigate", url=Path(path).resolve().as_uri())
         page.wait_for("document.readyState == 'complete'")
         yield page

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,10 +27,10 @@ class MeshLibrary:
         """What to draw for one visual of a robot, in the frame of the joint that carries it.
 
         A mesh gives one shape for each colour of its file. The colour of the robot description, where it has
-        one, replaces them. A file whose colours cannot be read is drawn in grey, with a warning.
+        one, replaces them.
 
         Raises:
-            RobotError: the shape cannot be drawn (a plane, for instance).
+            RobotError: the shape cannot be drawn (a plane, for instance), or its mesh file cannot be read.
         """
         color: Color = tuple(float(c) for c in visual.meshColor)  # type: ignore[assignment]
         placement = visual.placement.homogeneous
@@ -39,24 +38,22 @@ class MeshLibrary:
         if not path.suffix:
             return [_placed(_primitive(visual, color), placement)]
         stretch = placement @ np.diag([*visual.meshScale, 1.0])
-        try:
-            parts = self._read(path)
-        except _UnreadableMesh as error:
-            warnings.warn(f"visual '{visual.name}': {error}; it is drawn without its colours", stacklevel=2)
-            return [_placed(_triangles(visual.geometry, color), placement)]
         keep = not visual.overrideMaterial
         return [
-            _placed(replace(shape, color=own if own and keep else color), stretch) for shape, own in parts
+            _placed(replace(shape, color=own if own and keep else color), stretch)
+            for shape, own in self._read(visual.name, path)
         ]
 
-    def _read(self, path: Path) -> list[tuple[Shape, Color | None]]:
+    def _read(self, visual: str, path: Path) -> list[tuple[Shape, Color | None]]:
         if path not in self._files:
-            self._files[path] = _read_mesh(path)
+            try:
+                self._files[path] = _read_mesh(path)
+            except Exception as error:  # each format has its own library, and each library its own errors
+                raise RobotError(
+                    f"visual '{visual}': mesh {path} cannot be read ({type(error).__name__}: {error}); "
+                    f"expected one of {', '.join(FORMATS)}"
+                ) from error
         return self._files[path]
-
-
-class _UnreadableMesh(Exception):
-    """A mesh file that Pinocchio could read and trimesh cannot."""
 
 
 def _placed(shape: Shape, placement: np.ndarray) -> Shape:
@@ -87,7 +84,7 @@ def _primitive(visual: pin.GeometryObject, color: Color) -> Shape:
 
 
 def _triangles(shape: Any, color: Color) -> Shape:
-    """The triangles that Pinocchio itself holds, already scaled."""
+    """A mesh that was built in memory, already scaled."""
     triangles = [shape.tri_indices(k) for k in range(shape.num_tris)]
     return mesh(shape.vertices(), np.array([[t[0], t[1], t[2]] for t in triangles]), color)
 
@@ -106,17 +103,15 @@ def _read_mesh(path: Path) -> list[tuple[Shape, Color | None]]:
 def _load(path: Path) -> list[Any]:
     import trimesh
 
-    suffix = path.suffix.lower()
-    if suffix not in FORMATS:
-        raise _UnreadableMesh(f"mesh format of {path} is unknown; expected {', '.join(FORMATS)}")
-    try:
-        harmless = suffix != ".dae" or b"<!ENTITY" not in path.read_bytes()
-        parts = trimesh.load_scene(path, process=False).dump() if harmless else []
-    except Exception as error:  # each format has its own library, and each library its own errors
-        raise _UnreadableMesh(f"mesh {path} cannot be read ({type(error).__name__}: {error})") from error
-    if not harmless:
-        raise _UnreadableMesh(f"mesh {path} defines XML entities, which are refused")
-    return [part for part in parts if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+    if path.suffix.lower() not in FORMATS:
+        raise ValueError(f"unknown format {path.suffix}")
+    if path.suffix.lower() == ".dae" and b"<!ENTITY" in path.read_bytes():
+        raise ValueError("it defines XML entities, which are refused")
+    scene = trimesh.load_scene(path, process=False)
+    parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+    if not parts:
+        raise ValueError("it holds no triangles")
+    return parts
 
 
 def _color(part: Any) -> Color | None:

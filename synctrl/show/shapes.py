@@ -54,8 +54,9 @@ def cylinder(radius: float, length: float, color: Color = GREY, top: float = 1.0
 
 def capsule(radius: float, length: float, color: Color = GREY) -> Shape:
     """A cylinder of `length` along z, m, with a half ball at each end."""
-    angles = np.linspace(-np.pi / 2, np.pi / 2, 18)
-    heights = radius * np.sin(angles) + np.sign(angles) * length / 2
+    quarter = np.linspace(0, np.pi / 2, 9)
+    angles = np.concatenate([-quarter[::-1], quarter])
+    heights = radius * np.sin(angles) + np.repeat([-length / 2, length / 2], len(quarter))
     points = [{"x": float(x), "y": float(y)} for x, y in zip(radius * np.cos(angles), heights, strict=True)]
     geometry = {"type": "LatheGeometry", "points": points, "segments": 32}
     return Shape(geometry, _around(radius, radius + length / 2), _UPRIGHT, color)
