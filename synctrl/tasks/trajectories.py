@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array, finite_number, positive_number
-from ..errors import TrajectoryError
+from ..errors import InputError, TrajectoryError
 
 
 class Motion(NamedTuple):
@@ -175,21 +175,21 @@ class FunctionTrajectory:
         acceleration: Callable[[float], ArrayLike],
         breaks: tuple[float, ...] = (),
     ):
-        self._functions = (position, velocity, acceleration)
+        self._functions = {"position": position, "velocity": velocity, "acceleration": acceleration}
         self.breaks = tuple(finite_number("breaks", b) for b in breaks)
         self.dimension = np.size(position(0.0))
         self(0.0)
 
     def __call__(self, t: ArrayLike) -> Motion:
         times = np.asarray(t, dtype=float)
-        parts = [np.array([f(float(tk)) for tk in times.ravel()], dtype=float) for f in self._functions]
-        for name, part in zip(("position", "velocity", "acceleration"), parts, strict=True):
-            if part.shape != (times.size, self.dimension) or not np.isfinite(part).all():
-                raise TrajectoryError(
-                    f"{name}: expected {self.dimension} finite numbers at every time, "
-                    f"found {part[0] if part.size else part} near t = {times.ravel()[0]:g} s"
-                )
-        return Motion(*(part.reshape(*times.shape, self.dimension) for part in parts))
+        parts = [[self._value(name, tk) for tk in times.ravel().tolist()] for name in self._functions]
+        return Motion(*(np.array(part).reshape(*times.shape, self.dimension) for part in parts))
+
+    def _value(self, name: str, t: float) -> np.ndarray:
+        try:
+            return finite_array(name, self._functions[name](t), (self.dimension,))
+        except InputError as error:
+            raise TrajectoryError(f"{error} at t = {t:g} s") from error
 
 
 def _times(factor: np.ndarray, vector: np.ndarray) -> np.ndarray:
