@@ -46,6 +46,10 @@ class DisturbanceSchedule:
         cell: the cell they act on.
         disturbances: the disturbances.
 
+    Attributes:
+        edges: instants at which a torque jumps, s.
+        torques: torque on every joint before, between and after the edges, (edges + 1, n, nv), N·m.
+
     Raises:
         InputError: a robot that is not in the cell, or a torque of the wrong size.
     """
@@ -55,17 +59,19 @@ class DisturbanceSchedule:
             _check(cell, disturbance)
         self.edges = tuple(sorted({edge for d in disturbances for edge in (d.start, d.stop)}))
         bounds = (0.0, *self.edges, np.inf)
-        self._torques = []
-        for begin in bounds[:-1]:
-            torque = np.zeros((cell.n, cell.nv))
+        self.torques = np.zeros((len(bounds) - 1, cell.n, cell.nv))
+        for torque, begin in zip(self.torques, bounds[:-1], strict=True):
             for d in disturbances:
                 if d.start <= begin < d.stop:
                     torque[d.robot, : cell.robots[d.robot].nv] += d.torque
-            self._torques.append(torque)
+
+    def windows(self, times: np.ndarray) -> np.ndarray:
+        """Which row of `torques` acts at the times; at an edge the one from the right."""
+        return np.searchsorted(self.edges, times, side="right")
 
     def torque(self, t: float) -> np.ndarray:
         """Torque on every joint, (n, nv), N·m; at an edge the value from the right."""
-        return self._torques[int(np.searchsorted(self.edges, t, side="right"))]
+        return self.torques[int(self.windows(np.array(t)))]
 
 
 def _check(cell: Cell, disturbance: Disturbance) -> None:

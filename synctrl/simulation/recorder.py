@@ -40,6 +40,15 @@ class Recorder:
         self._damping.add(self.count, s)
         self.count += 1
 
+    def rows_ahead(self) -> list[np.ndarray]:
+        """The part of every array not logged yet, in the order of `LAYOUT`, to be filled from outside."""
+        return [array[self.count :] for array in self._rows]
+
+    def advance(self, times: np.ndarray) -> None:
+        """Count rows that were filled from outside."""
+        self._rows[0][self.count : self.count + len(times)] = times
+        self.count += len(times)
+
     def result(self, status: str, info: Mapping[str, Any], experiment: Any) -> Result:
         """What was logged until now."""
         arrays = {name: array[: self.count].copy() for name, array in self._arrays.items()}

@@ -33,24 +33,24 @@ def steps_per_sample(period: float, dt: float) -> int:
 
 
 def sampled_rk4(
-    loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule, period: float
+    loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule, every: int
 ) -> Iterator[Sample]:
-    """The plant by the classical Runge-Kutta method, under a controller that acts every `period` seconds.
+    """The plant by the classical Runge-Kutta method, under a controller that acts once in so many instants.
 
     Within a period torque, theta_hat' and the integrands of the synchronization errors keep their values, so
     the estimates and integrals advance as in x_{k+1} = x_k + period x'_k.
     """
     y = loop.initial_state()
     logged = np.isin(clock.times, clock.logged)
-    due = 0.0
+    count = 0
     held, tau = np.zeros(loop.size), np.zeros((loop.cell.n, loop.cell.nv))
     for k, (t, t_next, (start, _, _)) in enumerate(steps(loop, clock.times)):
         disturbance = schedule.torque(0.5 * (t + t_next))
         if logged[k]:
             y_dot, signals = loop.evaluate(start, y, disturbance)
-            if t >= due - 1e-9 * period:
+            if count % every == 0:
                 held, tau = y_dot, signals.tau
-                due += period
+            count += 1
             yield Sample(t, y, disturbance, replace(signals, tau=tau))
         y = _rk4_step(loop, y, t_next - t, held, tau + disturbance)
     last = final(loop, clock, y, disturbance)

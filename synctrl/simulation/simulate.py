@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -72,6 +72,7 @@ class Experiment:
         dt: float = 1e-3,
         integrator: str = "rk4",
         *,
+        engine: str = "pinocchio",
         control_period: float | None = None,
         rtol: float = 1e-9,
         atol: float = 1e-11,
@@ -84,49 +85,63 @@ class Experiment:
             dt: step of "rk4" and interval of the log, s.
             integrator: "rk4", or a method of SciPy's solve_ivp: "RK45", "RK23", "DOP853", "Radau", "BDF",
                 "LSODA".
+            engine: "pinocchio", the reference, or "compiled": the same closed loop as generated C, for "rk4".
             control_period: None for continuous control; otherwise torque and adaptation are held for this
                 long, a multiple of dt, s. Only with "rk4".
             rtol, atol: tolerances of SciPy's methods.
-            progress: called with the time reached, s, at every logged instant.
+            progress: called now and then with the time reached, s.
 
         Raises:
-            InputError: a duration, step, period or tolerance that is not positive, an unknown integrator, or
-                sampled control with another integrator than "rk4".
+            InputError: a duration, step, period or tolerance that is not positive, an unknown integrator or
+                engine, or a combination that does not exist.
             UnreachableError: a robot cannot reach its desired positions; raised before anything runs.
-            NonFiniteError, SingularJacobianError: the run had to stop; the error carries what was computed.
+            MissingDependencyError, CompilationError: the compiled engine cannot be had, and why.
+            SimulationError: the run had to stop; its kinds say why, and it carries what was computed.
         """
         choice("integrator", integrator, ("rk4", *ADAPTIVE))
+        choice("engine", engine, ("pinocchio", "compiled"))
         tolerances = positive_number("rtol", rtol), positive_number("atol", atol)
+        run = self._prepare(duration, dt, control_period)
+        if integrator != "rk4":
+            _needs_rk4(integrator, engine, control_period)
+            run.info.update(integrator=integrator, rtol=tolerances[0], atol=tolerances[1])
+            return _collect(
+                run, adaptive(run.loop, run.clock, run.schedule, integrator, *tolerances), progress
+            )
+        if engine == "compiled":
+            return _compiled(run, progress)
+        if run.every is not None:
+            return _collect(run, sampled_rk4(run.loop, run.clock, run.schedule, run.every), progress)
+        return _collect(run, rk4(run.loop, run.clock, run.schedule), progress)
+
+    def _prepare(self, duration: float | None, dt: float, control_period: float | None) -> Run:
+        """Everything that a run needs, checked."""
         duration = self.duration if duration is None else duration
         schedule = DisturbanceSchedule(self.cell, self.disturbances)
         clock = make_clock(duration, dt, (*schedule.edges, *self.cell.breaks))
+        every = None if control_period is None else steps_per_sample(control_period, dt)
         check_reachable(self.cell, clock.logged)
-        info: dict[str, Any] = {"integrator": integrator, "dt": float(dt), "duration": float(duration)}
+        self.cell.coupling.check_weights(clock.logged, self.cell.m)
+        info: dict[str, Any] = {"integrator": "rk4", "dt": float(dt), "duration": float(duration)}
+        info["engine"] = "pinocchio"
         info["title"] = self.title or self.cell.name
+        info["control_period"] = control_period
         info["disturbances"] = [_describe(d) for d in self.disturbances]
-        loop = self.closed_loop()
-        if control_period is not None:
-            info["control_period"] = control_period
-            samples = _sampled(loop, clock, schedule, integrator, control_period, dt)
-        elif integrator == "rk4":
-            samples = rk4(loop, clock, schedule)
-        else:
-            samples = adaptive(loop, clock, schedule, integrator, *tolerances)
-            info["rtol"], info["atol"] = tolerances
-        return _run(self, loop, clock, samples, info, progress)
+        return Run(self, self.closed_loop(), clock, schedule, every, info)
 
 
-def _sampled(
-    loop: ClosedLoop,
-    clock: Clock,
-    schedule: DisturbanceSchedule,
-    integrator: str,
-    period: float,
-    dt: float,
-) -> Iterator[Sample]:
-    if integrator != "rk4":
-        raise InputError(f"control_period: sampled control needs the integrator 'rk4', found {integrator!r}")
-    return sampled_rk4(loop, clock, schedule, steps_per_sample(period, dt) * dt)
+class Run(NamedTuple):
+    """A run that is about to start.
+
+    `every` is how many logged instants a sample of sampled control lasts, or None.
+    """
+
+    experiment: Experiment
+    loop: ClosedLoop
+    clock: Clock
+    schedule: DisturbanceSchedule
+    every: int | None
+    info: dict[str, Any]
 
 
 def simulate(
@@ -139,34 +154,56 @@ def simulate(
     disturbances: Sequence[Disturbance] = (),
     reference_acceleration: str = "exact",
     k_r_space: str = "joint",
+    engine: str = "pinocchio",
     progress: Progress | None = None,
 ) -> Result:
     """Run a cell under adaptive synchronized control: `Experiment(...).simulate(...)` in one call."""
     experiment = Experiment(cell, gains, duration, disturbances, reference_acceleration, k_r_space)
-    return experiment.simulate(dt=dt, integrator=integrator, progress=progress)
+    return experiment.simulate(dt=dt, integrator=integrator, engine=engine, progress=progress)
 
 
-def _run(
-    experiment: Experiment,
-    loop: ClosedLoop,
-    clock: Clock,
-    samples: Iterator[Sample],
-    info: dict[str, Any],
-    progress: Progress | None,
-) -> Result:
-    """Collect samples; a failure takes along what was collected."""
-    recorder, guard = Recorder(loop, len(clock.logged)), Guard(loop)
+def _needs_rk4(integrator: str, engine: str, control_period: float | None) -> None:
+    if engine == "compiled":
+        raise InputError(f"engine='compiled' has the integrator 'rk4' only, found {integrator!r}")
+    if control_period is not None:
+        raise InputError(f"control_period: sampled control needs the integrator 'rk4', found {integrator!r}")
+
+
+def _collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> Result:
+    """Log samples one by one."""
+    recorder, guard = Recorder(run.loop, len(run.clock.logged)), Guard(run.loop)
+
+    def log() -> None:
+        for sample in samples:
+            guard.check(sample)
+            recorder.add(sample)
+            if progress is not None:
+                progress(sample.t)
+
+    return _finish(run, recorder, log)
+
+
+def _compiled(run: Run, progress: Progress | None) -> Result:
+    """The same run by generated code."""
+    from .compiled.engine import advance
+    from .compiled.program import Program
+
+    run.info["engine"] = "compiled"
+    recorder, program = Recorder(run.loop, len(run.clock.logged)), Program(run.loop)
+    return _finish(
+        run, recorder, lambda: advance(program, run.clock, run.schedule, recorder, run.every, progress)
+    )
+
+
+def _finish(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:
+    """Let a run log itself; a failure takes along what was logged."""
     with np.errstate(all="ignore"):  # overflow is found and named by the guard
         try:
-            for sample in samples:
-                guard.check(sample)
-                recorder.add(sample)
-                if progress is not None:
-                    progress(sample.t)
+            log()
         except SimulationError as error:
-            error.result = recorder.result(f"stopped: {error}", info, experiment)
+            error.result = recorder.result(f"stopped: {error}", run.info, run.experiment)
             raise
-    return recorder.result("completed", info, experiment)
+    return recorder.result("completed", run.info, run.experiment)
 
 
 def _describe(disturbance: Disturbance) -> dict[str, Any]:

@@ -125,12 +125,16 @@ class Cell:
 
     # -- desired motion -----------------------------------------------------------------------------------
 
-    def references(self, times: np.ndarray) -> list[Reference]:
-        """What is desired at each of the times, (T,)."""
+    def reference_table(self, times: np.ndarray) -> Reference:
+        """What is desired at all of the times, (T,), as arrays with time as their first axis."""
         motions = [member.trajectory(times) for member in self.members]
         desired = [np.stack(part, axis=1) for part in zip(*motions, strict=True)]
         weights = self.coupling.weights(times, self.m)
-        return [Reference(*row) for row in zip(*desired, *weights, strict=True)]
+        return Reference(*desired, weights.c, weights.c_dot, weights.c_ddot, weights.c_inv)
+
+    def references(self, times: np.ndarray) -> list[Reference]:
+        """What is desired at each of the times, (T,)."""
+        return [Reference(*row) for row in zip(*self.reference_table(times), strict=True)]
 
     # -- internals ----------------------------------------------------------------------------------------
 

@@ -1,0 +1,1 @@
+"""The closed loop as generated C: same models, same law, another engine."""

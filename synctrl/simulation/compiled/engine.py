@@ -1,0 +1,178 @@
+"""Runs of the compiled engine: blocks of steps through the library, and the same Result as the reference."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...errors import NonFiniteError, OrientationError, SimulationError
+from ...tasks.cell import Reference
+from ..clock import Clock
+from ..disturbances import DisturbanceSchedule
+from ..guard import PARTS, singular
+from ..recorder import Recorder
+from .program import LogStruct, Program, ReferenceStruct, ReportStruct
+
+#: bytes of references that one block of steps may need
+BLOCK_BYTES = 32_000_000
+
+
+class Block(NamedTuple):
+    """Consecutive steps, [first, last) of the clock, with what is desired at their start, middle and end."""
+
+    first: int
+    last: int
+    desired: np.ndarray
+    weights: np.ndarray
+
+
+def blocks(program: Program, clock: Clock) -> Iterator[Block]:
+    """The steps of a run, in blocks that fit into memory."""
+    cell, count = program.loop.cell, len(clock.times) - 1
+    weights = 0 if cell.coupling.is_constant else 4 * cell.m**2
+    length = max(1, BLOCK_BYTES // (3 * 8 * cell.n * (3 * cell.m + weights)))
+    for first in range(0, count, length):
+        last = min(first + length, count)
+        starts, ends = clock.times[first:last], clock.times[first + 1 : last + 1]
+        middles, ends = 0.5 * (starts + ends), np.nextafter(ends, -np.inf)
+        tables = [cell.reference_table(times) for times in (starts, middles, ends)]
+        yield Block(first, last, *_pack(cell.coupling.is_constant, tables))
+
+
+def advance(
+    program: Program,
+    clock: Clock,
+    schedule: DisturbanceSchedule,
+    recorder: Recorder,
+    every: int | None = None,
+    progress: Callable[[float], Any] | None = None,
+) -> None:
+    """Run a compiled program and log into the recorder.
+
+    Args:
+        program: the closed loop.
+        clock: its instants.
+        schedule: disturbances.
+        recorder: where logged instants go; after a failure it has those before it.
+        every: with sampled control, how many logged instants one sample lasts.
+        progress: called with the time reached, s, after every block.
+
+    Raises:
+        NonFiniteError, SingularJacobianError, OrientationError: as the reference engine.
+    """
+    y = program.loop.initial_state()
+    steps = _Steps(program, clock, schedule, every)
+    for block in blocks(program, clock):
+        steps.advance(block, y, recorder)
+        if progress is not None:
+            progress(float(clock.times[block.last]))
+    steps.finish(y, recorder)
+
+
+class _Steps:
+    """The library's `advance` with everything it needs for one run."""
+
+    def __init__(self, program: Program, clock: Clock, schedule: DisturbanceSchedule, every: int | None):
+        self._program, self._clock, self._every = program, clock, every
+        self._middles = 0.5 * (clock.times[:-1] + clock.times[1:])
+        self._window = schedule.windows(self._middles).astype(np.intc)
+        self._torques = np.ascontiguousarray(schedule.torques)
+        self._logged = np.isin(clock.times, clock.logged)
+        index = np.cumsum(self._logged) - 1
+        self._due = self._logged & (index % (every or 1) == 0)
+        ctypes.memset(program.work.sign, 0, 8 * program.loop.cell.n)
+
+    def advance(self, block: Block, y: np.ndarray, recorder: Recorder) -> None:
+        """Move y through a block, in place."""
+        steps = slice(block.first, block.last)
+        times = np.ascontiguousarray(self._clock.times[block.first : block.last + 1])
+        self._call(block, times, self._logged[steps], self._due[steps], self._window[steps], y, recorder)
+
+    def finish(self, y: np.ndarray, recorder: Recorder) -> None:
+        """Log the end of the run: one step of no length."""
+        end = self._clock.times[-1:]
+        table = self._program.loop.cell.reference_table(end)
+        packed = _pack(self._program.loop.cell.coupling.is_constant, [table] * 3)
+        times, yes, no = np.repeat(end, 2), np.array([True]), np.array([False])
+        self._call(Block(0, 1, *packed), times, yes, no, self._window[-1:], y, recorder)
+
+    def _call(
+        self,
+        block: Block,
+        times: np.ndarray,
+        logged: np.ndarray,
+        due: np.ndarray,
+        window: np.ndarray,
+        y: np.ndarray,
+        recorder: Recorder,
+    ) -> None:
+        program, library = self._program, self._program.library
+        constant = program.loop.cell.coupling.is_constant
+        table = ReferenceStruct(
+            block.desired.ctypes.data, block.weights.ctypes.data, len(times) - 1, int(constant)
+        )
+        rows = recorder.rows_ahead()
+        log, report = LogStruct(*(row.ctypes.data for row in rows[1:])), ReportStruct()
+        arrays = [times, logged, due, np.ascontiguousarray(window), self._torques, y]
+        if self._every is None:
+            del arrays[2]
+        call = library.advance if self._every is None else library.advance_sampled
+        call.restype = ctypes.c_long
+        count = call(
+            ctypes.byref(program.cell),
+            ctypes.byref(table),
+            *(array.ctypes.data_as(ctypes.c_void_p) for array in arrays),
+            *(ctypes.byref(struct) for struct in (log, program.work, report)),
+        )
+        recorder.advance(times[:-1][logged][:count])
+        if report.status:
+            raise _failure(program, float(times[report.step]), report)
+
+
+def _pack(constant: bool, tables: list[Reference]) -> tuple[np.ndarray, np.ndarray]:
+    """Tables of three stages as the driver's `Reference` wants them."""
+    desired = np.stack([np.concatenate(table[:3], axis=2) for table in tables])
+    if constant:
+        weights = np.stack([part[0] for part in tables[0][3:]], axis=1)
+    else:
+        weights = np.stack([np.stack(table[3:], axis=2) for table in tables])
+    return np.ascontiguousarray(desired), np.ascontiguousarray(weights)
+
+
+def _failure(program: Program, t: float, report: ReportStruct) -> SimulationError:
+    cell = program.loop.cell
+    if report.status == 1:
+        return _not_finite(program, t, report.robot)
+    i, name = report.robot, cell.names[report.robot]
+    if report.status == 4:
+        return OrientationError(
+            f"the orientation error of {name} is {report.value:.3g} rad at t = {t:g} s; at pi its direction "
+            "is not defined: start closer to the desired orientation, or turn more slowly",
+            time=t,
+            robot=i,
+        )
+    if report.status == 3:
+        return singular(cell, t, i, "its determinant changed sign since the instant before")
+    return singular(cell, t, i, f"its condition number is {report.value:.3g}")
+
+
+def _not_finite(program: Program, t: float, entry: int) -> NonFiniteError:
+    """The error for an entry of the flat state."""
+    loop, cell = program.loop, program.loop.cell
+    marker = np.zeros(loop.size)
+    marker[entry] = 1
+    name, row = next(
+        (name, int(np.argwhere(part)[0, 0]))
+        for name, part in zip(PARTS, loop.split(marker), strict=True)
+        if part.any()
+    )
+    i = row if name != PARTS[3] else int(cell.coupling.edges[row, 0])
+    return NonFiniteError(
+        f"the {name} of {cell.names[i]} is no longer finite at t = {t:g} s; the gains may be too high for "
+        "the step, or the closed loop unstable",
+        time=t,
+        robot=i,
+    )
