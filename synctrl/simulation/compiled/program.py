@@ -195,6 +195,10 @@ class Program:
     Args:
         loop: controller and plant of a cell.
 
+    Attributes:
+        kinds: number of different robots, each with generated functions of its own.
+        scratch: sizes of the scratch arrays arg, res, iw and w that the generated functions ask for.
+
     Raises:
         InputError: the cell uses something the compiled engine does not have.
         MissingDependencyError: CasADi or a C compiler is missing.
@@ -207,8 +211,10 @@ class Program:
         kinds, index, bases = classify(loop.controller)
         self._keep: list[np.ndarray] = []
         self.cell = self._cell(index, bases)
+        self.kinds = len(kinds)
         key = content_key([kind.key() for kind in kinds], version)
         self.library = cached_library(key, lambda: generate(kinds), self._check)
+        self.scratch = _work_sizes(self.library)
         self.work = self._work(self.library)
 
     def state_dot(self, reference: Reference, y: np.ndarray, disturbance: np.ndarray) -> np.ndarray:
