@@ -19,7 +19,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from ..checks import finite_number
+from ..checks import finite_number, instance
 from ..errors import FrameNotFound, InputError, RobotError, RobotWarning, near
 from .urdf_checks import check_bodies, check_model, check_tree
 from .urdf_document import Document, Geometry, Joint, Link
@@ -121,6 +121,7 @@ def lock_joints(document: Document, positions: Mapping[str, float]) -> Document:
         RobotError: no such moving joint, or a position outside its limits.
         InputError: a position that is no finite number.
     """
+    instance("locked", positions, Mapping, "positions by the names of joints")
     moving = {joint.name: joint for joint in document.moving_joints}
     for name, position in positions.items():
         if name not in moving:
@@ -163,6 +164,8 @@ def existing_file(path: str | Path) -> Path:
     if not isinstance(path, (str, Path)):
         raise InputError(f"path: expected a path, found {type(path).__name__}")
     file = Path(path)
+    if not str(file).isprintable():
+        raise RobotError(f"{str(file)!a}: expected the path of a URDF file, found one that cannot be printed")
     try:
         if file.is_file():
             return file
@@ -177,10 +180,13 @@ def existing_file(path: str | Path) -> Path:
 
 
 def _package_dirs(package_dirs: Iterable[str | Path]) -> tuple[Path, ...]:
-    if isinstance(package_dirs, (str, Path)):
-        package_dirs = (package_dirs,)
+    folders = (package_dirs,) if isinstance(package_dirs, (str, Path)) else package_dirs
+    instance("package_dirs", folders, Iterable, "folders")
+    folders = tuple(folders)
+    for folder in folders:
+        instance("package_dirs", folder, (str, Path), "folders")
     stock = data_folder()
-    return (*map(Path, package_dirs), *([stock] if stock else []))
+    return (*map(Path, folders), *([stock] if stock else []))
 
 
 # -- Pinocchio ---------------------------------------------------------------------------------------------

@@ -65,8 +65,10 @@ class Inertial:
     def parameters(self, placement: pin.SE3) -> np.ndarray:
         """The ten inertial parameters in a frame in which the link has this placement, Pinocchio's order."""
         place = placement * self.origin.se3
-        com, R = place.translation, place.rotation
-        return pin.Inertia(self.mass, com, R @ self.matrix @ R.T).toDynamicParameters()
+        c, R = place.translation, place.rotation
+        I = R @ self.matrix @ R.T + self.mass * (c @ c * np.eye(3) - np.outer(c, c))
+        moments = (I[0, 0], I[0, 1], I[1, 1], I[0, 2], I[1, 2], I[2, 2])
+        return np.array([self.mass, *(self.mass * c), *moments])
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,365 @@
+"""The loader: good descriptions come through as they are, broken ones are refused with the right words."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from urdf_corpus import CORPUS, GOOD, TRIANGLE, write
+
+from synctrl.errors import FrameNotFound, InputError, RobotError, RobotWarning
+from synctrl.robots.urdf import describe, existing_file, lock_joints, model_from_xml, read_urdf, urdf_folder
+from synctrl.robots.urdf_checks import check_model
+from synctrl.robots.urdf_document import Pose
+from synctrl.robots.urdf_meshes import data_folder
+from synctrl.robots.urdf_reader import read_document
+from synctrl.robots.urdf_writer import to_xml
+
+OWN = sorted(urdf_folder().glob("*/*.urdf"))
+
+
+def refusal(file: Path, **options: object) -> str:
+    """What the loader says about a file it refuses."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RobotWarning)
+        with pytest.raises(RobotError) as caught:
+            read_urdf(file, **options)
+    return str(caught.value)
+
+
+def with_mesh(folder: Path, filename: str) -> Path:
+    """The good description in a folder of its own, with another mesh."""
+    return write(folder / "robot", GOOD.replace("meshes/fore.stl", filename))
+
+
+# -- broken descriptions -----------------------------------------------------------------------------------
+
+
+def test_the_corpus_has_at_least_sixty_kinds():
+    assert len(CORPUS) >= 60
+
+
+@pytest.mark.parametrize("name", CORPUS)
+def test_a_broken_description_is_refused_with_the_right_words(name, tmp_path):
+    message = refusal(write(tmp_path, CORPUS[name].text))
+    assert message.startswith(str(tmp_path / "robot.urdf")), message
+    assert message.isprintable() and ("expected" in message or "did you mean" in message), message
+    for word in CORPUS[name].words:
+        assert word in message, message
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "no element found"),
+        (b"\x00\x01\x02\x03", "well-formed"),
+        (b"just text", "well-formed"),
+        (GOOD.encode("utf-16"), "UTF-8"),
+        (GOOD.encode().replace(b"good", b"g\xf6od", 1), "0xf6"),
+        (b"<robot name='x'>" + b" " * 10_000_001 + b"</robot>", "at most 10 MB"),
+        (b"<robot name='x'>" + b"<gazebo/>" * 100_001 + b"</robot>", "at most 100000 elements"),
+    ],
+)
+def test_a_file_that_is_no_urdf_is_refused(content, words, tmp_path):
+    assert words in refusal(write(tmp_path, content))
+
+
+def test_a_line_number_is_that_of_the_defect(tmp_path):
+    broken = GOOD.replace('value="2.5"', 'value="abc"')
+    line = broken[: broken.index("abc")].count("\n") + 1
+    assert f"robot.urdf:{line}: link 'upper', inertial, mass" in refusal(write(tmp_path, broken))
+
+
+def test_a_missing_file_is_said_with_the_near_ones(tmp_path):
+    write(tmp_path, GOOD)
+    assert "did you mean 'robot.urdf'" in refusal(tmp_path / "robto.urdf")
+    assert "robot.urdf" in refusal(tmp_path / "else.urdf")
+    assert "a folder" in refusal(tmp_path)
+    with pytest.raises(InputError, match="expected a path, found int"):
+        existing_file(3)
+
+
+@pytest.mark.parametrize("path", ["a\0b.urdf", "x" * 5000 + ".urdf", "\x1b[31mred.urdf"])
+def test_a_path_that_cannot_be_is_refused_in_printable_words(path):
+    assert refusal(Path(path)).isprintable()
+
+
+def test_an_unknown_tip_lists_the_frames(tmp_path):
+    with pytest.raises(FrameNotFound, match="did you mean 'tool'"):
+        read_urdf(write(tmp_path, GOOD), tip="tol")
+
+
+def test_the_reason_of_the_parser_is_in_the_error_and_not_on_the_screen(capfd):
+    with pytest.raises(RobotError, match="link 'a' is not unique"):
+        model_from_xml("a.urdf", '<robot name="x"><link name="a"/><link name="a"/></robot>')
+    assert capfd.readouterr().err == ""
+
+
+def test_a_refusal_works_without_a_standard_error():
+    code = (
+        "import os; os.close(2)\n"
+        "from synctrl.robots.urdf import model_from_xml\n"
+        "from synctrl.errors import RobotError\n"
+        "try: model_from_xml('a.urdf', '<robot/>')\n"
+        "except RobotError as error: print('refused')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, check=False)
+    assert done.stdout.strip() == "refused"
+
+
+# -- warnings ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 2"/>', "axis has length 2"),
+        ("meshes/fore.stl", "meshes/none.stl", "mesh 'meshes/none.stl' is missing"),
+        ("meshes/fore.stl", "package://nowhere/none.stl", "is missing"),
+        ('<link name="tool"/>', '<link name="tool"><feature/></link>', "<feature> is not read"),
+        ('<material name="grey"/>', '<material name="gray"/>', "did you mean 'grey'"),
+    ],
+)
+def test_a_harmless_oddity_is_a_warning(old, new, words, tmp_path):
+    with pytest.warns(RobotWarning, match=words):
+        read_urdf(write(tmp_path, GOOD.replace(old, new)))
+
+
+def test_an_impossible_inertia_of_the_base_is_a_warning_because_it_plays_no_part(tmp_path):
+    base = (
+        '<link name="base"><inertial><mass value="1"/>'
+        '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="9"/></inertial>'
+    )
+    with pytest.warns(RobotWarning, match="plays no part"):
+        read_urdf(write(tmp_path, GOOD.replace('<link name="base">', base)))
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_good_description_is_read_without_a_warning(tmp_path):
+    description = read_urdf(write(tmp_path, GOOD))
+    assert description.model.nv == 3
+    assert description.tip == "tool"
+    assert description.root == "base"
+    assert description.links == ("base", "upper", "fore", "slide", "tool")
+    assert len(description.visual.geometryObjects) == 4
+
+
+def test_an_axis_is_taken_by_its_direction(tmp_path):
+    with pytest.warns(RobotWarning):
+        long = read_urdf(write(tmp_path, GOOD.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 2"/>')))
+    assert long.model == read_urdf(write(tmp_path, GOOD)).model
+
+
+# -- meshes ------------------------------------------------------------------------------------------------
+
+
+def test_a_link_out_of_the_folder_is_refused(tmp_path):
+    (tmp_path / "outside.stl").write_bytes(TRIANGLE)
+    file = with_mesh(tmp_path, "meshes/link.stl")
+    (file.parent / "meshes" / "link.stl").symlink_to(tmp_path / "outside.stl")
+    assert "leads out of it" in refusal(file)
+
+
+def test_a_package_is_found_where_the_caller_says(tmp_path):
+    file = with_mesh(tmp_path, "package://my_robot/fore.stl")
+    package = tmp_path / "packages" / "my_robot"
+    package.mkdir(parents=True)
+    (package / "fore.stl").write_bytes(TRIANGLE)
+    shape = read_urdf(file, [tmp_path / "packages"]).visual.geometryObjects[2]
+    assert Path(shape.meshPath) == package / "fore.stl"
+
+
+def test_a_description_finds_the_package_it_lies_in_but_no_other_folder_above(tmp_path):
+    home = tmp_path / "home"
+    file = with_mesh(home, "package://home/secret.stl")
+    (home / "secret.stl").write_bytes(TRIANGLE)
+    with pytest.warns(RobotWarning, match="is missing"):
+        read_urdf(file)
+    (home / "package.xml").write_text("<package/>")
+    assert Path(read_urdf(file).visual.geometryObjects[2].meshPath) == home / "secret.stl"
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("fore.stl", TRIANGLE[:-1]),
+        ("fore.stl", b""),
+        ("fore.stl", b"solid fore\n facet"),
+        ("fore.dae", b"<COLLADA>"),
+        ("fore.dae", b'<!DOCTYPE c [<!ENTITY e SYSTEM "/etc/passwd">]><COLLADA>&e;</COLLADA>'),
+        ("fore.dae", b"<COLLADA><image><init_from>/etc/passwd</init_from></image></COLLADA>"),
+        ("fore.dae", b"<COLLADA><image><init_from>../../x.png</init_from></image></COLLADA>"),
+        ("fore.dae", b"<COLLADA><image><init_from>&#46;&#46;/x.png</init_from></image></COLLADA>"),
+        ("fore.dae", b"<COLLADA><image><init_from>file:///x.png</init_from></image></COLLADA>"),
+        ("fore.dae", "<COLLADA></COLLADA>".encode("utf-16")),
+        ("fore.obj", b"mtllib ../x.mtl\nv 0 0 0\n"),
+        ("fore.obj", b"v 0 0 0\n  mtllib /etc/passwd\n"),
+    ],
+)
+def test_a_mesh_that_is_cut_short_or_reaches_out_is_refused(name, content, tmp_path):
+    file = with_mesh(tmp_path, f"meshes/{name}")
+    (file.parent / "meshes" / name).write_bytes(content)
+    assert str(file.parent / "meshes" / name) in refusal(file)
+
+
+def test_a_material_library_that_reaches_out_is_refused(tmp_path):
+    file = with_mesh(tmp_path, "meshes/fore.obj")
+    (file.parent / "meshes" / "fore.obj").write_text("mtllib fore.mtl\nv 0 0 0\n")
+    (file.parent / "meshes" / "fore.mtl").write_text("newmtl a\nmap_Kd -s 1 1 1 /etc/passwd\n")
+    assert "/etc/passwd" in refusal(file)
+
+
+# -- good descriptions come through as they are ------------------------------------------------------------
+
+
+def stock(*paths: str) -> list[Path]:
+    """Files of example-robot-data."""
+    return [data_folder() / "example-robot-data" / "robots" / path for path in paths]
+
+
+@pytest.mark.parametrize(
+    "file",
+    [*OWN, *stock("ur_description/urdf/ur5_robot.urdf", "xarm_description/urdf/xarm7.urdf")],
+    ids=lambda file: file.stem,
+)
+def test_strict_reading_gives_the_model_and_shapes_that_pinocchio_reads_itself(file):
+    mine = read_urdf(file)
+    model = pin.buildModelFromUrdf(str(file))
+    visual = pin.buildGeomFromUrdf(model, str(file), pin.VISUAL, package_dirs=[str(data_folder())])
+    assert list(mine.model.names) == list(model.names)
+    for limit in ("lowerPositionLimit", "upperPositionLimit", "effortLimit", "velocityLimit", "damping"):
+        np.testing.assert_array_equal(getattr(mine.model, limit), getattr(model, limit))
+    for one, other in zip(mine.model.inertias, model.inertias, strict=True):
+        assert one.isApprox(other, 1e-14)
+    for one, other in zip(mine.model.frames, model.frames, strict=True):
+        assert one.name == other.name and one.placement.isApprox(other.placement, 1e-12)
+    for one, other in zip(mine.visual.geometryObjects, visual.geometryObjects, strict=True):
+        assert (one.name, one.parentJoint, one.parentFrame) == (
+            other.name,
+            other.parentJoint,
+            other.parentFrame,
+        )
+        assert one.placement.isApprox(other.placement, 1e-12)
+        if one.meshPath:
+            assert os.path.samefile(one.meshPath, other.meshPath)
+            np.testing.assert_array_equal(one.meshScale, other.meshScale)
+        else:
+            assert one.geometry == other.geometry
+        assert one.overrideMaterial == other.overrideMaterial
+        np.testing.assert_allclose(one.meshColor, other.meshColor, atol=1e-7)
+
+
+def test_what_is_written_is_read_again_as_the_same_document(tmp_path):
+    file = write(tmp_path, GOOD)
+    document = read_document(file)
+    again = read_document(write(tmp_path, to_xml(document)))
+    assert without_lines(again) == without_lines(document)
+
+
+def without_lines(document):
+    """A document with nothing in it that tells where in a file a thing stood."""
+
+    def plain(item):
+        lines = {"line": 0} if hasattr(item, "line") else {}
+        for key in ("visuals", "collisions"):
+            if hasattr(item, key):
+                lines[key] = tuple(map(plain, getattr(item, key)))
+        if getattr(item, "inertial", None):
+            lines["inertial"] = plain(item.inertial)
+        return replace(item, **lines)
+
+    links, joints = tuple(map(plain, document.links)), tuple(map(plain, document.joints))
+    return replace(document, links=links, joints=joints)
+
+
+angle = st.floats(-np.pi, np.pi)
+near_upright = st.floats(-1e-6, 1e-6).map(lambda small: np.pi / 2 + small)
+
+
+@given(roll=angle, pitch=angle | near_upright | near_upright.map(lambda x: -x), yaw=angle)
+def test_a_pose_writes_every_rotation_to_rounding(roll, pitch, yaw):
+    placement = pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.zeros(3))
+    np.testing.assert_allclose(Pose.of(placement).se3.rotation, placement.rotation, atol=1e-14)
+
+
+@given(q=st.tuples(st.floats(-2, 2.5), st.floats(-3, 3), st.floats(0, 0.3)), keep=st.sampled_from([0, 1, 2]))
+def test_locked_joints_leave_the_reduced_model(q, keep):
+    """Compared with Pinocchio's own reduction, by the mass matrix and gravity of what is left."""
+    names = ("shoulder", "elbow", "rail")
+    document = replace(read_document(CORPUS_FILE), file=None)
+    full = describe(without_shapes(document)).model
+    locked = {name: value for name, value in zip(names, q, strict=True) if name != names[keep]}
+    mine = describe(without_shapes(lock_joints(document, locked))).model
+    whole = pin.integrate(full, pin.neutral(full), np.array(q))
+    theirs = pin.buildReducedModel(full, [full.getJointId(name) for name in locked], whole)
+    for model in (mine, theirs):
+        assert list(model.names) == ["universe", names[keep]]
+    at = [pin.integrate(model, pin.neutral(model), np.array([q[keep]])) for model in (mine, theirs)]
+    H = [pin.crba(m, m.createData(), x) for m, x in zip((mine, theirs), at, strict=True)]
+    g = [pin.computeGeneralizedGravity(m, m.createData(), x) for m, x in zip((mine, theirs), at, strict=True)]
+    np.testing.assert_allclose(H[0], H[1], rtol=1e-11)
+    np.testing.assert_allclose(g[0], g[1], atol=1e-11)
+
+
+CORPUS_FILE = Path(__file__).parent / "urdf_corpus" / "good.urdf"
+
+
+def without_shapes(document):
+    """The document without visuals, so that no mesh is looked for."""
+    return replace(document, links=tuple(replace(link, visuals=()) for link in document.links))
+
+
+def test_a_mimic_joint_is_read_when_it_is_locked(tmp_path):
+    text = GOOD.replace('<limit effort="30"', '<mimic joint="shoulder"/><limit effort="30"')
+    description = read_urdf(write(tmp_path, text), locked={"elbow": 0.0})
+    assert description.locked == ("elbow",)
+    assert list(description.model.names) == ["universe", "shoulder", "rail"]
+
+
+@pytest.mark.parametrize(
+    ("locked", "words"),
+    [
+        ({"elbw": 0.0}, "did you mean 'elbow'"),
+        ({"mount": 0.0}, "moving joints"),
+        ({"rail": 0.4}, "from 0 to 0.3"),
+    ],
+)
+def test_a_joint_that_cannot_be_locked_is_refused(locked, words, tmp_path):
+    assert words in refusal(write(tmp_path, GOOD), locked=locked)
+
+
+def test_a_position_that_is_no_number_cannot_be_locked(tmp_path):
+    with pytest.raises(InputError, match="position of joint 'elbow'"):
+        read_urdf(write(tmp_path, GOOD), locked={"elbow": float("nan")})
+
+
+@pytest.mark.parametrize("options", [{"locked": ("elbow",)}, {"package_dirs": 3}, {"package_dirs": [None]}])
+def test_options_of_another_type_are_refused(options, tmp_path):
+    with pytest.raises(InputError, match=f"{next(iter(options))}: expected"):
+        read_urdf(write(tmp_path, GOOD), **options)
+
+
+def test_a_model_that_is_not_the_document_is_refused(tmp_path):
+    description = read_urdf(write(tmp_path, GOOD))
+    lighter = pin.Model(description.model)
+    lighter.inertias[2].mass *= 0.999
+    with pytest.raises(RobotError, match="joint 'elbow': expected a model with the inertial parameters"):
+        check_model(description.document, lighter)
+    fewer = pin.buildReducedModel(description.model, [2], pin.neutral(description.model))
+    with pytest.raises(RobotError, match="a model with the joints"):
+        check_model(description.document, fewer)
+
+
+def test_a_fixed_joint_may_share_its_name_with_a_link(tmp_path):
+    text = GOOD.replace('<joint name="mount"', '<joint name="tool"')
+    description = read_urdf(write(tmp_path, text))
+    assert description.model.frames[description.model.getFrameId("tool")].type == pin.BODY
