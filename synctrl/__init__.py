@@ -16,6 +16,7 @@ from .tasks.poses import Attached, AxisRotation, FunctionOrientation, PoseTrajec
 from .tasks.reachability import inverse_kinematics
 from .tasks.redundancy import Damping, Redundancy
 from .tasks.spaces import CartesianSpace, JointSpace
+from .tasks.synchronization import SynchronizationFunction
 from .tasks.trajectories import Circle, Cubic, ExponentialApproach, FunctionTrajectory, Hold
 
 __all__ = [
@@ -45,6 +46,7 @@ __all__ = [
     "Redundancy",
     "Result",
     "Robot",
+    "SynchronizationFunction",
     "SynctrlError",
     "inverse_kinematics",
     "load_robot",

@@ -2,50 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple, Self
+import warnings
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, instance
-from ..errors import CouplingError, InputError
+from ..checks import finite_array, finite_number, instance
+from ..errors import CouplingError, CouplingWarning, InputError
+from . import graphs
+from .weights import ConstantWeights, WeightFunction, Weights, WeightSource, as_source, check_weights
 
-#: A condition number above this counts as "no inverse".
-SINGULAR = 1e12
-
-
-class Weights(NamedTuple):
-    """c, its first and second time derivatives and its inverse, each (T, n, m, m)."""
-
-    c: np.ndarray
-    c_dot: np.ndarray
-    c_ddot: np.ndarray
-    c_inv: np.ndarray
-
-
-#: t -> c, c', c'', each (n, m, m)
-WeightFunction = Callable[[float], tuple[ArrayLike, ArrayLike, ArrayLike]]
+#: what the arguments `c` below may be
+WeightsLike = ArrayLike | WeightFunction | WeightSource
 
 
 class Coupling:
     """Synchronization errors epsilon_k = sum_i S[k, i] c_i e_i, eqs. (7) and (28).
 
-    Every row of S has two entries, one per robot that is compared; S is kept as the list of these pairs, so
-    that work grows with the number of pairs and not with its square.
+    Every row of S has a few entries, one per robot that is compared, usually two; S is kept as the list of
+    these, so that work grows with their number and no n by n matrix is ever made.
 
     Args:
         robots: number of robots, n.
-        edges: pairs of robots, counted from 0, (p, 2).
-        signs: the two entries of S per pair, (p, 2).
+        edges: the robots compared in each row, counted from 0, (p, 2); or all robots in one row, (1, n).
+        signs: the entries of S for them, of the same shape as `edges`.
         c: weights: a number per robot, (n,); diagonals, (n, m); matrices, (n, m, m); or a function of time
-            returning c, c' and c'' as matrices.
+            returning c, c' and c'' in one of these forms.
         name: for legends.
         unit: unit of the weights, "" if they have none.
 
     Raises:
-        CouplingError: a pair of a robot with itself or outside the cell, a repeated pair, a graph that is not
-            connected, or a weight without an inverse.
+        CouplingError: a robot compared with itself or outside the cell, an entry that is zero, a graph
+            that is not connected, or a weight without an inverse.
+
+    Warns:
+        CouplingWarning: two rows that compare the same pair, or a graph on which all synchronization errors
+            vanish only if all tracking errors do.
     """
 
     def __init__(
@@ -53,37 +46,137 @@ class Coupling:
         robots: int,
         edges: ArrayLike,
         signs: ArrayLike,
-        c: ArrayLike | WeightFunction,
+        c: WeightsLike,
         name: str = "coupling",
         unit: str = "",
     ):
         self.robots = _count(robots)
         self.name, self.unit = name, unit
-        self.signs = finite_array("signs", signs, (None, 2))
-        self.edges = finite_array("edges", edges, self.signs.shape).astype(int)
+        self.signs = finite_array("signs", signs, (None, None))
+        self.edges = graphs.indices("edges", finite_array("edges", edges, self.signs.shape))
         self.edges.flags.writeable = False
-        self._check_graph()
-        self.weight_function: WeightFunction | None = c if callable(c) else None
-        self.constant = np.ones(self.robots) if callable(c) else finite_array("c", c)
-        if self.constant.ndim == 0 or len(self.constant) != self.robots:
-            raise InputError(
-                f"c: expected one weight for each of {self.robots} robots, found shape {self.constant.shape}"
-            )
+        self._in_pairs = self.signs.shape[1] == 2
+        graphs.check_rows(name, self.robots, self.edges, self.signs)
+        self._source = as_source(self.robots, c)
         self._gather_by_robot()
 
     # -- ready couplings ----------------------------------------------------------------------------------
 
     @classmethod
-    def pair(cls, c: ArrayLike | WeightFunction = (1.0, -1.0), unit: str = "") -> Self:
+    def pair(cls, c: WeightsLike = (1.0, -1.0), unit: str = "") -> Self:
         """Two robots, epsilon = c_1 e_1 + c_2 e_2, eq. (7)."""
         return cls(2, [(0, 1)], [(1, 1)], c, "pair", unit)
 
     @classmethod
-    def ring(cls, n: int, c: ArrayLike | WeightFunction | None = None, unit: str = "") -> Self:
-        """The paper's ring, epsilon_k = c_k e_k + c_{k+1} e_{k+1}, eq. (28); by default c alternates in sign."""
+    def sum(cls, n: int, c: WeightsLike | None = None, unit: str = "") -> Self:
+        """One error for all robots, epsilon = sum_i c_i e_i: eq. (6) undivided, and the pair for n = 2.
+
+        It asks for nothing but (6), for any n; in exchange every robot has to know the error of every other.
+        """
+        n = _count(n)
+        return cls(n, [range(n)], np.ones((1, n)), np.ones(n) if c is None else c, "sum", unit)
+
+    @classmethod
+    def ring(cls, n: int, c: WeightsLike | None = None, unit: str = "") -> Self:
+        """The paper's ring, epsilon_k = c_k e_k + c_{k+1} e_{k+1}, eq. (28); by default c alternates in sign.
+
+        Warns:
+            CouplingWarning: n is odd, or n = 2. All epsilon vanish where c_1 e_1 = -c_2 e_2 = c_3 e_3 = ...;
+                on an odd ring that ends in c_1 e_1 = -c_1 e_1 = 0, and nothing is left to be synchronized:
+                use `signed_ring`. A ring of two has the pair's row twice, so twice its beta and K_eps.
+        """
         n = _count(n)
         default = [(-1.0) ** i for i in range(n)]
-        return cls(n, _cycle(n), np.ones((n, 2)), default if c is None else c, "ring", unit)
+        return cls(n, graphs.cycle(n), np.ones((n, 2)), default if c is None else c, "ring", unit)
+
+    @classmethod
+    def signed_ring(cls, n: int, c: WeightsLike | None = None, unit: str = "") -> Self:
+        """The ring of differences, epsilon_k = c_k e_k - c_{k+1} e_{k+1}, for any n; by default c = 1."""
+        return cls._differences(n, graphs.cycle(_count(n)), c, "signed ring", unit)
+
+    @classmethod
+    def chain(cls, n: int, c: WeightsLike | None = None, unit: str = "") -> Self:
+        """Differences of neighbours, c_k e_k - c_{k+1} e_{k+1} for k = 1 to n - 1; by default c = 1."""
+        return cls._differences(n, graphs.path(_count(n)), c, "chain", unit)
+
+    @classmethod
+    def star(cls, n: int, leader: int = 0, c: WeightsLike | None = None, unit: str = "") -> Self:
+        """Differences of one robot and each other one; by default c = 1. The leader feels all of them."""
+        instance("leader", leader, (int, np.integer), "the number of a robot")
+        if not 0 <= leader < _count(n):
+            raise CouplingError(f"leader: expected a robot from 0 to {n - 1}, found {leader}")
+        return cls._differences(n, graphs.star(n, leader), c, "star", unit)
+
+    @classmethod
+    def complete(cls, n: int, c: WeightsLike | None = None, unit: str = "") -> Self:
+        """Differences of all robots, n (n - 1) / 2 of them; by default c = 1."""
+        return cls._differences(n, graphs.complete(_count(n)), c, "all to all", unit)
+
+    @classmethod
+    def from_graph(
+        cls, graph: Any, n: int | None = None, c: WeightsLike | None = None, unit: str = ""
+    ) -> Self:
+        """Differences along the edges of a graph, epsilon_k = a_k (c_i e_i - c_j e_j) for edge k from i to j.
+
+        Args:
+            graph: pairs (i, j) or triples (i, j, a), robots counted from 0; or an undirected networkx graph
+                with nodes 0 to n - 1, whose `weight` attributes, if there are any, are the a of `weighted`.
+            n: number of robots; by default as many as the graph names.
+            c: weights, by default 1.
+            unit: unit of the weights.
+
+        Raises:
+            CouplingError: see `Coupling`; also a directed graph, or one without edges.
+        """
+        found, edges, edge_weights = graphs.read_graph(graph)
+        coupling = cls._differences(found if n is None else n, edges, c, "graph", unit)
+        return coupling if (edge_weights == 1).all() else coupling.weighted(edge_weights)
+
+    @classmethod
+    def _differences(cls, n: int, edges: ArrayLike, c: WeightsLike | None, name: str, unit: str) -> Self:
+        signs = np.tile([1.0, -1.0], (len(edges), 1))  # type: ignore[arg-type]
+        return cls(n, edges, signs, np.ones(_count(n)) if c is None else c, name, unit)
+
+    # -- variations ---------------------------------------------------------------------------------------
+
+    def weighted(self, edge_weights: ArrayLike) -> Self:
+        """This coupling with row k of S multiplied by a_k.
+
+        epsilon_k grows by a_k, and what it does to its robots, through beta and K_eps, by a_k squared.
+
+        Args:
+            edge_weights: a, (p,), above 0.
+
+        Raises:
+            InputError: another size, or a weight that is not above 0.
+        """
+        a = finite_array("edge_weights", edge_weights, (self.pairs,))
+        if a.min() <= 0:
+            k = int(np.argmin(a))
+            raise InputError(
+                f"edge_weights: expected numbers above 0, found {a[k]:g} at index {k}; leave that pair out"
+            )
+        return self._again(self.signs * a[:, None], self._source, self.unit)
+
+    def normalized(self, t: float = 0.0) -> Self:
+        """This coupling with weights that do not depend on how the synchronization function was scaled.
+
+        f = 0 and 5 f = 0 are the same task, but epsilon differs by 5 and the effective K_eps by 25. Here all
+        c are divided by one constant, the geometric mean of the singular values of all c_i at one instant.
+        K_eps is then in N·m/rad, or N/m, as if c had no unit. A constant leaves c' and c'' as exact as c.
+
+        Args:
+            t: the instant, s.
+        """
+        size = self._source.size(finite_number("t", t))
+        if not 0 < size < np.inf:
+            raise CouplingError(f"a weight has no inverse at t = {t:g} s, so there is no scale to divide by")
+        return self._again(self.signs, self._source.scaled(1 / size), "")
+
+    def _again(self, signs: np.ndarray, source: WeightSource, unit: str) -> Self:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", CouplingWarning)  # said once is enough
+            return type(self)(self.robots, self.edges, signs, source, self.name, unit)
 
     # -- use ----------------------------------------------------------------------------------------------
 
@@ -93,31 +186,57 @@ class Coupling:
         return len(self.edges)
 
     @property
+    def is_constant(self) -> bool:
+        """Whether the weights are the same at all times."""
+        return isinstance(self._source, ConstantWeights)
+
+    @property
+    def incidence(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """S^T as lists: where the rows of each robot begin, (n + 1,); then each row, and its entry of S."""
+        return np.append(self._first, self._incident.size), self._incident, self._incident_sign[:, 0]
+
+    @property
     def matrix(self) -> np.ndarray:
         """S, (p, n), written out. For display and tests; the law does not need it."""
         S = np.zeros((self.pairs, self.robots))
         np.add.at(S, (np.arange(self.pairs)[:, None], self.edges), self.signs)
         return S
 
+    @property
+    def synchronized_motion(self) -> np.ndarray | None:
+        """The w = (c_i e_i), (n,), that all pairs leave free, S w = 0, with w_0 = 1; None if there is none.
+
+        Raises:
+            CouplingError: the coupling is not made of pairs.
+        """
+        if not self._in_pairs:
+            raise CouplingError(f"{self!r} compares all robots at once and leaves more than one motion free")
+        w = graphs.carried_motion(self.robots, self.edges, self.signs)
+        return w if graphs.fits_all(self.edges, self.signs, w) else None
+
     def weights(self, times: np.ndarray, m: int) -> Weights:
         """Weights at some times, (T,), for a task of dimension m: four arrays (T, n, m, m).
 
         Raises:
             CouplingError: a weight has no inverse, or the weight function returned something else than three
-                finite arrays of shape (n, m, m).
+                finite arrays, one entry per robot.
         """
-        shape = (self.robots, m, m)
-        if self.weight_function is None:
-            c = _as_matrices(self.constant, m)
-            constant = (c, np.zeros(shape), np.zeros(shape), _inverse(c[None], times)[0])
-            return Weights(*(np.broadcast_to(part, (len(times), *shape)) for part in constant))
-        parts = [_call(self.weight_function, t, shape) for t in times]
-        c, c_dot, c_ddot = (np.array(part) for part in zip(*parts, strict=True))
-        return Weights(c, c_dot, c_ddot, _inverse(c, times))
+        return self._source.at(times, m)
+
+    def check_weights(self, times: np.ndarray, m: int) -> None:
+        """Follow the weights through the instants of a run, (T,), before it starts.
+
+        Raises:
+            CouplingError: a weight loses its inverse on the way, or c' or c'' is not the derivative it should
+                be; the message names the robot and the time.
+        """
+        check_weights(self._source, np.asarray(times, dtype=float), m)
 
     def compare(self, w: np.ndarray) -> np.ndarray:
         """S w, (p, ...), for one row of w, (n, ...), per robot."""
-        return self._sign_a * w.take(self._a, 0) + self._sign_b * w.take(self._b, 0)
+        if self._in_pairs:
+            return self._sign_a * w.take(self._a, 0) + self._sign_b * w.take(self._b, 0)
+        return np.add.reduce(self.signs[:, :, None] * w.take(self.edges, 0), axis=1)
 
     def distribute(self, z: np.ndarray) -> np.ndarray:
         """S^T z, (n, ...), for one row of z, (p, ...), per pair."""
@@ -126,35 +245,18 @@ class Coupling:
     # -- internals ----------------------------------------------------------------------------------------
 
     def _gather_by_robot(self) -> None:
-        """Lists the pairs of each robot one after another, so that a sum over them is one pass."""
-        self._a, self._b = self.edges.T.copy()
-        self._sign_a, self._sign_b = (column[:, None] for column in self.signs.T.copy())
+        """Lists the rows of each robot one after another, so that a sum over them is one pass."""
+        self._a, self._b = self.edges[:, 0].copy(), self.edges[:, 1].copy()
+        self._sign_a, self._sign_b = self.signs[:, :1].copy(), self.signs[:, 1:2].copy()
         ends = self.edges.T.ravel()
         order = np.argsort(ends, kind="stable")
-        self._incident = np.tile(np.arange(self.pairs), 2)[order]
+        self._incident = np.tile(np.arange(self.pairs), self.edges.shape[1])[order]
         self._incident_sign = self.signs.T.ravel()[order][:, None]
         self._first = np.searchsorted(ends[order], np.arange(self.robots))
 
-    def _check_graph(self) -> None:
-        n = self.robots
-        for k, (i, j) in enumerate(self.edges):
-            if not (0 <= i < n and 0 <= j < n):
-                raise CouplingError(
-                    f"pair {k}: expected robots 0 to {n - 1}, found ({i}, {j})"
-                )
-            if i == j:
-                raise CouplingError(f"pair {k}: robot {i} is compared with itself")
-        if not self.signs.all():
-            raise CouplingError("signs: expected entries other than 0, found a pair that leaves one robot out")
-        apart = _unreached(n, self.edges)
-        if apart:
-            raise CouplingError(
-                f"the graph is not connected: no chain of pairs leads from robot 0 to robot {apart[0]}; "
-                "add a pair, or simulate the groups as separate cells"
-            )
-
     def __repr__(self) -> str:
-        return f"Coupling('{self.name}', {self.robots} robots, {self.pairs} pairs)"
+        rows = f"{self.pairs} pairs" if self._in_pairs else "all in one"
+        return f"Coupling('{self.name}', {self.robots} robots, {rows})"
 
 
 def _count(n: int) -> int:
@@ -162,53 +264,3 @@ def _count(n: int) -> int:
     if isinstance(n, bool) or n < 2:
         raise CouplingError(f"robots: a coupling compares at least 2 robots, found {n}")
     return int(n)
-
-
-def _cycle(n: int) -> list[tuple[int, int]]:
-    return [(k, (k + 1) % n) for k in range(n)]
-
-
-def _unreached(n: int, edges: Sequence | np.ndarray) -> list[int]:
-    """Robots that no chain of pairs connects with robot 0."""
-    neighbours: list[list[int]] = [[] for _ in range(n)]
-    for i, j in edges:
-        neighbours[i].append(j)
-        neighbours[j].append(i)
-    seen, todo = {0}, [0]
-    while todo:
-        new = set(neighbours[todo.pop()]) - seen
-        seen |= new
-        todo.extend(new)
-    return sorted(set(range(n)) - seen)
-
-
-def _as_matrices(c: np.ndarray, m: int) -> np.ndarray:
-    n = len(c)
-    if c.ndim == 1:
-        return c[:, None, None] * np.eye(m)
-    if c.shape == (n, m):
-        return c[:, :, None] * np.eye(m)
-    if c.shape == (n, m, m):
-        return c.copy()
-    raise InputError(f"c: expected shape ({n},), ({n}, {m}) or ({n}, {m}, {m}), found {c.shape}")
-
-
-def _call(function: WeightFunction, t: float, shape: tuple[int, int, int]) -> list[np.ndarray]:
-    value = function(float(t))
-    if not isinstance(value, (tuple, list)) or len(value) != 3:
-        raise CouplingError("c: expected a function returning the three arrays c, c' and c''")
-    try:
-        return [finite_array("c", part, shape) for part in value]
-    except InputError as error:
-        raise CouplingError(f"weights at t = {t:g} s: {error}") from error
-
-
-def _inverse(c: np.ndarray, times: np.ndarray) -> np.ndarray:
-    condition = np.nan_to_num(np.linalg.cond(c), nan=np.inf)
-    if condition.max() >= SINGULAR:
-        k, i = np.unravel_index(np.argmax(condition), condition.shape)
-        raise CouplingError(
-            f"the weight c of the robot at index {i} has no inverse at t = {times[k]:g} s "
-            f"(condition number {condition[k, i]:.2g}): {c[k, i].tolist()}"
-        )
-    return np.linalg.inv(c)
