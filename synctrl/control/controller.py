@@ -141,7 +141,7 @@ class Controller:
     def _regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
         for i, (regressor, Y, nv) in enumerate(self._regressors):
             Y[:] = regressor(q[i, :nv], v[i, :nv], v_ref[i, :nv], a_ref[i, :nv])
-        return self._Y
+        return self._Y.copy()
 
     def _joint_damping(
         self, task: Measurement, s_q: np.ndarray, c_inv: np.ndarray, r: np.ndarray
