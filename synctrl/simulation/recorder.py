@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -100,10 +101,12 @@ def describe(loop: ClosedLoop) -> dict[str, Any]:
 
 def versions() -> dict[str, str]:
     """Versions of the packages that determine the numbers."""
-    found = {}
-    for package in ("synctrl", "pin", "numpy", "scipy"):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not installed as a package"
-    return found
+    return {package: _version(package) for package in ("synctrl", "pin", "numpy", "scipy")}
+
+
+@cache
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed as a package"

@@ -21,7 +21,7 @@ from pathlib import Path
 
 from ...errors import CompilationError, MissingDependencyError
 
-FLAGS = ("-O1", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off")
+FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off")
 
 
 def require_casadi() -> str:
