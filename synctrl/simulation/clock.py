@@ -28,11 +28,19 @@ class Clock:
     jumps: np.ndarray
 
 
-def make_clock(duration: float, dt: float, jumps: Sequence[float]) -> Clock:
+def make_clock(duration: float, dt: float, edges: Sequence[float], breaks: Sequence[float] = ()) -> Clock:
     """A clock that lands exactly on every jump.
 
-    A jump closer than 1e-9 dt to a multiple of dt counts as that multiple, so that 0.7 = 700 dt whatever the
-    rounding. If duration is not a multiple of dt the last step is shorter.
+    What is closer than 1e-9 dt to a multiple of dt counts as that multiple, so that 0.7 = 700 dt whatever the
+    rounding. At a break the multiple gives way, because a desired motion asks on which side of it a time lies;
+    at an edge it stays, so that the instants do not depend on disturbances. If duration is not a multiple of
+    dt the last step is shorter.
+
+    Args:
+        duration: length of the run, s.
+        dt: distance of logged instants, s.
+        edges: instants at which a disturbance jumps, s.
+        breaks: instants at which a desired motion jumps, s.
 
     Raises:
         InputError: duration or dt not positive, dt longer than the run, or more than ten million steps.
@@ -44,9 +52,12 @@ def make_clock(duration: float, dt: float, jumps: Sequence[float]) -> Clock:
         raise InputError(f"dt: {duration:g} s in steps of {dt:g} s are more than {MAX_STEPS} steps")
     count = int(np.ceil(duration / dt - 1e-9))
     logged = np.append(np.arange(count) * dt, duration)
-    inside = _snap(np.array([j for j in jumps if 0 < j < duration]), logged, 1e-9 * dt)
-    inside = inside[(inside > 0) & (inside < duration)]
-    return Clock(logged, np.union1d(logged, inside), np.unique(inside))
+    for instant in breaks:
+        near = 1 + np.abs(logged[1:] - instant).argmin()
+        logged[near] = _snap(logged[near], instant, dt)
+    snapped = [_snap(edge, logged[np.abs(logged - edge).argmin()], dt) for edge in edges]
+    jumps = np.unique([jump for jump in (*breaks, *snapped) if 0 < jump < logged[-1]])
+    return Clock(logged, np.union1d(logged, jumps), jumps)
 
 
 def before(t: float) -> float:
@@ -54,6 +65,5 @@ def before(t: float) -> float:
     return float(np.nextafter(t, -np.inf))
 
 
-def _snap(jumps: np.ndarray, grid: np.ndarray, tolerance: float) -> np.ndarray:
-    nearest = grid[np.abs(grid[:, None] - jumps[None, :]).argmin(axis=0)] if jumps.size else jumps
-    return np.where(np.abs(nearest - jumps) <= tolerance, nearest, jumps)
+def _snap(t: float, to: float, dt: float) -> float:
+    return to if abs(t - to) <= 1e-9 * dt else t

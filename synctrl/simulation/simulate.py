@@ -118,7 +118,7 @@ class Experiment:
         """Everything that a run needs, checked."""
         duration = self.duration if duration is None else duration
         schedule = DisturbanceSchedule(self.cell, self.disturbances)
-        clock = make_clock(duration, dt, (*schedule.edges, *self.cell.breaks))
+        clock = make_clock(duration, dt, schedule.edges, self.cell.breaks)
         every = None if control_period is None else steps_per_sample(control_period, dt)
         check_reachable(self.cell, clock.logged)
         self.cell.coupling.check_weights(clock.logged, self.cell.m)
