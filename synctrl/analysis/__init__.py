@@ -1,1 +1,5 @@
 """How well: metrics, the Lyapunov proof, certificates."""
+
+from .certify import Certificate, certify
+
+__all__ = ["Certificate", "certify"]

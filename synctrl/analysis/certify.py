@@ -1,0 +1,187 @@
+"""Certify: everything the theory says about one run, in one object."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ..simulation.result import Result
+from ..simulation.simulate import Experiment
+from .convergence import Convergence, convergence_of
+from .gain_condition import GainCondition, gain_condition_of
+from .lyapunov import OUTSIDE, Growth, Lyapunov, first_growth, lyapunov_of
+from .replay import Replay, replay
+
+VERDICTS = ("certified", "outside the theorem", "not certified")
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """What the proof of convergence says about one run.
+
+    Attributes:
+        title: of the run.
+        verdict: "certified": every assumption of the theorem holds along the run, V' <= 0 to rounding at
+            every logged instant, and the balance of V closes. "outside the theorem": some assumption does not
+            hold, and nothing else is wrong. "not certified": V grows although every assumption holds, or the
+            run is not accurate enough to tell.
+        outside: the assumptions that do not hold, each with what was found.
+        doubts: what speaks against the run itself.
+        growth: the first instant at which V grows, and the term that did it, or None.
+        lyapunov: V and V' with their terms.
+        gain_condition: where the gain condition is tightest; it matters only if `gain_condition.needed`.
+        convergence: errors at the end.
+    """
+
+    title: str
+    verdict: str
+    outside: tuple[str, ...]
+    doubts: tuple[str, ...]
+    growth: Growth | None
+    lyapunov: Lyapunov
+    gain_condition: GainCondition
+    convergence: Convergence
+
+    @property
+    def certified(self) -> bool:
+        """Whether the verdict is "certified"."""
+        return self.verdict == "certified"
+
+    def as_dict(self) -> dict[str, Any]:
+        """The same as plain numbers, words and lists, without the arrays over time."""
+        record = self.lyapunov
+        return {
+            "title": self.title,
+            "verdict": self.verdict,
+            "outside": list(self.outside),
+            "doubts": list(self.doubts),
+            "growth": None if self.growth is None else asdict(self.growth),
+            "V": {"start": float(record.V[0]), "end": float(record.V[-1]), **_ends(record)},
+            "V_dot": {"largest": float(record.V_dot.max()), "rounding": float(record.rounding.max())},
+            "energy": {name: float(value) for name, value in record.supplied.items()},
+            "balance": {"closes": record.closes, "drift": record.largest_drift, "bound": record.drift_bound},
+            "gain_condition": {**_finite(asdict(self.gain_condition)), "holds": self.gain_condition.holds},
+            "convergence": asdict(self.convergence),
+        }
+
+    def __str__(self) -> str:
+        return "\n".join(_lines(self))
+
+
+def certify(result: Result, experiment: Experiment | None = None) -> Certificate:
+    """Check a run against the proof of convergence, at every logged instant.
+
+    Args:
+        result: the run.
+        experiment: what made it; needed for a result loaded from a file.
+
+    Raises:
+        InputError: no experiment, or another than the one that made the result.
+    """
+    run = replay(result, experiment)
+    record, condition, errors = lyapunov_of(run), gain_condition_of(run), convergence_of(run)
+    growth = first_growth(record)
+    outside = tuple(_outside(run, record, condition))
+    doubts = tuple(_doubts(run, record, errors, growth, bool(outside)))
+    verdict = VERDICTS[2] if doubts else VERDICTS[1] if outside else VERDICTS[0]
+    title = str(result.info["title"])
+    return Certificate(title, verdict, outside, doubts, growth, record, condition, errors)
+
+
+def _outside(run: Replay, record: Lyapunov, condition: GainCondition) -> list[str]:
+    """Assumptions of the theorem that do not hold along the run."""
+    found = []
+    if run.result.status != "completed":
+        found.append(f"the run {run.result.status}")
+    period = run.result.info.get("control_period")
+    if period is not None:
+        found.append(f"torque and adaptation are held for {period:g} s at a time")
+    for name, words in _WORDS.items():
+        power = record.power[name]
+        if (np.abs(power) > record.rounding).any():
+            found.append(f"{words}: power from {power.min():.3g} to {power.max():.3g}")
+    if condition.needed and not condition.holds:
+        found.append(f"the gain condition fails: {_condition_in_words(run, condition)}")
+    return found
+
+
+_WORDS = {
+    "friction": "friction that the model does not contain",
+    "disturbance": "torque from outside",
+    "model error": "parameters that are wrong and not adapted",
+    "damped inverse": "a reference that damped inverse kinematics do not follow",
+    "other": "forces that the model does not contain",
+}
+
+
+def _doubts(
+    run: Replay, record: Lyapunov, errors: Convergence, growth: Growth | None, outside: bool
+) -> list[str]:
+    """What should not be even outside the theorem, and growth of V inside it."""
+    found = []
+    sampled = run.result.info.get("control_period") is not None
+    if not record.closes and not sampled:
+        found.append(
+            f"the balance of V does not close: V - V(0) - integral of V' reaches {record.largest_drift:.3g}, "
+            f"numerical errors explain {record.drift_bound:.3g}; the step is too long to follow this motion"
+        )
+    if growth is not None and not outside:
+        found.append(f"V grows at t = {growth.time:g} s by the term '{growth.term}'")
+    if not errors.identity_holds:
+        found.append(f"w = N e* + S+ epsilon is off by {errors.identity:.3g}")
+    return found
+
+
+def _condition_in_words(run: Replay, condition: GainCondition) -> str:
+    name = run.loop.cell.names[condition.robot]
+    return (
+        f"{name} at t = {condition.time:g} s has lambda_min(K_r) = {condition.K_r_min:.4g} against "
+        f"lambda_max(sym(B)) = {condition.corrected:.4g} "
+        f"((18) as printed compares with {condition.printed:.4g})"
+    )
+
+
+# -- in words ---------------------------------------------------------------------------------------------
+
+
+def _ends(record: Lyapunov) -> dict[str, dict[str, float]]:
+    return {name: {"start": float(term[0]), "end": float(term[-1])} for name, term in record.energy.items()}
+
+
+def _finite(values: dict[str, Any]) -> dict[str, Any]:
+    """None for what is infinite, so that strict JSON can hold it."""
+    return {k: None if isinstance(v, float) and not np.isfinite(v) else v for k, v in values.items()}
+
+
+def _lines(c: Certificate) -> list[str]:
+    record, errors = c.lyapunov, c.convergence
+    acting = [name for name, power in record.power.items() if (np.abs(power) > record.rounding).any()]
+    supplied = ", ".join(f"{name} {record.supplied[name]:.3g}" for name in acting)
+    lines = [f"{c.title}: {c.verdict}"]
+    lines += [f"  outside: {text}" for text in c.outside] + [f"  doubt: {text}" for text in c.doubts]
+    lines.append(
+        f"  V goes from {record.V[0]:.5g} to {record.V[-1]:.5g}; its change by term: {supplied or 'none'}"
+    )
+    lines.append(f"  V' is at most {record.V_dot.max():.3g} (rounding {record.rounding.max():.1g})")
+    lines.append(
+        f"  balance: off by {record.largest_drift:.2g}, numerical errors explain {record.drift_bound:.2g}"
+    )
+    lines.append(f"  gain condition: {_state(c.gain_condition)}")
+    final = ", ".join(f"{name} {value:.3g}" for name, value in errors.final.items())
+    lines.append(f"  at the end: {final}")
+    lines.append(f"  w = N e* + S+ epsilon: off by {errors.identity:.1g}")
+    if c.growth is not None:
+        lines.append(f"  V first grows at t = {c.growth.time:g} s, by the term '{c.growth.term}'")
+    return lines
+
+
+def _state(condition: GainCondition) -> str:
+    margin = f"margin {condition.margin:.4g}"
+    if not condition.needed:
+        return f"not needed with the exact reference acceleration ({margin})"
+    return f"{'holds' if condition.holds else 'fails'}, {margin}"
+
+
+__all__ = ["OUTSIDE", "VERDICTS", "Certificate", "certify"]

@@ -1,0 +1,279 @@
+"""The proof, watched: V and V' along a run, term by term.
+
+    V  = sum_i 1/2 s_q^T M s_q                       kinetic
+       + sum_i 1/2 tilde^T Gamma^-1 tilde            parameter
+       + sum_k 1/2 eps_k^T K_eps eps_k               synchronization
+       + sum_i 1/2 E_i^T K_eps Lambda beta E_i       integral
+
+    V' = - sum_i s_q^T K_r s_q                       damping
+       - sum_k eps_k^T K_eps Lambda eps_k            synchronization rate
+       - sum_i sigma_i^T K_eps beta sigma_i          coupling
+       + power of what is outside the theorem
+
+with tilde = theta - theta_hat, E = S^T int eps, sigma = S^T eps; (19), (24), (34) and (39) for any coupling.
+V' is not taken from that formula: it is the chain rule applied to V with the accelerations of the plant. What
+the formula does not explain is the power called "other", and is rounding when the model is complete.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..simulation.closed_loop import ClosedLoop
+from ..simulation.result import Result
+from ..simulation.simulate import Experiment
+from .replay import Replay, replay
+
+ENERGIES = ("kinetic", "parameter", "synchronization", "integral")
+#: what the theorem knows; each is at most 0
+THEOREM = ("damping", "synchronization rate", "coupling")
+#: what it does not: each may have either sign
+OUTSIDE = ("friction", "disturbance", "weight rate", "model error", "damped inverse", "other")
+POWERS = THEOREM + OUTSIDE
+EPS = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True, eq=False)
+class Lyapunov:
+    """V and V' of a run at its T logged instants, at a jump with values from the right.
+
+    V has the unit of energy, N·m, when the weights have none.
+
+    Attributes:
+        t: (T,), s.
+        energy: terms of V under the names in `ENERGIES`, each (T,).
+        power: terms of V' under the names in `POWERS`, each (T,).
+        rounding: bound of the rounding error of V', (T,).
+        drift: V(t) - V(0) - integral of V', (T,); 0 but for the error of the run and of the quadrature.
+        drift_bound: what these two errors and rounding may amount to.
+        supplied: integral of every power over the run, by name; together the change of V.
+    """
+
+    t: np.ndarray
+    energy: Mapping[str, np.ndarray]
+    power: Mapping[str, np.ndarray]
+    rounding: np.ndarray
+    drift: np.ndarray
+    drift_bound: float
+    supplied: Mapping[str, float]
+
+    @property
+    def V(self) -> np.ndarray:  # noqa: N802
+        """Sum of the energies, (T,)."""
+        return np.sum([self.energy[name] for name in ENERGIES], axis=0)
+
+    @property
+    def V_dot(self) -> np.ndarray:  # noqa: N802
+        """V', the sum of the powers, (T,)."""
+        return np.sum([self.power[name] for name in POWERS], axis=0)
+
+    @property
+    def largest_drift(self) -> float:
+        """Largest absolute value of `drift`."""
+        return float(np.abs(self.drift).max())
+
+    @property
+    def closes(self) -> bool:
+        """Whether the balance of V closes: all power that enters or leaves V has been accounted for."""
+        return self.largest_drift <= self.drift_bound
+
+
+@dataclass(frozen=True)
+class Growth:
+    """The first instant at which V grows.
+
+    Attributes:
+        time: s.
+        index: of that instant in the log.
+        rate: V' there, or the increase to the next instant over the step if V' is not positive.
+        term: the largest positive power there; "integration" if there is none, and the step is too long.
+    """
+
+    time: float
+    index: int
+    rate: float
+    term: str
+
+
+def lyapunov(result: Result, experiment: Experiment | None = None) -> Lyapunov:
+    """V and V' at every logged instant of a run.
+
+    Entries of theta that are not adapted (Gamma = 0) have no place in V; their error appears in V' as the
+    power "model error", s_q^T Y tilde.
+
+    Args:
+        result: the run.
+        experiment: what made it; needed for a result loaded from a file.
+
+    Raises:
+        InputError: no experiment, or another than the one that made the result.
+    """
+    return lyapunov_of(replay(result, experiment))
+
+
+def lyapunov_of(run: Replay) -> Lyapunov:
+    """V and V' of a run that has been gone through already."""
+    energy, power = _energy(run), _power(run)
+    V, V_dot = (np.sum(list(terms.values()), axis=0) for terms in (energy, power))
+    drift, bound = _drift(run, V, V_dot)
+    at = run.logged
+    return Lyapunov(
+        run.result.t,
+        {name: term[at] for name, term in energy.items()},
+        {name: term[at] for name, term in power.items()},
+        operations(run.loop) * EPS * _magnitude(run)[at],
+        drift,
+        bound + operations(run.loop) * EPS * float(np.max(V)),
+        {name: _supplied(run, term) for name, term in power.items()},
+    )
+
+
+def first_growth(record: Lyapunov) -> Growth | None:
+    """The first instant at which V grows beyond rounding, and the term that did it; None if it never does."""
+    V, V_dot = record.V, record.V_dot
+    rising = V_dot > record.rounding
+    gained = np.diff(V, append=V[-1])
+    rising |= gained > 8 * EPS * V + record.rounding * np.diff(record.t, append=record.t[-1])
+    if not rising.any():
+        return None
+    k = int(np.argmax(rising))
+    if V_dot[k] > record.rounding[k]:
+        term = max(POWERS, key=lambda name: record.power[name][k])
+        return Growth(float(record.t[k]), k, float(V_dot[k]), term)
+    rate = float(gained[k] / (record.t[k + 1] - record.t[k]))
+    term = max(POWERS, key=lambda name: record.power[name][k + 1])
+    grows = record.power[term][k + 1] > record.rounding[k + 1]
+    return Growth(float(record.t[k]), k, rate, term if grows else "integration")
+
+
+def operations(loop: ClosedLoop) -> int:
+    """Roundings behind one entry of V': ten chained sums over joints, axes and parameters."""
+    cell = loop.cell
+    return 10 * (cell.nv + cell.m + cell.theta.shape[1])
+
+
+# -- terms ------------------------------------------------------------------------------------------------
+
+
+def _energy(run: Replay) -> dict[str, np.ndarray]:
+    """Terms of V, one value per row."""
+    x, controller = run.rows, run.loop.controller
+    K_eps, beta, Lambda = controller.K_eps, controller.beta, controller.Lambda
+    terms = (
+        x.s_q * np.matvec(x.M, x.s_q),
+        x.tilde * _per_gamma(run, x.tilde),
+        x.epsilon * K_eps * x.epsilon,
+        x.E * K_eps * Lambda * beta * x.E,
+    )
+    return {name: 0.5 * _sum(term) for name, term in zip(ENERGIES, terms, strict=True)}
+
+
+def _rates(run: Replay) -> tuple[np.ndarray, ...]:
+    """Time derivatives of the terms of V by the chain rule, before they are added up over robots and axes."""
+    x, controller = run.rows, run.loop.controller
+    K_eps, beta, Lambda = controller.K_eps, controller.beta, controller.Lambda
+    s_q_dot = x.a_ref + _reference_gap(run) - x.v_dot
+    return (
+        x.s_q * (np.matvec(x.M, s_q_dot) + x.C_s),
+        -x.theta_hat_dot * _per_gamma(run, x.tilde),
+        x.epsilon * K_eps * x.epsilon_dot,
+        x.E * K_eps * Lambda * beta * x.sigma,
+    )
+
+
+def _power(run: Replay) -> dict[str, np.ndarray]:
+    """Terms of V', one value per row; "other" is what the chain rule has beyond those with a name."""
+    x, controller = run.rows, run.loop.controller
+    K_eps, K_r = controller.K_eps, controller.K_r
+    s, moved = np.matvec(x.c_inv, x.r), np.matvec(x.J, x.s_q)
+    damping = x.s_q * K_r * x.s_q if controller.k_r_space == "joint" else moved * K_r * s
+    force = np.vecmat(K_eps * x.sigma, x.c)
+    terms = (
+        -damping,
+        -x.epsilon * K_eps * controller.Lambda * x.epsilon,
+        -x.sigma * K_eps * controller.beta * x.sigma,
+        x.s_q * x.friction,
+        -x.s_q * x.disturbance,
+        x.s_q * np.matvec(x.M, _reference_gap(run)),
+        x.s_q * x.Y_frozen,
+        (s - moved) * force,
+    )
+    power = {name: _sum(term) for name, term in zip(POWERS, terms, strict=False)}
+    total = np.sum([_sum(rate) for rate in _rates(run)], axis=0)
+    power["other"] = total - np.sum(list(power.values()), axis=0)
+    return power
+
+
+def _reference_gap(run: Replay) -> np.ndarray:
+    """v_ref' - a_ref, (R, n, nv): 0 when exact, J^-1 d(c^-1)/dt r with the paper's reference acceleration."""
+    x = run.rows
+    if run.loop.controller.reference_acceleration == "exact":
+        return np.zeros_like(x.a_ref)
+    return -np.matvec(x.J_inv, np.matvec(x.c_inv, np.matvec(x.c_dot, np.matvec(x.c_inv, x.r))))
+
+
+def _per_gamma(run: Replay, tilde: np.ndarray) -> np.ndarray:
+    """Gamma^-1 tilde, and 0 for what is not adapted."""
+    Gamma = run.loop.controller.Gamma
+    return tilde * np.divide(1.0, Gamma, out=np.zeros_like(Gamma), where=Gamma > 0)
+
+
+def _magnitude(run: Replay) -> np.ndarray:
+    """Sum of the magnitudes of all that is added up to V', from which its rounding follows, (R,)."""
+    x, controller = run.rows, run.loop.controller
+    condition = np.linalg.norm(x.J, axis=(-2, -1)) * np.linalg.norm(x.J_inv, axis=(-2, -1))
+    size = np.abs(x.s_q) + np.abs(x.v_ref) + np.abs(x.v)
+    inertial = np.abs(np.matvec(x.M, x.a_ref - x.v_dot))
+    kinetic = size * (x.Y_size + np.abs(x.tau) + inertial)
+    command = np.abs(x.u) + np.abs(x.r) + controller.Lambda * np.abs(x.e_star)
+    coupling = command * controller.K_eps * np.abs(x.sigma)
+    per_robot = condition * (kinetic.sum(axis=-1) + coupling.sum(axis=-1))
+    return per_robot.sum(axis=-1) + sum(_sum(np.abs(rate)) for rate in _rates(run))
+
+
+def _sum(term: np.ndarray) -> np.ndarray:
+    """Over all axes but the first."""
+    return term.sum(axis=(1, 2))
+
+
+# -- the balance over time --------------------------------------------------------------------------------
+
+
+def _drift(run: Replay, V: np.ndarray, V_dot: np.ndarray) -> tuple[np.ndarray, float]:
+    """V - V(0) - integral of V', (T,), and a bound of its numerical error.
+
+    V' is integrated by a cubic spline, which like the Runge-Kutta method errs with the fourth power of the
+    step and with a larger constant. What an integral changes when every second instant is left out is about
+    15 times its error. Summed over the terms of V, between which much is exchanged, it stands for both errors.
+    """
+    drift, bound = np.zeros(len(run.logged)), 0.0
+    rates = [_sum(rate) for rate in _rates(run)]
+    for first, last, rows in run.stretches:
+        t = run.result.t[first : last + 1]
+        missing = V[rows] - V[rows][0] - _integral(t, V_dot[rows])
+        drift[last + 1 :] = drift[first] + missing[-1]
+        drift[first : last + 1] = drift[first] + missing
+        bound += sum(_halving(t, rate[rows]) for rate in rates)
+    return drift, bound
+
+
+def _supplied(run: Replay, rate: np.ndarray) -> float:
+    """Integral of a power over all stretches of the run."""
+    t = run.result.t
+    return sum(float(_integral(t[first : last + 1], rate[rows])[-1]) for first, last, rows in run.stretches)
+
+
+def _integral(t: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """Integral of a smooth rate from the first instant to each."""
+    from scipy.interpolate import make_interp_spline
+
+    return make_interp_spline(t, rate, k=min(3, len(t) - 1)).antiderivative()(t)
+
+
+def _halving(t: np.ndarray, rate: np.ndarray) -> float:
+    """How much the integral of a rate changes when every second instant is left out."""
+    half = np.unique(np.append(np.arange(0, len(t), 2), len(t) - 1))
+    return float(np.abs(_integral(t[half], rate[half]) - _integral(t, rate)[half]).max())

@@ -1,0 +1,244 @@
+"""A run gone through again: the closed loop evaluated at every logged state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..checks import instance
+from ..control.controller import Signals
+from ..errors import InputError
+from ..simulation.clock import before
+from ..simulation.closed_loop import ClosedLoop
+from ..simulation.disturbances import DisturbanceSchedule
+from ..simulation.result import Result
+from ..simulation.simulate import Experiment
+from ..tasks.cell import Reference
+
+#: instants whose references are evaluated together
+BLOCK = 256
+#: relative difference between logged and re-evaluated velocity errors that means "another experiment"
+MISMATCH = 1e-6
+
+
+class Row(NamedTuple):
+    """What the closed loop computes at one instant; with one more axis in front, at all of them.
+
+    Attributes:
+        v, v_dot, v_ref, a_ref, s_q, tau, disturbance, friction: (n, nv).
+        tilde, theta_hat_dot: theta - theta_hat, and the rate of theta_hat, (n, P).
+        epsilon, epsilon_dot: (p, m).
+        E, sigma, e_star, u, r: (n, m).
+        c, c_dot, c_inv: (n, m, m).
+        J, J_inv: (n, m, nv) and (n, nv, m); identities in joint space.
+        M: mass matrices, (n, nv, nv).
+        C_s: C(q, v) s_q, (n, nv).
+        Y_frozen: Y tilde of the parameters that are not adapted, (n, nv).
+        Y_size: |Y| (|theta| + |theta_hat|), the magnitude of the model's torque, (n, nv).
+    """
+
+    v: np.ndarray
+    v_dot: np.ndarray
+    v_ref: np.ndarray
+    a_ref: np.ndarray
+    s_q: np.ndarray
+    tau: np.ndarray
+    disturbance: np.ndarray
+    friction: np.ndarray
+    tilde: np.ndarray
+    theta_hat_dot: np.ndarray
+    epsilon: np.ndarray
+    epsilon_dot: np.ndarray
+    E: np.ndarray
+    sigma: np.ndarray
+    e_star: np.ndarray
+    u: np.ndarray
+    r: np.ndarray
+    c: np.ndarray
+    c_dot: np.ndarray
+    c_inv: np.ndarray
+    J: np.ndarray
+    J_inv: np.ndarray
+    M: np.ndarray
+    C_s: np.ndarray
+    Y_frozen: np.ndarray
+    Y_size: np.ndarray
+
+
+class Stretch(NamedTuple):
+    """A part of the log in which nothing jumps: instants `first` to `last`, and their rows."""
+
+    first: int
+    last: int
+    rows: slice
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """The instants of a run, gone through again.
+
+    Attributes:
+        result: the run.
+        experiment: what made it.
+        loop: its closed loop.
+        rows: states and signals, one row per instant, and two where something jumps: from the left and right.
+        logged: row of every logged instant, (T,); at a jump the one from the right.
+        stretches: parts of the log in which nothing jumps.
+    """
+
+    result: Result
+    experiment: Experiment
+    loop: ClosedLoop
+    rows: Row
+    logged: np.ndarray
+    stretches: tuple[Stretch, ...]
+
+
+def replay(result: Result, experiment: Experiment | None = None) -> Replay:
+    """Evaluate the closed loop at every logged state of a run.
+
+    Args:
+        result: the run.
+        experiment: what made it; may be left out while the result still knows.
+
+    Raises:
+        InputError: no experiment for a result loaded from a file, or another than the one that made it.
+    """
+    instance("result", result, Result, "a Result")
+    experiment = experiment_of(result, experiment)
+    loop = experiment.closed_loop()
+    _check_sizes(result, loop)
+    jumps, crossed = _jumps(result.t, loop, experiment)
+    rows = Row(*(np.array(column) for column in zip(*_rows(result, loop, jumps), strict=True)))
+    instants = np.arange(len(result.t))
+    logged = instants + np.searchsorted(jumps, instants, side="right")
+    _check_same(result, Row(*(column[logged] for column in rows)))
+    return Replay(result, experiment, loop, rows, logged, _stretches(logged, jumps, crossed))
+
+
+def experiment_of(result: Result, experiment: Experiment | None) -> Experiment:
+    """The experiment given, or else the one the result still knows.
+
+    Raises:
+        InputError: there is neither.
+    """
+    experiment = result.experiment if experiment is None else experiment
+    if experiment is None:
+        raise InputError(
+            "experiment: this result was loaded from a file and does not know the closed loop that made it; "
+            "pass the experiment, for example certify(result, experiment=planar_four())"
+        )
+    instance("experiment", experiment, Experiment, "an Experiment")
+    return experiment
+
+
+# -- jumps ------------------------------------------------------------------------------------------------
+
+
+def _jumps(t: np.ndarray, loop: ClosedLoop, experiment: Experiment) -> tuple[list[int], list[int]]:
+    """Logged instants at which something jumps, and those before a jump that falls between two."""
+    edges = DisturbanceSchedule(loop.cell, experiment.disturbances).edges
+    tolerance = 1e-9 * float(np.diff(t).max(initial=0.0))
+    on_log, between = set(), set()
+    for jump in (*edges, *loop.cell.breaks):
+        if t[0] < jump < t[-1]:
+            nearest = int(np.abs(t - jump).argmin())
+            if abs(t[nearest] - jump) <= tolerance:
+                on_log.add(nearest)
+            else:
+                between.add(int(np.searchsorted(t, jump)) - 1)
+    return sorted(on_log - {0, len(t) - 1}), sorted(between)
+
+
+def _stretches(logged: np.ndarray, jumps: list[int], crossed: list[int]) -> tuple[Stretch, ...]:
+    starts = sorted([0, *jumps, *(k + 1 for k in crossed)])
+    ends = sorted([*jumps, *crossed, len(logged) - 1])
+    return tuple(
+        Stretch(a, b, slice(int(logged[a]), int(logged[b]) + 1 - (b in jumps)))
+        for a, b in zip(starts, ends, strict=True)
+        if b > a
+    )
+
+
+# -- rows -------------------------------------------------------------------------------------------------
+
+
+def _rows(result: Result, loop: ClosedLoop, jumps: list[int]) -> Iterator[Row]:
+    t, references = result.t, loop.cell.references
+    for start in range(0, len(t), BLOCK):
+        for k, reference in enumerate(references(t[start : start + BLOCK]), start):
+            if k in jumps:
+                from_left = references(np.array([before(t[k])]))[0]
+                yield _row(result, loop, k, from_left, result.disturbance[k - 1])
+            yield _row(result, loop, k, reference, result.disturbance[k])
+
+
+def _row(result: Result, loop: ClosedLoop, k: int, reference: Reference, disturbance: np.ndarray) -> Row:
+    q, v, theta_hat = result.q[k], result.v[k], result.theta_hat[k]
+    y = np.concatenate([part.ravel() for part in (q, v, theta_hat, result.sync_integral[k])])
+    y_dot, s = loop.evaluate(reference, y, disturbance)
+    theta, adapted = loop.cell.theta, loop.controller.Gamma > 0
+    J, J_inv = _jacobians(loop, s)
+    M, C_s = _dynamics(loop, q, v, s.s_q)
+    return Row(
+        v, loop.split(y_dot)[1], s.v_ref, s.a_ref, s.s_q, s.tau, disturbance,
+        loop.plant.friction(v) + np.zeros_like(v), theta - theta_hat, s.theta_hat_dot, s.epsilon,
+        s.epsilon_dot, s.E, s.sigma, s.e_star, s.u, s.r, reference.c, reference.c_dot, reference.c_inv,
+        J, J_inv, M, C_s, np.matvec(s.Y, np.where(adapted, 0.0, theta - theta_hat)),
+        np.matvec(np.abs(s.Y), np.abs(theta_hat) + np.abs(theta)),
+    )  # fmt: skip
+
+
+def _jacobians(loop: ClosedLoop, s: Signals) -> tuple[np.ndarray, np.ndarray]:
+    if s.task.J is not None and s.task.J_inv is not None:
+        return s.task.J, s.task.J_inv
+    identities = np.broadcast_to(np.eye(loop.cell.m), (loop.cell.n, loop.cell.m, loop.cell.m))
+    return identities, identities
+
+
+def _dynamics(
+    loop: ClosedLoop, q: np.ndarray, v: np.ndarray, s_q: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mass matrices, (n, nv, nv), and C s_q, (n, nv)."""
+    n, nv = q.shape
+    M, C_s = np.zeros((n, nv, nv)), np.zeros((n, nv))
+    for i, robot in enumerate(loop.cell.robots):
+        k = robot.nv
+        M[i, :k, :k] = robot.mass_matrix(q[i, :k])
+        C_s[i, :k] = robot.coriolis_matrix(q[i, :k], v[i, :k]) @ s_q[i, :k]
+    return M, C_s
+
+
+# -- checks -----------------------------------------------------------------------------------------------
+
+
+def _check_sizes(result: Result, loop: ClosedLoop) -> None:
+    cell = loop.cell
+    expected = {
+        "q": (cell.n, cell.nv),
+        "theta_hat": cell.theta.shape,
+        "sync_error": (cell.coupling.pairs, cell.m),
+    }
+    for name, shape in expected.items():
+        found = getattr(result, name).shape[1:]
+        if found != shape:
+            raise InputError(
+                f"experiment: expected the one that made the result; its {name} has the shape {shape} at an "
+                f"instant, but the result's has {found}"
+            )
+    if not len(result.t):
+        raise InputError("result: expected at least one logged instant, found none")
+
+
+def _check_same(result: Result, rows: Row) -> None:
+    difference = np.abs(rows.s_q - result.v_error).max(axis=(1, 2))
+    wrong = ~(difference <= MISMATCH * (np.abs(rows.v_ref) + np.abs(rows.v)).max(axis=(1, 2)))
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise InputError(
+            f"experiment: expected the one that made the result; at t = {result.t[k]:g} s it gives a "
+            f"velocity error of {rows.s_q[k].tolist()}, but the result has {result.v_error[k].tolist()}"
+        )

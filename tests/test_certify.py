@@ -1,0 +1,135 @@
+"""Certificates: certified only where the theorem holds, and otherwise the reason."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import FrozenInstanceError
+
+import numpy as np
+import pytest
+from theory_cells import GAINS, coupling, experiment
+
+from synctrl import Disturbance, Friction, Result
+from synctrl.analysis import Certificate, certify
+from synctrl.analysis.convergence import convergence
+from synctrl.errors import InputError
+from synctrl.experiments import a460_pair, planar_four
+
+pytestmark = pytest.mark.filterwarnings("ignore::synctrl.errors.CouplingWarning")  # odd rings are meant
+PUSH = Disturbance(robot=0, torque=2.0, start=0.01, stop=0.03)
+
+
+def small(kind: str = "ring", **options) -> Certificate:
+    return certify(experiment(coupling(kind, 4, 2, "moving"), **options).simulate(0.03, 1e-3))
+
+
+def test_a_run_inside_the_theorem_is_certified() -> None:
+    certificate = small()
+    assert certificate.certified
+    assert certificate.outside == certificate.doubts == ()
+    assert certificate.growth is None
+    assert certificate.lyapunov.closes
+    assert certificate.convergence.identity_holds
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"friction": Friction(viscous=0.5)}, "friction"),
+        ({"disturbances": (PUSH,)}, "torque from outside"),
+        ({"gains": GAINS.replace(Gamma=0.0)}, "not adapted"),
+        (
+            {"gains": GAINS.replace(K_r=0.01), "reference_acceleration": "paper"},
+            "gain condition fails: robot",
+        ),
+    ],
+)
+def test_what_is_outside_the_theorem_is_named_and_the_balance_closes_nevertheless(
+    options: dict, reason: str
+) -> None:
+    certificate = small(**options)
+    assert certificate.verdict == "outside the theorem"
+    assert len(certificate.outside) == 1
+    assert reason in certificate.outside[0]
+    assert certificate.lyapunov.closes
+    assert certificate.doubts == ()
+    assert reason in str(certificate)
+
+
+def test_the_papers_reference_acceleration_is_certified_where_the_gain_condition_holds() -> None:
+    certificate = small(gains=GAINS.replace(K_r=60.0, Gamma=1e-3), reference_acceleration="paper")
+    assert certificate.gain_condition.needed
+    assert certificate.gain_condition.holds
+    assert certificate.certified
+
+
+def test_a_run_that_is_too_coarse_is_not_certified() -> None:
+    stiff = Friction(coulomb=3.0, smoothing=1e-3)
+    run = experiment(coupling("pair", 2, 1), joints=1, friction=stiff)
+    certificate = certify(run.simulate(0.2, 4e-3))
+    assert certificate.verdict == "not certified"
+    assert any("does not close" in doubt for doubt in certificate.doubts)
+
+
+def test_a_run_under_sampled_control_is_outside_the_theorem() -> None:
+    run = experiment(coupling("ring", 4, 2)).simulate(0.03, 1e-3, control_period=2e-3)
+    certificate = certify(run)
+    assert certificate.verdict == "outside the theorem"
+    assert any("held for 0.002 s" in reason for reason in certificate.outside)
+
+
+def test_a_certificate_is_frozen_readable_and_plain_data() -> None:
+    certificate = small()
+    with pytest.raises(FrozenInstanceError):
+        certificate.verdict = "certified"  # type: ignore[misc]
+    text = str(certificate)
+    for word in (certificate.title, "certified", "V'", "balance", "gain condition", "at the end", "S+"):
+        assert word in text
+    data = json.loads(json.dumps(certificate.as_dict(), allow_nan=False))
+    assert data["verdict"] == "certified"
+    assert data["V"]["start"] == certificate.lyapunov.V[0]
+    assert set(data["energy"]) == set(certificate.lyapunov.power)
+
+
+def test_a_loaded_result_is_certified_with_its_experiment(tmp_path) -> None:
+    run = experiment(coupling("pair", 2, 2))
+    result = run.simulate(0.01, 1e-3)
+    loaded = Result.load(result.save(tmp_path / "run.npz"))
+    with pytest.raises(InputError, match="experiment"):
+        certify(loaded)
+    assert certify(loaded, run).as_dict() == certify(result).as_dict()
+
+
+@pytest.mark.parametrize(("n", "kind"), [(2, "pair"), (4, "ring"), (5, "ring"), (5, "all-to-all")])
+@pytest.mark.parametrize("weight", ["constant", "moving"])
+def test_the_weighted_error_is_made_of_e_star_and_epsilon_at_every_instant(
+    n: int, kind: str, weight: str
+) -> None:
+    link = coupling(kind, n, 2, weight)
+    found = convergence(experiment(link).simulate(0.02, 1e-3))
+    assert found.identity_holds
+    assert found.identity < 1e-12
+    assert found.modes == n - np.linalg.matrix_rank(link.matrix)
+
+
+def test_the_errors_of_a_certified_run_vanish() -> None:
+    gains = GAINS.replace(K_r=8.0, Lambda=10.0, Gamma=0.001)
+    result = experiment(coupling("ring", 4, 1), gains, joints=1, gravity=0.0, known=1.0).simulate(1.5, 5e-3)
+    found = convergence(result)
+    assert all(found.final[name] < 1e-2 * found.peak[name] for name in found.final)
+    assert certify(result).certified
+
+
+@pytest.mark.parametrize(
+    ("run", "verdict"),
+    [
+        (planar_four(), "certified"),
+        (planar_four(synchronized=False), "certified"),
+        (planar_four(disturbance=PUSH), "outside the theorem"),
+        (a460_pair(friction=False), "certified"),
+        (a460_pair(), "outside the theorem"),
+    ],
+)
+def test_the_cells_of_the_paper_are_certified_unless_pushed_or_rubbed(run, verdict: str) -> None:
+    certificate = certify(run.simulate(0.05))
+    assert certificate.verdict == verdict, str(certificate)
