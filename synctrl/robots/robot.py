@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array
 from ..errors import FrameNotFound, InputError, RobotError
 from .catalog import load_description
+from .model_checks import check_inertia, check_numbering
+from .urdf_document import Document, Pose
 
 
 class Robot:
@@ -28,6 +30,7 @@ class Robot:
         tip: name of the frame whose motion is controlled in Cartesian space.
         visual: shapes for display, or None.
         name: what error messages and legends call it.
+        document: the URDF that describes it, base and all; None if there is none.
 
     Raises:
         FrameNotFound: `tip` is not a frame of the model.
@@ -42,17 +45,19 @@ class Robot:
         *,
         visual: pin.GeometryModel | None = None,
         name: str | None = None,
+        document: Document | None = None,
     ):
         self.model = model
         self.name = name or model.name
         self.visual = visual
+        self.document = document
         for joint, joint_name in zip(model.joints[1:], model.names[1:], strict=False):
             if joint.nv != 1:
                 raise RobotError(
                     f"robot '{self.name}': joint '{joint_name}' has {joint.nv} degrees of freedom; "
                     "expected joints with one (fixed-base arms of revolute and prismatic joints)"
                 )
-        _check_numbering(self.name, model)
+        check_numbering(self.name, model)
         self.tip, self.tip_id = tip, self._frame_id(tip)
         self.nv: int = model.nv
         self.joint_names: tuple[str, ...] = tuple(model.names)[1:]
@@ -85,11 +90,13 @@ class Robot:
         for frame in model.frames:
             if frame.parentJoint == 0 and frame.name != "universe":
                 frame.placement = base * frame.placement
-        return type(self)(model, self.tip, visual=_moved(self.visual, base), name=name or self.name)
+        document = None if self.document is None else self.document.placed(Pose(tuple(shift), tuple(angles)))
+        visual = _moved(self.visual, base)
+        return type(self)(model, self.tip, visual=visual, name=name or self.name, document=document)
 
     def with_tip(self, tip: str) -> Self:
         """This robot controlled at another frame."""
-        return type(self)(self.model, tip, visual=self.visual, name=self.name)
+        return type(self)(self.model, tip, visual=self.visual, name=self.name, document=self.document)
 
     def with_parameters(self, pi: ArrayLike) -> Self:
         """This robot with other true inertial parameters.
@@ -103,9 +110,25 @@ class Robot:
         rows = finite_array("pi", pi, (10 * self.body_count,)).reshape(-1, 10)
         model = pin.Model(self.model)
         for joint, row in enumerate(rows, start=1):
-            _check_inertia(self.name, self.joint_names[joint - 1], row)
+            check_inertia(self.name, self.joint_names[joint - 1], row)
             model.inertias[joint] = pin.Inertia.FromDynamicParameters(np.array(row))
         return type(self)(model, self.tip, visual=self.visual, name=self.name)
+
+    def with_armature(self, armature: ArrayLike) -> Self:
+        """This robot with rotors that turn with its joints: a diagonal added to M.
+
+        Args:
+            armature: rotor inertia times the square of the gear ratio, number or (nv,), kg·m^2.
+
+        Raises:
+            InputError: a value below 0.
+        """
+        values = np.broadcast_to(finite_array("armature", armature), (self.nv,))
+        if values.min() < 0:
+            raise InputError(f"armature: expected at least 0 kg·m^2, found {values.min():g}")
+        model = pin.Model(self.model)
+        model.armature = values.copy()
+        return type(self)(model, self.tip, visual=self.visual, name=self.name, document=self.document)
 
     # -- what it is ---------------------------------------------------------------------------------------
 
@@ -123,6 +146,11 @@ class Robot:
         """Names of `inertial_parameters`, for example `joint1.m`."""
         kinds = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
         return tuple(f"{joint}.{kind}" for joint in self.joint_names for kind in kinds)
+
+    @property
+    def armature(self) -> np.ndarray:
+        """Inertia of rotors that the joints turn along, (nv,), kg·m^2."""
+        return np.array(self.model.armature)
 
     @property
     def gravity_vector(self) -> np.ndarray:
@@ -241,22 +269,17 @@ def load_robot(name_or_path: str | Path, tip: str | None = None) -> Robot:
     if not isinstance(name_or_path, (str, Path)):
         raise InputError(f"robot: expected a name or a path, found {type(name_or_path).__name__}")
     description = load_description(name_or_path)
-    return Robot(description.model, tip or description.tip, visual=description.visual, name=description.name)
+    return Robot(
+        description.model,
+        tip or description.tip,
+        visual=description.visual,
+        name=description.name,
+        document=description.document,
+    )
 
 
 def _vector(value: ArrayLike) -> np.ndarray:
     return np.asarray(value, dtype=float)
-
-
-def _check_numbering(robot: str, model: pin.Model) -> None:
-    """Refuse joints not numbered branch after branch: Pinocchio's C(q, v) would be silently wrong."""
-    for joint in range(1, model.njoints):
-        carried = list(model.subtrees[joint])
-        if carried != list(range(joint, joint + len(carried))):
-            raise RobotError(
-                f"robot '{robot}': expected joints numbered branch after branch, found joint "
-                f"'{model.names[joint]}' to carry the joints {carried}"
-            )
 
 
 def _moved(visual: pin.GeometryModel | None, base: pin.SE3) -> pin.GeometryModel | None:
@@ -268,18 +291,3 @@ def _moved(visual: pin.GeometryModel | None, base: pin.SE3) -> pin.GeometryModel
         if shape.parentJoint == 0:
             shape.placement = base * shape.placement
     return moved
-
-
-def _check_inertia(robot: str, joint: str, row: np.ndarray) -> None:
-    m, h = row[0], row[1:4]
-    ixx, ixy, iyy, ixz, iyz, izz = row[4:]
-    about_joint = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-    if m <= 0:
-        raise RobotError(f"robot '{robot}', body of '{joint}': expected a mass above 0 kg, found {m:g}")
-    S = np.array([[0, -h[2], h[1]], [h[2], 0, -h[0]], [-h[1], h[0], 0]])
-    lowest = np.linalg.eigvalsh(about_joint + S @ S / m)[0]
-    if lowest <= 0:
-        raise RobotError(
-            f"robot '{robot}', body of '{joint}': expected a positive definite inertia about the centre of "
-            f"mass, found a smallest eigenvalue of {lowest:g} kg·m^2"
-        )

@@ -179,6 +179,13 @@ class Document:
         parents = {joint.parent for joint in self.joints}
         return [link.name for link in self.links if link.name not in parents][-1]
 
+    def placed(self, pose: Pose) -> Self:
+        """The document with its base moved: a new root link, and the old one fixed to it."""
+        taken = {link.name for link in self.links} | {joint.name for joint in self.joints}
+        name = next(name for k in range(len(taken) + 1) if (name := f"place{k}") not in taken)
+        joint = Joint(f"{name}_mount", "fixed", name, self.root, pose)
+        return replace(self, links=(Link(name), *self.links), joints=(joint, *self.joints))
+
     def where(self, item: Link | Joint, line: int | None = None) -> str:
         """File, line and name of a link or joint, as messages begin; `line` is that of a part of it."""
         line = line or item.line

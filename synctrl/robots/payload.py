@@ -1,0 +1,86 @@
+"""A robot that carries something."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from ..checks import finite_array, positive_number
+from ..errors import FrameNotFound, InputError
+from .documents import weld
+from .robot import Robot
+from .urdf_document import Document
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """A rigid body fixed to a frame of a robot.
+
+    Args:
+        mass: kg.
+        com: centre of mass in the frame, (3,), m.
+        inertia: about the centre of mass in the frame's axes, (3, 3), or (3,) for its diagonal, kg·m^2; by
+            default that of a uniform ball of the density of water.
+        frame: name of the frame; by default the robot's tip.
+
+    Raises:
+        InputError: numbers that no body can have.
+    """
+
+    mass: float
+    com: Any = (0.0, 0.0, 0.0)
+    inertia: Any = None
+    frame: str | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mass", positive_number("payload, mass", self.mass))
+        object.__setattr__(self, "com", finite_array("payload, com", self.com, (3,)))
+        object.__setattr__(self, "inertia", self._checked_inertia())
+
+    def _checked_inertia(self) -> np.ndarray:
+        if self.inertia is None:
+            radius = np.cbrt(3 * self.mass / (4 * np.pi * 1000.0))
+            return 0.4 * self.mass * radius**2 * np.eye(3)
+        given = np.array(self.inertia, dtype=float)
+        inertia = finite_array("payload, inertia", np.diag(given) if given.shape == (3,) else given, (3, 3))
+        if not np.allclose(inertia, inertia.T, rtol=1e-12, atol=0):
+            raise InputError(f"payload, inertia: expected a symmetric matrix, found {inertia.tolist()}")
+        moments = np.linalg.eigvalsh(inertia)
+        if moments[0] <= 0 or moments[2] > (1 + 1e-9) * (moments[0] + moments[1]):
+            raise InputError(
+                "payload, inertia: expected three positive principal moments, none larger than the sum of the "
+                f"others, found {moments.tolist()} kg·m^2"
+            )
+        return inertia
+
+
+def carrying(robot: Robot, load: Load) -> Robot:
+    """The robot with a load fixed to it.
+
+    Raises:
+        FrameNotFound: the robot has no such frame.
+        InputError: the frame does not move.
+    """
+    name = load.frame or robot.tip
+    if not robot.model.existFrame(name):
+        raise FrameNotFound(robot.name, name, [frame.name for frame in robot.model.frames])
+    frame = robot.model.frames[robot.model.getFrameId(name)]
+    if frame.parentJoint == 0:
+        raise InputError(f"payload, frame: expected one of robot '{robot.name}' that moves, found '{name}'")
+    model = pin.Model(robot.model)
+    body = pin.Inertia(load.mass, np.array(load.com), np.array(load.inertia))
+    model.appendBodyToJoint(frame.parentJoint, body, frame.placement)
+    document = _welded(robot.document, name, load)
+    return Robot(model, robot.tip, visual=robot.visual, name=robot.name, document=document)
+
+
+def _welded(document: Document | None, frame: str, load: Load) -> Document | None:
+    """The same in the document; None if the frame is no link of it."""
+    links = [] if document is None else [link.name for link in document.links]
+    if document is None or frame not in links:
+        return None
+    name = next(name for k in range(len(links) + 1) if (name := f"payload{k}") not in links)
+    return weld(document, frame, load.mass, com=load.com, inertia=load.inertia, name=name)
