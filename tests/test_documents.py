@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
+import yourdfpy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from urdf_corpus import GOOD, write
@@ -131,7 +132,6 @@ def test_an_unchanged_robot_is_written_as_it_is(folder):
 
 def test_another_reader_understands_what_is_written(folder):
     """yourdfpy, which shares nothing with this package or Pinocchio, finds the tip at the same place."""
-    yourdfpy = pytest.importorskip("yourdfpy")
     made = weld(planar_arm([0.4, 0.3, 0.2], [3, 2, 1]), "tip", 0.5, xyz=(0.1, 0, 0.2), rpy=(0.1, 0.2, 0.3))
     file = write_urdf(made, folder / "other.urdf")
     model = read_urdf(file).model

@@ -57,6 +57,15 @@ def test_a_broken_description_is_refused_with_the_right_words(name, tmp_path):
         assert word in message, message
 
 
+def test_two_joints_on_one_axis_with_next_to_nothing_between_them_are_refused(tmp_path):
+    """Each body is possible, but no acceleration of such a mechanism has a correct digit."""
+    text = GOOD.replace('<origin xyz="0.4 0 0"/>', "").replace('<axis xyz="0 1 0"/>', '<axis xyz="0 0 1"/>')
+    text = text.replace('"2.5"/>', '"1e-15"/>').replace('<origin xyz="0.2 0 0" rpy="0.1 0.2 0.3"/>', "")
+    light = 'ixx="1e-17" ixy="0" ixz="0" iyy="1e-17" iyz="0" izz="1e-17"'
+    text = text.replace('ixx="0.01" ixy="0.001" ixz="0" iyy="0.04" iyz="0" izz="0.045"', light)
+    assert "positive definite mass matrix" in refusal(write(tmp_path, text))
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
     [

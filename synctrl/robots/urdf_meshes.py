@@ -6,7 +6,6 @@ stays in the folder it belongs to, and that it is not cut short.
 
 from __future__ import annotations
 
-import html
 import re
 from collections.abc import Iterable, Iterator
 from importlib import metadata
@@ -121,7 +120,7 @@ def _check_dae(file: Path, data: bytes) -> None:
     if b"<COLLADA" not in data or b"</COLLADA>" not in data:
         raise RobotError(f"{file}: expected a COLLADA mesh, found one that is cut short or of another format")
     for found in _DAE_IMAGES.findall(data):
-        _check_reference(file, html.unescape(_text(found)))
+        _check_reference(file, _text(found))
 
 
 def _check_obj(file: Path, data: bytes) -> None:
