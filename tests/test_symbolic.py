@@ -10,7 +10,8 @@ from machines import random_robot
 
 from synctrl import load_robot
 from synctrl.errors import RobotError
-from synctrl.robots.symbolic import Symbols, mechanism
+from synctrl.robots.mechanism import mechanism
+from synctrl.robots.symbolic import Symbols
 
 ca = pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
 

@@ -1,98 +1,18 @@
 """Rigid-body algorithms over a Pinocchio model, written with CasADi symbols.
 
 They are what the compiled engine is generated from. The recursions are those of Featherstone, *Rigid Body
-Dynamics Algorithms* (2008), in body coordinates; `Mechanism` holds the numbers of a model that do not change
-during a run. Every function is checked against Pinocchio by a test and again whenever code is generated.
+Dynamics Algorithms* (2008), in body coordinates. Every function is checked against Pinocchio by a test, and
+generated code again whenever it is built.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
-from ..errors import RobotError
-from .robot import Robot
-
-#: numbers this close to 0, 1 or -1 in fixed placements are taken as such, so that terms with them vanish
-SNAP = 1e-15
-
-
-@dataclass(frozen=True, eq=False)
-class Joint:
-    """One joint: parent body (-1: the base), fixed placement in it, axis, and whether it turns or slides."""
-
-    parent: int
-    rotation: np.ndarray
-    translation: np.ndarray
-    axis: np.ndarray
-    turns: bool
-    armature: float
-
-
-@dataclass(frozen=True, eq=False)
-class Mechanism:
-    """What of a robot's model does not depend on where it stands."""
-
-    joints: tuple[Joint, ...]
-    tip_parent: int
-    tip_translation: np.ndarray
-    tip_rotation: np.ndarray
-
-    def key(self) -> list[Any]:
-        """Plain data that is equal for equal mechanisms."""
-        joints = [
-            [j.parent, j.rotation.tolist(), j.translation.tolist(), j.axis.tolist(), j.turns, j.armature]
-            for j in self.joints
-        ]
-        return [joints, self.tip_parent, self.tip_translation.tolist(), self.tip_rotation.tolist()]
-
-
-def mechanism(robot: Robot) -> tuple[Mechanism, pin.SE3]:
-    """A robot's mechanism, and the placement of its first joint in the world.
-
-    Raises:
-        RobotError: several joints on the base, or a tip on the base.
-    """
-    model = robot.model
-    tip = model.frames[robot.tip_id]
-    roots = [j for j in range(1, model.njoints) if model.parents[j] == 0]
-    if len(roots) != 1 or tip.parentJoint == 0:
-        raise RobotError(
-            f"robot '{robot.name}': the compiled engine needs one joint on the base and a tip that moves, "
-            f"found {len(roots)} joints on the base and tip '{robot.tip}'; use engine='pinocchio'"
-        )
-    joints = tuple(_joint(model, j, first=j == roots[0]) for j in range(1, model.njoints))
-    fixed = Mechanism(
-        joints, tip.parentJoint - 1, _snap(tip.placement.translation), _snap(tip.placement.rotation)
-    )
-    return fixed, model.jointPlacements[roots[0]]
-
-
-def _joint(model: pin.Model, j: int, first: bool) -> Joint:
-    data = model.joints[j].createData()
-    model.joints[j].calc(data, pin.neutral(model))
-    subspace = np.asarray(data.S).ravel()
-    turns = bool(np.any(subspace[3:]))
-    placement = pin.SE3.Identity() if first else model.jointPlacements[j]
-    return Joint(
-        model.parents[j] - 1,
-        _snap(placement.rotation),
-        _snap(placement.translation),
-        _snap(subspace[3:] if turns else subspace[:3]),
-        turns,
-        float(model.armature[j - 1]),
-    )
-
-
-def _snap(values: np.ndarray) -> np.ndarray:
-    values = np.array(values, dtype=float)
-    for exact in (-1.0, 0.0, 1.0):
-        values[np.abs(values - exact) < SNAP] = exact
-    return values
+from .mechanism import Joint, Mechanism
 
 
 class Symbols:

@@ -128,9 +128,8 @@ class Cell:
     def reference_table(self, times: np.ndarray) -> Reference:
         """What is desired at all of the times, (T,), as arrays with time as their first axis."""
         motions = [member.trajectory(times) for member in self.members]
-        desired = [np.stack(part, axis=1) for part in zip(*motions, strict=True)]
-        weights = self.coupling.weights(times, self.m)
-        return Reference(*desired, weights.c, weights.c_dot, weights.c_ddot, weights.c_inv)
+        xd, xd_dot, xd_ddot = (np.stack(part, axis=1) for part in zip(*motions, strict=True))
+        return Reference(xd, xd_dot, xd_ddot, *self.coupling.weights(times, self.m))
 
     def references(self, times: np.ndarray) -> list[Reference]:
         """What is desired at each of the times, (T,)."""

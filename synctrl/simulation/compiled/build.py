@@ -160,5 +160,5 @@ def _generating_code() -> list[Path]:
     return [
         package / "control" / "law.py",
         package / "robots" / "symbolic.py",
-        *(here / name for name in ("trace.py", "pose.py", "program.py", "driver.c")),
+        *(here / name for name in ("kind.py", "trace.py", "pose.py", "program.py", "driver.c")),
     ]

@@ -14,7 +14,8 @@ from ..clock import Clock
 from ..disturbances import DisturbanceSchedule
 from ..guard import PARTS, singular
 from ..recorder import Recorder
-from .program import LogStruct, Program, ReferenceStruct, ReportStruct
+from .program import Program
+from .structs import LogStruct, ReferenceStruct, ReportStruct
 
 #: bytes of references that one block of steps may need
 BLOCK_BYTES = 32_000_000

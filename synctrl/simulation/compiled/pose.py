@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from math import factorial
 from typing import Any
 
 import numpy as np
 
-from ...tasks.rotations import B_SERIES, B_SLOPE_SERIES, SMALL_ANGLE
+#: absolute values of the Bernoulli numbers B_2, B_4, ...; b(a) = sum_k |B_2k| a^(2k-2) / (2k)!
+_BERNOULLI = (1/6, 1/30, 1/42, 1/30, 5/66, 691/2730, 7/6, 3617/510, 43867/798, 174611/330)  # fmt: skip
+B_SERIES = tuple(B / factorial(2 * k) for k, B in enumerate(_BERNOULLI, start=1))
+B_SLOPE_SERIES = tuple(2 * k * coefficient for k, coefficient in enumerate(B_SERIES))[1:]
+#: below this angle the closed forms lose digits and the series have them all, rad
+SMALL_ANGLE = 1.0
 
 
 def pose_task(ca: Any, v: Any, x: Any, R: Any, J: Any, J_dot: Any, desired: Any) -> tuple:

@@ -10,15 +10,17 @@ import numpy as np
 
 from ...control.controller import Controller
 from ...errors import CompilationError, InputError
+from ...robots.mechanism import Mechanism, mechanism
 from ...robots.parameters import FullParameters, LinearParameters
-from ...robots.symbolic import Mechanism, mechanism
 from ...tasks.cell import Reference
 from ...tasks.pose import MAX_ANGLE, PoseSpace
 from ...tasks.spaces import CartesianSpace, JointSpace
 from ..closed_loop import ClosedLoop
 from ..plant import Plant
 from .build import cached_library, content_key, require_casadi
-from .trace import Kind, Trace
+from .kind import Kind
+from .structs import CellStruct, ReferenceStruct, WorkStruct
+from .trace import Trace
 
 #: relative difference between generated code and the reference engine above which the code is refused
 AGREEMENT = 1e-9
@@ -118,75 +120,6 @@ def _table(table: list[tuple[Kind, list[str]]]) -> str:
     return "\n".join(
         [*lines, "static const Kind kinds[] = {", *rows, "};", f"enum {{ KINDS = {len(table)} }};\n"]
     )
-
-
-class CellStruct(ctypes.Structure):
-    """`Cell` of driver.c."""
-
-    _fields_ = [
-        *((name, ctypes.c_int) for name in ("n", "m", "nv", "P", "p", "bodies")),
-        *(
-            (name, ctypes.c_void_p)
-            for name in (
-                "kind", "edge", "sign", "first", "incident", "incident_sign", "Lambda", "beta", "K_eps",
-                "K_r", "Gamma", "W_inv", "posture", "gain", "base", "pi", "viscous", "coulomb", "smoothing",
-            )
-        ),
-        ("rubs", ctypes.c_int),
-        ("K", ctypes.c_int),
-        ("arity", ctypes.c_int),
-        ("max_condition", ctypes.c_double),
-        ("max_angle", ctypes.c_double),
-    ]  # fmt: skip
-
-
-class ReferenceStruct(ctypes.Structure):
-    """`Reference` of driver.c."""
-
-    _fields_ = [
-        ("desired", ctypes.c_void_p),
-        ("weights", ctypes.c_void_p),
-        ("steps", ctypes.c_int),
-        ("constant", ctypes.c_int),
-    ]
-
-
-class LogStruct(ctypes.Structure):
-    """`Log` of driver.c, in the order of `LAYOUT` without t."""
-
-    _fields_ = [
-        (name, ctypes.c_void_p)
-        for name in (
-            "x", "x_desired", "tracking_error", "sync_error", "sync_integral", "coupled_error",
-            "q", "v", "v_error", "tau", "disturbance", "theta_hat",
-        )
-    ]  # fmt: skip
-
-
-class WorkStruct(ctypes.Structure):
-    """`Work` of driver.c."""
-
-    _fields_ = [
-        *(
-            (name, ctypes.c_void_p)
-            for name in ("w", "iw", "arg", "res", "task", "trig", "J", "compared", "shares", "tau", "loaded")
-        ),
-        ("e_star", ctypes.c_void_p),
-        ("s_q", ctypes.c_void_p),
-        ("k", ctypes.c_void_p * 4),
-        *((name, ctypes.c_void_p) for name in ("stage", "sign", "held", "held_tau")),
-    ]
-
-
-class ReportStruct(ctypes.Structure):
-    """`Report` of driver.c."""
-
-    _fields_ = [
-        ("status", ctypes.c_int),
-        ("step", ctypes.c_int),
-        ("robot", ctypes.c_int),
-        ("value", ctypes.c_double),
-    ]
 
 
 class Program:
