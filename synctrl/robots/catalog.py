@@ -31,6 +31,7 @@ class Entry:
 _UR = "ur_description/urdf"
 CATALOG: dict[str, Entry] = {
     "planar2r": Entry("planar2r/planar2r.urdf", "tip", own=True),
+    "wheel": Entry("wheel/wheel.urdf", "wheel", own=True),
     "a460": Entry("a460/a460.urdf", "wrist", own=True),
     "a460_full": Entry("a460/a460_full.urdf", "wrist", own=True),
     "ur3": Entry(f"{_UR}/ur3_robot.urdf", "tool0"),

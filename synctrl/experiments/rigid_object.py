@@ -1,0 +1,72 @@
+"""Two planar arms that hold a rigid object and carry it round a circle: example 1 of the paper.
+
+The synchronization function is f = x_1 - x_2 - A = 0 with the constant vector A from one grip to the other,
+so that c_1 = -1, c_2 = 1 and epsilon = e_2 - e_1. The object is not simulated: epsilon is by how much the
+two grips would stretch or bend it. The arms are those of section V-B; the object, its path and the gains
+are our choice.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..control.gains import Gains
+from ..robots.parameters import planar_two_link_parameters, theta_50
+from ..robots.robot import load_robot
+from ..simulation.disturbances import Disturbance
+from ..simulation.simulate import Experiment
+from ..tasks.cell import Cell, Member
+from ..tasks.reachability import inverse_kinematics
+from ..tasks.spaces import CartesianSpace
+from ..tasks.synchronization import SynchronizationFunction
+from ..tasks.trajectories import Circle
+
+A = np.array([-0.3, 0.0])  # m, x_1 - x_2
+BASES = ((-0.35, 0.0, 0.0), (0.35, 0.0, 0.0))  # m
+CENTER, RADIUS, SPEED = np.array([0.0, 0.35]), 0.08, np.pi / 2  # m, m, rad/s
+#: where the search for the initial joint positions begins: elbows outward
+Q0 = ((1.9, -1.6), (1.2, 1.6))  # rad
+SPACE = CartesianSpace("xy")
+DURATION = 6.0  # s
+GAINS = Gains(Lambda=10.0, beta=20.0, K_r=2.0, K_eps=20.0, Gamma=3.0)
+MASS_HAT, LENGTH_HAT = 0.8, 0.2  # kg, m: the initial guess of every link
+#: something pushes against the first arm
+PUSH = Disturbance(robot=0, torque=(1.0, 1.0), start=3.0, stop=3.25)
+
+
+def object_synchronization() -> SynchronizationFunction:
+    """f = x_1 - x_2 - A, in m."""
+    return SynchronizationFunction(lambda x_1, x_2, t: x_1 - x_2 - A, robots=2, dimension=2)
+
+
+def rigid_object(synchronized: bool = True, disturbed: bool = True, gains: Gains | None = None) -> Experiment:
+    """Two arms and the object between them, in Cartesian space.
+
+    Args:
+        synchronized: False sets beta = K_eps = 0.
+        disturbed: whether the first arm is pushed, 1 N·m on both joints for 3 <= t < 3.25 s.
+        gains: by default ours.
+    """
+    members = [_member(i) for i in range(2)]
+    coupling = object_synchronization().coupling([member.trajectory for member in members], DURATION)
+    gains = GAINS if gains is None else gains
+    kind = "synchronized" if synchronized else "independent"
+    return Experiment(
+        Cell(members, coupling, SPACE, name="rigid object"),
+        gains if synchronized else gains.independent(),
+        DURATION,
+        (PUSH,) if disturbed else (),
+        title=f"rigid object, {kind}{', disturbed' if disturbed else ''}",
+    )
+
+
+def _member(i: int) -> Member:
+    robot = load_robot("planar2r").placed(BASES[i], name=f"arm {i + 1}")
+    path = Circle(CENTER + (1, -1)[i] * A / 2, RADIUS, SPEED)
+    return Member(
+        robot,
+        path,
+        inverse_kinematics(robot, path(0.0).x, np.array(Q0[i]), SPACE),
+        parameters=planar_two_link_parameters(robot),
+        theta_hat0=theta_50([MASS_HAT] * 2, [LENGTH_HAT] * 2),
+    )
