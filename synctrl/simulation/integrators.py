@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..control.controller import Signals
-from ..errors import NonFiniteError
+from ..errors import NonFiniteError, SynctrlError
 from ..tasks.cell import Reference
 from .clock import Clock, before
 from .closed_loop import ClosedLoop
@@ -23,6 +23,8 @@ from .disturbances import DisturbanceSchedule
 ADAPTIVE = ("RK45", "RK23", "DOP853", "Radau", "BDF", "LSODA")
 #: steps whose references are evaluated together
 BLOCK = 256
+#: steps of an adaptive method between two logged instants, after which it is taken to be stuck
+MAX_TRIES = 10_000
 
 
 class Sample(NamedTuple):
@@ -62,24 +64,59 @@ def adaptive(
     atol: float,
 ) -> Iterator[Sample]:
     """One of SciPy's methods with error control, restarted at every jump."""
-    from scipy.integrate import solve_ivp
+    import scipy.integrate
 
     y = loop.initial_state()
     borders = np.concatenate(([clock.logged[0]], clock.jumps, [clock.logged[-1]]))
     for t0, t1 in pairwise(borders):
         disturbance = schedule.torque(0.5 * (t0 + t1))
         rhs = _right_hand_side(loop, disturbance, t1)
-        inside = clock.logged[(clock.logged >= t0) & (clock.logged < t1)]
-        instants = np.append(inside, t1)
-        solution = solve_ivp(rhs, (t0, t1), y, method=method, t_eval=instants, rtol=rtol, atol=atol)
-        for t, state in zip(solution.t, solution.y.T, strict=True):
-            if t < t1:
-                yield _sample(loop, t, state, disturbance)
-        if solution.status != 0:
-            reached = solution.t[-1] if solution.t.size else t0
-            raise NonFiniteError(f"{method} stopped near t = {reached:g} s: {solution.message}", time=reached)
-        y = solution.y[:, -1].copy()
+        instants = clock.logged[(clock.logged >= t0) & (clock.logged < t1)]
+        solver = getattr(scipy.integrate, method)(rhs, t0, y, t1, rtol=rtol, atol=atol)
+        for t, state in _states(solver, instants):
+            yield _sample(loop, t, state, disturbance)
+        if solver.status == "failed":
+            raise _stuck(loop, method, solver.t, rhs(solver.t, solver.y))
+        y = solver.y.copy()
     yield final(loop, clock, y, disturbance)
+
+
+def _states(solver: Any, instants: np.ndarray) -> Iterator[tuple[float, np.ndarray]]:
+    """The solver's state at every instant, as soon as it has got there; ends early if it fails."""
+    passed, tries = int(instants.size and instants[0] == solver.t), 0
+    if passed:
+        yield solver.t, solver.y
+    while solver.status == "running":
+        _step(solver)
+        tries += 1
+        count = int(np.searchsorted(instants, solver.t, side="right"))
+        if solver.status != "failed" and count > passed:
+            reached, passed, tries = instants[passed:count], count, 0
+            yield from zip(reached, solver.dense_output()(reached).T, strict=True)
+        if tries > MAX_TRIES:
+            solver.status = "failed"
+
+
+def _step(solver: Any) -> None:
+    """One step; numbers that an implicit method cannot calculate with are a failure like others."""
+    try:
+        solver.step()
+    except SynctrlError:
+        raise
+    except ValueError:
+        solver.status = "failed"
+
+
+def _stuck(loop: ClosedLoop, method: str, t: float, y_dot: np.ndarray) -> NonFiniteError:
+    """The error of a method that cannot go on, with the robot whose state changes fastest."""
+    v_dot = np.nan_to_num(np.abs(loop.split(y_dot)[1]), nan=np.inf).max(axis=1)
+    i = int(v_dot.argmax())
+    return NonFiniteError(
+        f"{method} got stuck at t = {t:g} s, where {loop.cell.names[i]} accelerates with {v_dot[i]:.3g} "
+        "rad/s²; the closed loop is unstable, near a singularity, or too stiff for the method's tolerances",
+        time=float(t),
+        robot=i,
+    )
 
 
 def steps(
