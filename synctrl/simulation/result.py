@@ -12,6 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from ..checks import instance
 from ..errors import ResultError
 
 FORMAT = "synctrl result 1"
@@ -101,7 +102,10 @@ class Result:
         Raises:
             ResultError: the file cannot be written.
         """
+        instance("path", path, (str, Path), "a path")
         path = Path(path)
+        if path.is_dir():
+            raise ResultError(f"cannot write the result to '{path}': it is a folder")
         content = {name: getattr(self, name) for name in LAYOUT}
         info = json.dumps({"format": FORMAT, **self.info}, ensure_ascii=False)
         partial = path.with_name(path.name + ".part")
@@ -110,8 +114,8 @@ class Result:
             with partial.open("wb") as file:
                 np.savez(file, info=np.array(info), **content)
             partial.replace(path)
-        except OSError as error:
-            raise ResultError(f"cannot write the result to '{path}': {error.strerror or error}") from error
+        except (OSError, ValueError) as error:
+            raise ResultError(f"cannot write the result to '{path}': {error}") from error
         return path
 
     @classmethod
@@ -121,14 +125,13 @@ class Result:
         Raises:
             ResultError: the file is missing, damaged, or no result.
         """
+        instance("path", path, (str, Path), "a path")
         path = Path(path)
         if not path.is_file():
             raise ResultError(f"no result file at '{path}'")
         try:
-            with np.load(path, allow_pickle=False) as content:
-                info = json.loads(str(content["info"]))
-                arrays = {name: content[name] for name in LAYOUT}
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError) as error:
+            info, arrays = _read(path)
+        except _DAMAGE as error:
             raise ResultError(f"'{path}' is no complete result file of synctrl: {error}") from error
         _check_content(path, info, arrays)
         info.pop("format")
@@ -150,14 +153,37 @@ class Result:
         return f"Result({self.info['title']!r}, {n} robots, {m} axes, {len(self.t)} instants, {self.status})"
 
 
+#: what reading a file that is no archive, or a damaged one, may raise
+_DAMAGE = (OSError, ValueError, KeyError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile)
+
+
+def _read(path: Path) -> tuple[Any, dict[str, np.ndarray]]:
+    """Content of an archive such as `save` writes: uncompressed, so that it is no larger in memory than on disk."""
+    with zipfile.ZipFile(path) as archive:
+        if any(entry.compress_type != zipfile.ZIP_STORED for entry in archive.infolist()):
+            raise ValueError("expected uncompressed entries")
+    with np.load(path, allow_pickle=False) as content:
+        return json.loads(str(content["info"])), {name: content[name] for name in LAYOUT}
+
+
 def _check_content(path: Path, info: Any, arrays: dict[str, np.ndarray]) -> None:
     if not isinstance(info, dict) or info.get("format") != FORMAT:
         found = info.get("format") if isinstance(info, dict) else type(info).__name__
         raise ResultError(f"'{path}': expected the format '{FORMAT}', found {found!r}")
-    missing = {"status", "title", "robots", "task_unit", "weighted_unit", "sizes"} - set(info)
-    if missing:
-        raise ResultError(f"'{path}': its info lacks {', '.join(sorted(missing))}")
-    sizes = {**info["sizes"], "time": len(arrays["t"]) if arrays["t"].ndim else -1}
+    for name in ("status", "title", "task_unit", "weighted_unit"):
+        if not isinstance(info.get(name), str):
+            raise ResultError(f"'{path}': info, {name}: expected a text, found {info.get(name)!r}")
+    sizes, robots = info.get("sizes"), info.get("robots")
+    if not isinstance(sizes, dict):
+        raise ResultError(f"'{path}': info, sizes: expected lengths by name, found {sizes!r}")
+    if not isinstance(robots, list) or not all(
+        isinstance(robot, dict) and isinstance(robot.get("name"), str) for robot in robots
+    ):
+        raise ResultError(f"'{path}': info, robots: expected one entry with a name per robot")
+    _check_shapes(path, {**sizes, "time": arrays["t"].size}, arrays)
+
+
+def _check_shapes(path: Path, sizes: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:
     for name, (dimensions, _) in LAYOUT.items():
         expected = tuple(sizes.get(d) for d in dimensions)
         if arrays[name].shape != expected or arrays[name].dtype != np.float64:
