@@ -32,9 +32,9 @@ def make_clock(duration: float, dt: float, edges: Sequence[float], breaks: Seque
     """A clock that lands exactly on every jump.
 
     What is closer than 1e-9 dt to a multiple of dt counts as that multiple, so that 0.7 = 700 dt whatever the
-    rounding. At a break the multiple gives way, because a desired motion asks on which side of it a time lies;
-    at an edge it stays, so that the instants do not depend on disturbances. If duration is not a multiple of
-    dt the last step is shorter.
+    rounding. At a break the multiple gives way, because a desired motion asks on which side of it a time
+    lies; at an edge it stays, so that the instants do not depend on disturbances. If duration is not a
+    multiple of dt the last step is shorter.
 
     Args:
         duration: length of the run, s.
