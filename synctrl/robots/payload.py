@@ -51,7 +51,7 @@ class Load:
         moments = np.linalg.eigvalsh(inertia)
         if moments[0] <= 0 or moments[2] > (1 + 1e-9) * (moments[0] + moments[1]):
             raise InputError(
-                "payload, inertia: expected three positive principal moments, none larger than the sum of the "
+                "payload, inertia: expected positive principal moments, none larger than the sum of the "
                 f"others, found {moments.tolist()} kg·m^2"
             )
         return inertia

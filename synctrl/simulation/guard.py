@@ -71,7 +71,12 @@ class Guard:
 
     def _non_finite(self, sample: Sample) -> NonFiniteError:
         parts = zip(PARTS, self._loop.split(sample.y), strict=True)
-        name, rows = next((name, bad) for name, part in parts if (bad := _non_finite_rows(part)).size)
+        broken = [(name, bad) for name, part in parts if (bad := _non_finite_rows(part)).size]
+        if not broken:
+            return NonFiniteError(
+                f"the plant's own state is no longer finite at t = {sample.t:g} s", time=sample.t
+            )
+        name, rows = broken[0]
         i = int(rows[0]) if name != PARTS[3] else int(self._loop.cell.coupling.edges[rows[0], 0])
         hint = "the gains may be too high for the step, or the closed loop unstable"
         if self._condition[i] > 100:

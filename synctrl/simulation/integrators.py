@@ -44,13 +44,13 @@ def rk4(loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule) -> Iterat
     for k, (t, t_next, references) in enumerate(steps(loop, clock.times)):
         start, middle, end = references
         disturbance = schedule.torque(0.5 * (t + t_next))
-        h = t_next - t
-        k1, signals = loop.evaluate(start, y, disturbance)
+        h, stage = t_next - t, loop.at(0.5 * (t + t_next))
+        k1, signals = stage.evaluate(start, y, disturbance)
         if logged[k]:
             yield Sample(t, y, disturbance, signals)
-        k2, _ = loop.evaluate(middle, y + 0.5 * h * k1, disturbance)
-        k3, _ = loop.evaluate(middle, y + 0.5 * h * k2, disturbance)
-        k4, _ = loop.evaluate(end, y + h * k3, disturbance)
+        k2, _ = stage.evaluate(middle, y + 0.5 * h * k1, disturbance)
+        k3, _ = stage.evaluate(middle, y + 0.5 * h * k2, disturbance)
+        k4, _ = stage.evaluate(end, y + h * k3, disturbance)
         y = y + (h / 6) * (k1 + 2 * (k2 + k3) + k4)
     yield final(loop, clock, y, disturbance)
 
@@ -70,7 +70,7 @@ def adaptive(
     borders = np.concatenate(([clock.logged[0]], clock.jumps, [clock.logged[-1]]))
     for t0, t1 in pairwise(borders):
         disturbance = schedule.torque(0.5 * (t0 + t1))
-        rhs = _right_hand_side(loop, disturbance, t1)
+        rhs = _right_hand_side(loop.at(0.5 * (t0 + t1)), disturbance, t1)
         instants = clock.logged[(clock.logged >= t0) & (clock.logged < t1)]
         solver = getattr(scipy.integrate, method)(rhs, t0, y, t1, rtol=rtol, atol=atol)
         for t, state in _states(solver, instants):

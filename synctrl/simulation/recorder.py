@@ -12,6 +12,7 @@ import numpy as np
 from .closed_loop import ClosedLoop
 from .damping import DampingLog
 from .integrators import Sample
+from .limits import limit_report, torque_limits
 from .result import LAYOUT, Result
 
 
@@ -26,6 +27,7 @@ class Recorder:
         }
         self._rows = tuple(self._arrays.values())
         self._damping = DampingLog(instants, loop.cell.n)
+        self._hidden = np.zeros((instants, loop.plant.hidden0.size))
         self.count = 0
 
     def add(self, sample: Sample) -> None:
@@ -39,6 +41,7 @@ class Recorder:
         for array, value in zip(self._rows, values, strict=True):
             array[self.count] = value
         self._damping.add(self.count, s)
+        self._hidden[self.count] = self._loop.hidden(sample.y)
         self.count += 1
 
     def rows_ahead(self) -> list[np.ndarray]:
@@ -55,6 +58,9 @@ class Recorder:
         arrays = {name: array[: self.count].copy() for name, array in self._arrays.items()}
         described = {"status": status, **describe(self._loop), **info}
         described["damping"] = self._damping.report(arrays["t"])
+        seen = (arrays[name] for name in ("t", "q", "v", "tau"))
+        described["limits"] = limit_report(self._loop.cell, *seen)
+        described.update(self._loop.plant.report(self._hidden[: self.count]))
         return Result(**arrays, info=described, experiment=experiment)
 
 
@@ -82,8 +88,11 @@ def describe(loop: ClosedLoop) -> dict[str, Any]:
                 "joints": list(robot.joint_names),
                 "parameters": list(parameters.names),
                 "theta": [float(value) for value in parameters.theta],
+                "torque_limits": [float(x) if np.isfinite(x) else None for x in limits[: robot.nv]],
             }
-            for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True)
+            for name, robot, parameters, limits in zip(
+                cell.names, cell.robots, cell.parameters, torque_limits(cell), strict=True
+            )
         ],
         "axes": list(cell.labels),
         "task_unit": cell.space.unit,

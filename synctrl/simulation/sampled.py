@@ -45,21 +45,27 @@ def sampled_rk4(
     count = 0
     held, tau = np.zeros(loop.size), np.zeros((loop.cell.n, loop.cell.nv))
     for k, (t, t_next, (start, _, _)) in enumerate(steps(loop, clock.times)):
-        disturbance = schedule.torque(0.5 * (t + t_next))
+        middle = 0.5 * (t + t_next)
+        disturbance, plant = schedule.torque(middle), loop.at(middle)
         if logged[k]:
             y_dot, signals = loop.evaluate(start, y, disturbance)
             if count % every == 0:
                 held, tau = y_dot, signals.tau
             count += 1
             yield Sample(t, y, disturbance, replace(signals, tau=tau))
-        y = _rk4_step(loop, y, t_next - t, held, tau + disturbance)
+        y = _rk4_step(plant, y, t_next - t, held, tau, disturbance)
     last = final(loop, clock, y, disturbance)
     yield last._replace(signals=replace(last.signals, tau=tau))
 
 
-def _rk4_step(loop: ClosedLoop, y: np.ndarray, h: float, held: np.ndarray, tau: np.ndarray) -> np.ndarray:
-    k1 = loop.coast(y, held, tau)
-    k2 = loop.coast(y + 0.5 * h * k1, held, tau)
-    k3 = loop.coast(y + 0.5 * h * k2, held, tau)
-    k4 = loop.coast(y + h * k3, held, tau)
+def _rk4_step(
+    loop: ClosedLoop, y: np.ndarray, h: float, held: np.ndarray, tau: np.ndarray, disturbance: np.ndarray
+) -> np.ndarray:
+    def coast(y: np.ndarray) -> np.ndarray:
+        return loop.coast(y, held, tau, disturbance)
+
+    k1 = coast(y)
+    k2 = coast(y + 0.5 * h * k1)
+    k3 = coast(y + 0.5 * h * k2)
+    k4 = coast(y + h * k3)
     return y + (h / 6) * (k1 + 2 * (k2 + k3) + k4)

@@ -19,7 +19,8 @@ from .closed_loop import ClosedLoop
 from .disturbances import Disturbance, DisturbanceSchedule
 from .guard import Guard
 from .integrators import ADAPTIVE, Sample, adaptive, rk4
-from .plant import Plant
+from .payloads import Payload
+from .plant import PHYSICS, Plant
 from .recorder import Recorder
 from .result import Result
 from .sampled import sampled_rk4, steps_per_sample
@@ -39,6 +40,9 @@ class Experiment:
         reference_acceleration: "exact" or "paper", see `Controller`.
         k_r_space: "joint" or "task", see `Controller`.
         title: for figures and files.
+        payloads: what robots pick up and put down, of which the controller is not told.
+        saturate: whether the plant cuts torques off at the limits of the robots' descriptions.
+        plant_type: `Plant`, or a kind of plant with joints that the controller does not know.
     """
 
     cell: Cell
@@ -48,6 +52,9 @@ class Experiment:
     reference_acceleration: str = "exact"
     k_r_space: str = "joint"
     title: str | None = None
+    payloads: Sequence[Payload] = ()
+    saturate: bool = False
+    plant_type: type[Plant] = Plant
 
     def __post_init__(self) -> None:
         instance("cell", self.cell, Cell, "a Cell")
@@ -56,15 +63,16 @@ class Experiment:
         self.closed_loop()
         DisturbanceSchedule(self.cell, self.disturbances)
 
-    def closed_loop(self) -> ClosedLoop:
-        """The differential equation of this experiment."""
+    def closed_loop(self, plant: str = "pinocchio") -> ClosedLoop:
+        """The differential equation of this experiment; `plant` as in `simulate`."""
         controller = Controller(
             self.cell,
             self.gains,
             reference_acceleration=self.reference_acceleration,
             k_r_space=self.k_r_space,
         )
-        return ClosedLoop(controller, Plant(self.cell))
+        body = self.plant_type(self.cell, physics=plant, payloads=self.payloads, saturate=self.saturate)
+        return ClosedLoop(controller, body)
 
     def simulate(
         self,
@@ -73,6 +81,7 @@ class Experiment:
         integrator: str = "rk4",
         *,
         engine: str = "pinocchio",
+        plant: str = "pinocchio",
         control_period: float | None = None,
         rtol: float = 1e-9,
         atol: float = 1e-11,
@@ -86,6 +95,8 @@ class Experiment:
             integrator: "rk4", or a method of SciPy's solve_ivp: "RK45", "RK23", "DOP853", "Radau", "BDF",
                 "LSODA".
             engine: "pinocchio", the reference, or "compiled": the same closed loop as generated C, for "rk4".
+            plant: library that computes the plant: "pinocchio", or "mujoco", which reads the robots' URDF by
+                itself and is an independent judge of the physics.
             control_period: None for continuous control; otherwise torque and adaptation are held for this
                 long, a multiple of dt, s. Only with "rk4".
             rtol, atol: tolerances of SciPy's methods.
@@ -100,8 +111,9 @@ class Experiment:
         """
         choice("integrator", integrator, ("rk4", *ADAPTIVE))
         choice("engine", engine, ("pinocchio", "compiled"))
+        choice("plant", plant, tuple(PHYSICS))
         tolerances = positive_number("rtol", rtol), positive_number("atol", atol)
-        run = self._prepare(duration, dt, control_period)
+        run = self._prepare(duration, dt, control_period, plant)
         if integrator != "rk4":
             _needs_rk4(integrator, engine, control_period)
             run.info.update(integrator=integrator, rtol=tolerances[0], atol=tolerances[1])
@@ -114,20 +126,23 @@ class Experiment:
             return _collect(run, sampled_rk4(run.loop, run.clock, run.schedule, run.every), progress)
         return _collect(run, rk4(run.loop, run.clock, run.schedule), progress)
 
-    def _prepare(self, duration: float | None, dt: float, control_period: float | None) -> Run:
+    def _prepare(self, duration: float | None, dt: float, control_period: float | None, plant: str) -> Run:
         """Everything that a run needs, checked."""
         duration = self.duration if duration is None else duration
+        loop = self.closed_loop(plant)
         schedule = DisturbanceSchedule(self.cell, self.disturbances)
-        clock = make_clock(duration, dt, schedule.edges, self.cell.breaks)
+        clock = make_clock(duration, dt, (*schedule.edges, *loop.plant.schedule.edges), self.cell.breaks)
         every = None if control_period is None else steps_per_sample(control_period, dt)
         check_reachable(self.cell, clock.logged)
         self.cell.coupling.check_weights(clock.logged, self.cell.m)
         info: dict[str, Any] = {"integrator": "rk4", "dt": float(dt), "duration": float(duration)}
         info["engine"] = "pinocchio"
+        info["plant"], info["saturate"] = plant, bool(self.saturate)
         info["title"] = self.title or self.cell.name
         info["control_period"] = control_period
         info["disturbances"] = [_describe(d) for d in self.disturbances]
-        return Run(self, self.closed_loop(), clock, schedule, every, info)
+        info["payloads"] = [payload.as_dict() for payload in self.payloads]
+        return Run(self, loop, clock, schedule, every, info)
 
 
 class Run(NamedTuple):
@@ -155,11 +170,12 @@ def simulate(
     reference_acceleration: str = "exact",
     k_r_space: str = "joint",
     engine: str = "pinocchio",
+    plant: str = "pinocchio",
     progress: Progress | None = None,
 ) -> Result:
     """Run a cell under adaptive synchronized control: `Experiment(...).simulate(...)` in one call."""
     experiment = Experiment(cell, gains, duration, disturbances, reference_acceleration, k_r_space)
-    return experiment.simulate(dt=dt, integrator=integrator, engine=engine, progress=progress)
+    return experiment.simulate(dt=dt, integrator=integrator, engine=engine, plant=plant, progress=progress)
 
 
 def _needs_rk4(integrator: str, engine: str, control_period: float | None) -> None:
@@ -167,6 +183,17 @@ def _needs_rk4(integrator: str, engine: str, control_period: float | None) -> No
         raise InputError(f"engine='compiled' has the integrator 'rk4' only, found {integrator!r}")
     if control_period is not None:
         raise InputError(f"control_period: sampled control needs the integrator 'rk4', found {integrator!r}")
+
+
+def _needs_plain_plant(plant: Plant) -> None:
+    special = {
+        f"plant='{plant.physics}'": plant.physics != "pinocchio",
+        "saturation": plant.saturate,
+        "payloads": bool(plant.payloads),
+        type(plant).__name__: type(plant) is not Plant,
+    }
+    for name in (name for name, found in special.items() if found):
+        raise InputError(f"engine='compiled' does not have {name}; use engine='pinocchio'")
 
 
 def _collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> Result:
@@ -188,6 +215,7 @@ def _compiled(run: Run, progress: Progress | None) -> Result:
     from .compiled.engine import advance
     from .compiled.program import Program
 
+    _needs_plain_plant(run.loop.plant)
     run.info["engine"] = "compiled"
     recorder, program = Recorder(run.loop, len(run.clock.logged)), Program(run.loop)
     return _finish(
