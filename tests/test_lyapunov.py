@@ -1,4 +1,4 @@
-"""V and V' along runs: V' is what V does, is never positive inside the theorem, and every term has its name."""
+"""V and V' along runs: V' is what V does, is never positive inside the theorem, and has named terms."""
 
 from __future__ import annotations
 

@@ -1,14 +1,15 @@
 """The gain condition of the paper's reference acceleration: (18) as printed, and as it should be.
 
-With xref'' as (13) prints it, V' gains sum_i s^T H_x (d(c^-1)/dt) c s, with s = c^-1 r = J s_q and the inertia
-in task space H_x = J^-T M J^-1. In the coordinates in which K_r acts this is s^T B s with
+With xref'' as (13) prints it, V' gains sum_i s^T H_x (d(c^-1)/dt) c s, with s = c^-1 r = J s_q and
+the inertia in task space H_x = J^-T M J^-1. In the coordinates in which K_r acts this is s^T B s with
 
     B = H_x (d(c^-1)/dt) c                 K_r in task space
     B = M J^-1 (d(c^-1)/dt) c J            K_r in joint space
 
-so that damping outweighs it for all s if and only if the smallest eigenvalue of K_r - sym(B), the margin, is
-above 0. It is if lambda_min(K_r) > lambda_max(sym(B)). What (18) compares with, lambda_max(B), may be smaller,
-because B is not symmetric: (18) then holds although V grows. The exact reference acceleration needs none of this.
+so that damping outweighs it for all s if and only if the smallest eigenvalue of K_r - sym(B), the margin,
+is above 0. It is if lambda_min(K_r) > lambda_max(sym(B)). What (18) compares with, lambda_max(B), may be
+smaller, because B is not symmetric: (18) then holds although V grows. The exact reference acceleration needs
+none of this.
 """
 
 from __future__ import annotations

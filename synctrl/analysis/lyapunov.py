@@ -247,7 +247,7 @@ def _drift(run: Replay, V: np.ndarray, V_dot: np.ndarray) -> tuple[np.ndarray, f
 
     V' is integrated by a cubic spline, which like the Runge-Kutta method errs with the fourth power of the
     step and with a larger constant. What an integral changes when every second instant is left out is about
-    15 times its error. Summed over the terms of V, between which much is exchanged, it stands for both errors.
+    15 times its error. Summed over the terms of V, which exchange much, it stands for both errors.
     """
     drift, bound = np.zeros(len(run.logged)), 0.0
     rates = [_sum(rate) for rate in _rates(run)]

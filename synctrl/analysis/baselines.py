@@ -1,0 +1,230 @@
+"""Fair comparisons: what else the same torque could have bought, and what each part of the law contributes.
+
+The paper compares with beta = K_eps = 0 and everything else unchanged: the synchronized controller then has
+more gain. Beside it stand here an independent controller with Lambda + beta for Lambda, and one whose gains
+are multiplied by a common factor until its peak torque is that of the synchronized one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..checks import instance
+from ..errors import InputError
+from ..simulation.result import Result
+from ..simulation.simulate import Experiment
+from .matching import Match, match_peak_torque, peak_torque
+
+PARTS = ("beta", "K_eps", "Gamma")
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One controller on one task, in numbers over all robots and axes.
+
+    Attributes:
+        name: what is different about the controller.
+        tracking_peak, tracking_rms: of e, rad or m.
+        sync_peak, sync_rms: of epsilon, in the unit of c e.
+        peak_torque: of any joint, N·m.
+        gains: as plain lists.
+    """
+
+    name: str
+    tracking_peak: float
+    tracking_rms: float
+    sync_peak: float
+    sync_rms: float
+    peak_torque: float
+    gains: dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Trials of one task, and what they say.
+
+    Attributes:
+        title: of the task.
+        duration: how long the runs took, s.
+        trials: synchronized, independent as in the paper, with Lambda + beta, and with matched peak torque.
+        ablation: the parts of the law switched on alone and together.
+        match: how the gains were matched.
+        gravity_torque: largest torque that gravity alone asks for along the synchronized run, N·m.
+        units: of e and epsilon.
+    """
+
+    title: str
+    duration: float
+    trials: tuple[Trial, ...]
+    ablation: tuple[Trial, ...]
+    match: Match
+    gravity_torque: float
+    units: tuple[str, str]
+
+    def findings(self) -> list[str]:
+        """What the numbers say, a sentence each."""
+        return [*_against_independent(self), _about_torque(self), *_about_parts(self)]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "title": self.title,
+            "duration": self.duration,
+            "trials": [asdict(trial) for trial in self.trials],
+            "ablation": [asdict(trial) for trial in self.ablation],
+            "matched": {
+                "factor": self.match.factor,
+                "scaled": list(self.match.scaled),
+                "runs": self.match.runs,
+            },
+            "gravity_torque": self.gravity_torque,
+            "units": list(self.units),
+            "findings": self.findings(),
+        }
+
+
+def trial(name: str, experiment: Experiment, **options: Any) -> Trial:
+    """Run an experiment and measure it; `options` go to `Experiment.simulate`."""
+    return measure(name, experiment.simulate(**options))
+
+
+def measure(name: str, result: Result) -> Trial:
+    """A finished run in numbers."""
+    e, epsilon = result.tracking_error, result.sync_error
+    peaks = float(np.abs(e).max()), float(np.abs(epsilon).max())
+    rms = _rms(result.t, e), _rms(result.t, epsilon)
+    return Trial(name, peaks[0], rms[0], peaks[1], rms[1], peak_torque(result), dict(result.info["gains"]))
+
+
+def ablation(experiment: Experiment, **options: Any) -> tuple[Trial, ...]:
+    """What beta, K_eps and the adaptation contribute: each alone, and all without each.
+
+    Args:
+        experiment: the cell under the full controller.
+        options: for `Experiment.simulate`.
+    """
+    kept = [(), *((p,) for p in PARTS), *(tuple(p for p in PARTS if p != q) for q in reversed(PARTS)), PARTS]
+    return tuple(trial(_kept(names), _with_parts(experiment, names), **options) for names in kept)
+
+
+def gravity_torque(result: Result) -> float:
+    """Largest torque that gravity alone asks of a joint along a run, N·m, from up to fifty instants of it."""
+    robots, every = result.experiment.cell.robots, max(1, len(result.t) // 50)
+    return max(
+        float(np.abs(robot.gravity(q)).max())
+        for i, robot in enumerate(robots)
+        for q in result.q[::every, i, : robot.nv]
+    )
+
+
+def compare(experiment: Experiment, scaled: Sequence[str] = ("Lambda",), **options: Any) -> Comparison:
+    """The synchronized controller beside independent ones, and part by part.
+
+    Args:
+        experiment: the cell under the synchronized controller.
+        scaled: gains of the matched controller that are multiplied by a common factor.
+        options: for `Experiment.simulate`; a shorter `duration` compares, and matches, over that time.
+
+    Raises:
+        InputError: the gains do not synchronize, are unknown, or no factor matches the peak torque.
+    """
+    instance("experiment", experiment, Experiment, "an Experiment")
+    gains = experiment.gains
+    if not (gains.beta.any() or gains.K_eps.any()):
+        raise InputError("experiment: expected a synchronized controller, found beta = K_eps = 0")
+    result = experiment.simulate(**options)
+    match = match_peak_torque(experiment, scaled, peak_torque(result), **options)
+    stiffer = gains.independent().replace(Lambda=gains.Lambda + gains.beta)
+    matched = f"independent, {' and '.join(map(_symbol, scaled))} times {match.factor:.3g}"
+    trials = (
+        measure("synchronized", result),
+        trial("independent", replace(experiment, gains=gains.independent()), **options),
+        trial("independent, Λ + β for Λ", replace(experiment, gains=stiffer), **options),
+        trial(matched, match.experiment, **options),
+    )
+    units = result.unit("tracking_error"), result.unit("sync_error")
+    parts, seconds = ablation(experiment, **options), float(result.t[-1])
+    return Comparison(_title(experiment), seconds, trials, parts, match, gravity_torque(result), units)
+
+
+# -- parts ------------------------------------------------------------------------------------------------
+
+_SYMBOLS = {"beta": "β", "K_eps": "k_ε", "Gamma": "adaptation", "Lambda": "Λ", "K_r": "K_r"}
+
+
+def _symbol(name: str) -> str:
+    return _SYMBOLS.get(name, name)
+
+
+def _kept(names: tuple[str, ...]) -> str:
+    return " + ".join(map(_symbol, names)) or "none of them"
+
+
+def _with_parts(experiment: Experiment, names: tuple[str, ...]) -> Experiment:
+    off = [name for name in PARTS if name not in names]
+    gains = experiment.gains.replace(**{name: 0 * getattr(experiment.gains, name) for name in off})
+    return replace(experiment, gains=gains)
+
+
+def _rms(t: np.ndarray, error: np.ndarray) -> float:
+    mean_square = np.square(error).mean(axis=(1, 2))
+    span = t[-1] - t[0]
+    return float(np.sqrt(np.trapezoid(mean_square, t) / span if span > 0 else mean_square[-1]))
+
+
+def _title(experiment: Experiment) -> str:
+    return experiment.title or experiment.cell.name
+
+
+# -- in words ---------------------------------------------------------------------------------------------
+
+
+def _against_independent(c: Comparison) -> list[str]:
+    ours = c.trials[0]
+    return [
+        f"Against '{other.name}', synchronized control has an RMS synchronization error that is "
+        f"{_times(other.sync_rms, ours.sync_rms)} and an RMS tracking error that is "
+        f"{_times(other.tracking_rms, ours.tracking_rms)}, at {ours.peak_torque:.4g} against "
+        f"{other.peak_torque:.4g} N·m of peak torque."
+        for other in c.trials[1:]
+    ]
+
+
+def _about_torque(c: Comparison) -> str:
+    share = c.gravity_torque / c.trials[0].peak_torque
+    factors = f"{' and '.join(map(_symbol, c.match.scaled))} by {c.match.factor:.3g}"
+    if share > 0.5:
+        return (
+            f"Multiplying {factors} matches the peak torque, but here that means little: gravity alone takes "
+            f"{share:.0%} of it, so peak torque hardly tells gentle from stiff control."
+        )
+    return f"Multiplying {factors} matches the peak torque, of which gravity takes {share:.0%}."
+
+
+def _about_parts(c: Comparison) -> list[str]:
+    """What each part does alone, compared with none of them, by RMS."""
+    nothing, *alone = c.ablation[: 1 + len(PARTS)]
+    return [
+        f"Alone, {part.name} makes the RMS synchronization error {_change(part.sync_rms, nothing.sync_rms)} "
+        f"and the RMS tracking error {_change(part.tracking_rms, nothing.tracking_rms)}."
+        for part in alone
+    ]
+
+
+def _times(other: float, ours: float) -> str:
+    """Ours compared with the other, as '3.2 times smaller' or '1.4 times larger'."""
+    if other == 0 or abs(ours / other - 1) < 0.02:
+        return "the same within 2 %" if other else f"{ours:.3g} instead of 0"
+    ratio = other / ours if ours else np.inf
+    return f"{ratio:.3g} times smaller" if ratio > 1 else f"{1 / ratio:.3g} times larger"
+
+
+def _change(now: float, before: float) -> str:
+    """Now compared with before, in percent."""
+    if before == 0:
+        return f"{now:.3g} instead of 0"
+    return f"{abs(now / before - 1):.1%} {'smaller' if now <= before else 'larger'}"

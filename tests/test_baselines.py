@@ -1,0 +1,149 @@
+"""Fair comparisons: gains match as claimed, parts are switched off as named, and words follow the numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from theory_cells import GAINS, coupling, experiment
+
+from synctrl.analysis.baselines import Comparison, ablation, compare, gravity_torque, trial
+from synctrl.analysis.matching import match_peak_torque, peak_torque
+from synctrl.errors import InputError
+from synctrl.experiments import a460_pair, planar_four
+
+SHORT = {"duration": 0.05, "dt": 1e-3}
+
+
+@pytest.fixture(scope="module")
+def planar() -> Comparison:
+    return compare(planar_four(), **SHORT)
+
+
+def small():
+    return experiment(coupling("pair", 2, 1), joints=1)
+
+
+def test_the_matched_controller_is_independent_and_has_the_same_peak_torque(planar: Comparison) -> None:
+    match = planar.match
+    run = match.experiment
+    assert not run.gains.beta.any()
+    assert not run.gains.K_eps.any()
+    assert match.factor == pytest.approx(float(run.gains.Lambda) / 10.0)
+    np.testing.assert_array_equal(run.gains.K_r, planar_four().gains.K_r)
+    again = peak_torque(run.simulate(**SHORT))
+    assert again == match.peak_torque
+    assert again == pytest.approx(planar.trials[0].peak_torque, rel=1e-3)
+
+
+def test_a_common_factor_scales_all_the_gains_named() -> None:
+    match = match_peak_torque(small(), ("Lambda", "K_r"), **SHORT)
+    np.testing.assert_allclose(match.experiment.gains.Lambda, match.factor * GAINS.Lambda)
+    np.testing.assert_allclose(match.experiment.gains.K_r, match.factor * GAINS.K_r)
+    assert match.peak_torque == pytest.approx(match.target, rel=1e-3)
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_the_factor_is_found_above_and_below_one(share: float) -> None:
+    run = planar_four()
+    independent = peak_torque(replace(run, gains=run.gains.independent()).simulate(**SHORT))
+    match = match_peak_torque(run, target=share * independent, **SHORT)
+    assert (match.factor > 1) == (share > 1)
+    assert match.peak_torque == pytest.approx(share * independent, rel=1e-3)
+
+
+def test_gains_under_which_a_run_has_to_stop_count_as_too_much_torque() -> None:
+    run = small()  # with K_r times 64 and this step, the run does not stay finite
+    options = {"duration": 0.4, "dt": 2e-2}
+    start = peak_torque(replace(run, gains=run.gains.independent()).simulate(**options))
+    match = match_peak_torque(run, ("K_r", "Lambda"), 3 * start, **options)
+    assert match.peak_torque == pytest.approx(3 * start, rel=1e-2)
+
+
+def test_a_peak_torque_that_no_factor_gives_is_refused() -> None:
+    with pytest.raises(InputError, match="found none"):
+        match_peak_torque(planar_four(), target=1e3, duration=0.01)
+    with pytest.raises(InputError, match="target"):
+        match_peak_torque(small(), target=-1.0, **SHORT)
+
+
+def test_an_independent_controller_with_lambda_110_tracks_better_than_the_papers(planar: Comparison) -> None:
+    ours, _, stiff, _ = planar.trials
+    assert stiff.gains["Lambda"] == pytest.approx(110.0)
+    assert stiff.tracking_peak < ours.tracking_peak
+    assert stiff.tracking_rms < ours.tracking_rms
+    assert stiff.peak_torque > ours.peak_torque
+    assert stiff.sync_rms > ours.sync_rms  # what it does not do better
+
+
+def test_at_the_papers_four_arm_gains_beta_does_the_work(planar: Comparison) -> None:
+    nothing, beta, k_eps, adaptation = planar.ablation[:4]
+    assert beta.sync_rms < 0.2 * nothing.sync_rms
+    assert k_eps.sync_rms > 0.9 * nothing.sync_rms
+    assert adaptation.sync_rms > 0.9 * nothing.sync_rms
+
+
+def test_every_combination_of_the_parts_is_tried_once_and_named() -> None:
+    run = small()
+    trials = ablation(run, **SHORT)
+    on = {t.name: tuple(bool(np.any(t.gains[k])) for k in ("beta", "K_eps", "Gamma")) for t in trials}
+    assert len(set(on.values())) == len(on) == 8
+    assert on["none of them"] == (False, False, False)
+    assert on["β"] == (True, False, False)
+    assert on["k_ε"] == (False, True, False)
+    assert on["adaptation"] == (False, False, True)
+    assert on["k_ε + adaptation"] == (False, True, True)
+    full, independent = trial("full", run, **SHORT), replace(run, gains=run.gains.independent())
+    assert replace(trials[-1], name="full") == full
+    assert replace(trials[3], name="independent") == trial("independent", independent, **SHORT)
+
+
+def test_a_trial_measures_what_the_run_did() -> None:
+    run = small()
+    result, found = run.simulate(**SHORT), trial("run", run, **SHORT)
+    assert found.tracking_peak == np.abs(result.tracking_error).max()
+    assert found.sync_peak == np.abs(result.sync_error).max()
+    assert found.peak_torque == np.abs(result.tau).max()
+    span = result.t[-1]
+    square = np.trapezoid((result.sync_error**2).mean(axis=(1, 2)), result.t) / span
+    assert found.sync_rms == pytest.approx(np.sqrt(square))
+
+
+def test_the_findings_are_computed_from_the_numbers(planar: Comparison) -> None:
+    ours, independent = planar.trials[:2]
+    text = " ".join(planar.findings())
+    assert f"{independent.sync_rms / ours.sync_rms:.3g} times smaller" in text
+    worse = replace(ours, sync_rms=2 * independent.sync_rms)
+    turned = replace(planar, trials=(worse, *planar.trials[1:]))
+    assert "synchronization error that is 2 times larger" in " ".join(turned.findings())
+    assert f"by {planar.match.factor:.3g}" in text
+    assert "gravity takes 0%" in text
+
+
+def test_it_is_said_where_gravity_takes_most_of_the_peak_torque(planar: Comparison) -> None:
+    heavy = replace(planar, gravity_torque=0.8 * planar.trials[0].peak_torque)
+    assert any("means little" in s and "80%" in s for s in heavy.findings())
+    assert not any("means little" in s for s in planar.findings())
+
+
+def test_gravity_takes_most_of_the_peak_torque_of_the_a460_and_nothing_of_the_planar_arms() -> None:
+    result = a460_pair().simulate(0.01)
+    assert gravity_torque(result) > 0.5 * peak_torque(result)
+    assert gravity_torque(planar_four().simulate(0.01)) == 0
+
+
+def test_a_comparison_needs_a_synchronized_controller_and_known_gains() -> None:
+    run = small()
+    with pytest.raises(InputError, match="beta = K_eps = 0"):
+        compare(replace(run, gains=GAINS.independent()))
+    with pytest.raises(InputError, match="scaled"):
+        compare(run, ("gain",), **SHORT)
+
+
+def test_a_comparison_is_plain_data(planar: Comparison) -> None:
+    data = planar.as_dict()
+    assert [t["name"] for t in data["trials"]][:2] == ["synchronized", "independent"]
+    assert data["matched"]["factor"] == planar.match.factor
+    assert data["units"] == ["m", "m²"]
+    assert data["findings"] == planar.findings()
