@@ -1,9 +1,21 @@
 """Ready cells: the paper's two, and its examples 1 to 3."""
 
 from .a460_pair import a460_pair
+from .mixed_four import mixed_four
 from .mobile_robot import mobile_robot
+from .panda_four import panda_four
 from .planar_four import planar_four
 from .quadratic import quadratic_analysis
 from .rigid_object import rigid_object
+from .ur5_payload import ur5_payload
 
-__all__ = ["a460_pair", "mobile_robot", "planar_four", "quadratic_analysis", "rigid_object"]
+__all__ = [
+    "a460_pair",
+    "mixed_four",
+    "mobile_robot",
+    "panda_four",
+    "planar_four",
+    "quadratic_analysis",
+    "rigid_object",
+    "ur5_payload",
+]

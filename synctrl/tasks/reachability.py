@@ -61,6 +61,19 @@ def inverse_kinematics(
     return None
 
 
+def reach(robot: Robot, target: np.ndarray, q: np.ndarray, space: TipSpace | None = None) -> np.ndarray:
+    """`inverse_kinematics` that does not return empty-handed.
+
+    Raises:
+        UnreachableError: no joint positions were found.
+    """
+    found = inverse_kinematics(robot, target, q, space)
+    if found is None:
+        place = ", ".join(f"{value:.4g}" for value in target)
+        raise UnreachableError(f"'{robot.name}' cannot reach ({place}); expected a place in reach of its tip")
+    return found
+
+
 def _descend(space: TipSpace, robot: Robot, target: np.ndarray, q: np.ndarray) -> np.ndarray | None:
     """Levenberg-Marquardt: the damping shrinks with every step that helps, and grows otherwise."""
     damping = 1e-6
