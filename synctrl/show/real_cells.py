@@ -1,0 +1,112 @@
+"""Cells of real robots, with their meshes: arms in formation, and arms that carry a payload."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..checks import finite_array, positive_number
+from ..errors import InputError
+from ..simulation.result import Result
+from ..tasks import rotations
+from ..tasks.poses import Attached
+from .scene import Scene
+from .style import DESIRED, robot_color
+
+GOOD, BAD = np.array([0.10, 0.62, 0.35]), np.array([0.80, 0.10, 0.10])
+#: synchronization error that is shown fully red, as a share of the largest of the run
+RED = 0.3
+LINE, BAR, BALL = 0.005, 0.008, 0.018  # m
+
+
+def formation_scene(result: Result, fps: float = 25) -> Scene:
+    """Arms with their desired paths, and a bar between the tips of every pair that is compared.
+
+    A bar turns from green to red with the synchronization error of its pair.
+
+    Args:
+        result: a run in Cartesian space along x, y, z, still with its experiment.
+        fps: frames per second.
+
+    Raises:
+        InputError: a run in another space, or one without its experiment.
+    """
+    frames = _frames(result, fps)
+    scene = _robots(
+        result, frames, fps, "Bars between compared tips turn red with the synchronization error."
+    )
+    tips = result.x[frames]
+    if tips.shape[2] != 3:
+        raise InputError(f"result: expected tips along x, y and z, found {tips.shape[2]} coordinates")
+    for i, name in enumerate(result.names):
+        scene.add_line(f"desired path of {name}", result.x_desired[frames, i], robot_color(i), LINE)
+        scene.add_sphere(f"tip of {name}", BALL, tips[:, i], robot_color(i))
+        scene.add_legend(name, robot_color(i))
+    colors = error_colors(result)[frames]
+    for k, (a, b) in enumerate(result.info["pairs"]):
+        scene.add_segment(f"pair {k + 1}", tips[:, a], tips[:, b], BAR, colors[:, k])
+    return scene
+
+
+def payload_scene(result: Result, size: ArrayLike, fps: float = 25) -> Scene:
+    """Two arms whose hands hold a box that lies midway between where each of them holds it.
+
+    The box turns from green to red with the synchronization error; it is drawn, not simulated.
+
+    Args:
+        result: a run in pose space with `Attached` desired motions, still with its experiment.
+        size: of the box in the payload's axes, (3,), m.
+        fps: frames per second.
+
+    Raises:
+        InputError: a run of other desired motions, or one without its experiment.
+    """
+    frames = _frames(result, fps)
+    scene = _robots(
+        result, frames, fps, "The payload turns red with the synchronization error; it has no mass."
+    )
+    hands = [member.trajectory for member in result.experiment.cell.members]
+    if len(hands) != 2 or not all(isinstance(hand, Attached) for hand in hands):
+        raise InputError("result: expected two robots whose desired motions are Attached to a payload")
+    position, orientation = _held(result.x[frames], hands)
+    extent = finite_array("size", size, (3,))
+    color = error_colors(result)[frames, 0]
+    scene.add_box("payload", extent, position, color, rotations.quaternion(orientation))
+    scene.add_line("desired path", hands[0].body(result.t[frames]).x[:, :3], DESIRED, LINE)
+    scene.add_legend("desired path of the payload", DESIRED)
+    return scene
+
+
+def error_colors(result: Result) -> np.ndarray:
+    """A colour per instant and pair, (T, p, 3): green without synchronization error, red with a large one."""
+    size = np.linalg.norm(result.sync_error[:, :, :3], axis=2)
+    share = np.clip(size / max(RED * float(size.max()), 1e-12), 0, 1)[..., None]
+    return (1 - share) * GOOD + share * BAD
+
+
+def _robots(result: Result, frames: np.ndarray, fps: float, caption: str) -> Scene:
+    if result.experiment is None:
+        raise InputError("result: expected a run that still has its experiment, found one loaded from a file")
+    scene = Scene(fps=fps, title=str(result.info["title"]), caption=caption)
+    for i, robot in enumerate(result.experiment.cell.robots):
+        q = np.array([robot.configuration(row) for row in result.q[frames, i, : robot.nv]])
+        if robot.visual is None:
+            raise InputError(f"robot '{robot.name}' has no shapes to show")
+        scene.add_robot(result.names[i], robot.model, robot.visual, q)
+    return scene
+
+
+def _frames(result: Result, fps: float) -> np.ndarray:
+    """Indices of the instants that are shown."""
+    times = np.arange(0.0, result.t[-1], 1 / positive_number("fps", fps))
+    return np.clip(np.searchsorted(result.t, times), 0, len(result.t) - 1)
+
+
+def _held(x: np.ndarray, hands: list[Attached]) -> tuple[np.ndarray, np.ndarray]:
+    """Position, (T, 3), and orientation, (T, 3, 3), midway between where the two hands hold the payload."""
+    first, second = (rotations.exp(x[:, i, 3:]) @ hand.rotation.T for i, hand in enumerate(hands))
+    half = 0.5 * rotations.log(second @ np.swapaxes(first, 1, 2))
+    places = [
+        x[:, i, :3] - R @ hand.xyz for i, (R, hand) in enumerate(zip((first, second), hands, strict=True))
+    ]
+    return 0.5 * (places[0] + places[1]), rotations.exp(half) @ first
