@@ -7,12 +7,14 @@ damping are off: friction is that of the cell's members, as for every plant.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, MissingDependencyError
 from ..robots.robot import Robot
+from ..robots.urdf_document import Document
 from ..robots.urdf_writer import dynamics_xml
 
 #: nothing is balanced, bounded or left out when MuJoCo compiles the description
@@ -70,9 +72,20 @@ def _model(mujoco: Any, robot: Robot) -> Any:
             f"plant='mujoco' reads a robot's URDF, and robot '{robot.name}' has none that describes it; use "
             "load_robot, or plant='pinocchio'"
         )
-    text = dynamics_xml(robot.document)
+    text = dynamics_xml(_named(robot.document, "world", "root link"))
     start = text.index(">", text.index("<robot")) + 1
     try:
         return mujoco.MjModel.from_xml_string(text[:start] + COMPILER + text[start:])
     except ValueError as error:
         raise InputError(f"MuJoCo refuses the URDF of robot '{robot.name}': {error}") from error
+
+
+def _named(document: Document, old: str, new: str) -> Document:
+    """The document with a link renamed: MuJoCo takes one called "world" for its own, wherever it stands."""
+
+    def name(link: str) -> str:
+        return new if link == old else link
+
+    links = tuple(replace(link, name=name(link.name)) for link in document.links)
+    joints = tuple(replace(j, parent=name(j.parent), child=name(j.child)) for j in document.joints)
+    return replace(document, links=links, joints=joints)

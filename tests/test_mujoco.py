@@ -1,0 +1,155 @@
+"""An independent judge: MuJoCo, reading the same URDF with its own parser, drives the same closed loop."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from synctrl import (
+    Cell,
+    Coupling,
+    Cubic,
+    Experiment,
+    Friction,
+    Gains,
+    Member,
+    Robot,
+    load_robot,
+    simulate,
+)
+from synctrl.errors import InputError, MissingDependencyError
+from synctrl.experiments import a460_pair, planar_four
+from synctrl.robots.documents import planar_arm
+from synctrl.robots.urdf import describe
+from synctrl.robots.urdf_document import Document, Inertial
+from synctrl.simulation.mujoco_plant import MujocoArm
+from synctrl.simulation.plant import PHYSICS
+
+#: equal accelerations up to rounding in chains of seven bodies
+SAME = 1e-10
+#: what the errors of two runs may differ by, relative to the largest error
+AGREEMENT = 1e-9
+
+NAMES = ("planar2r", "a460", "a460_full", "ur5", "panda", "xarm7", "kinova")
+
+
+def difference(a, b, array: str) -> float:
+    """Largest difference of an array of two results, relative to its largest value."""
+    one, other = getattr(a, array), getattr(b, array)
+    return np.abs(one - other).max() / np.abs(one).max()
+
+
+def pair(name: str, friction: Friction | None = None) -> Experiment:
+    """Two of a robot, turned and tilted, that move in joint space and start from half their parameters."""
+    members = []
+    for i in range(2):
+        robot = load_robot(name).placed((0.3 * i, 1.0, -0.2), (0.3, -0.4 * i, 0.5 + i))
+        start = np.linspace(-0.7, 0.9, robot.nv) + 0.2 * i
+        path = Cubic(start, start + np.linspace(0.5, -0.4, robot.nv), 1.0)
+        guess = 0.5 * robot.inertial_parameters
+        members.append(Member(robot, path, theta_hat0=guess, friction=friction or Friction()))
+    cell = Cell(members, Coupling.pair(), name=f"two {name}")
+    return Experiment(cell, Gains(Lambda=5.0, beta=2.0, K_r=5.0, K_eps=5.0, Gamma=0.05), 0.25)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_mujoco_and_pinocchio_compute_the_same_acceleration(name: str) -> None:
+    rng = np.random.default_rng(0)
+    robot = load_robot(name).placed(rng.normal(size=3), rng.uniform(-3, 3, 3)).with_armature(0.02)
+    arm = MujocoArm(robot)
+    for q, v, tau in rng.uniform(-3, 3, (20, 3, robot.nv)):
+        expected = robot.forward_dynamics(q, v, tau)
+        assert np.abs(arm.acceleration(q, v, tau) - expected).max() <= SAME * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("name", ["a460", "ur5", "panda"])
+def test_a_run_with_mujoco_as_the_plant_has_the_same_errors(name: str) -> None:
+    experiment = pair(name)
+    ours, theirs = experiment.simulate(dt=2e-3), experiment.simulate(dt=2e-3, plant="mujoco")
+    assert theirs.info["plant"] == "mujoco"
+    assert np.abs(ours.tracking_error).max() > 1e-4, "nothing to compare"
+    for array in ("tracking_error", "sync_error", "tau"):
+        assert difference(ours, theirs, array) < AGREEMENT
+
+
+@pytest.mark.parametrize("experiment", [planar_four(disturbance="torque"), a460_pair(friction=False)])
+def test_the_cells_of_the_paper_agree(experiment: Experiment) -> None:
+    ours, theirs = experiment.simulate(0.6), experiment.simulate(0.6, plant="mujoco")
+    for array in ("tracking_error", "sync_error"):
+        assert difference(ours, theirs, array) < AGREEMENT
+
+
+def test_friction_acts_on_either_plant() -> None:
+    rough, smooth = pair("a460", Friction(3.0, 2.0)), pair("a460")
+    ours, theirs = rough.simulate(0.1), rough.simulate(0.1, plant="mujoco")
+    assert difference(ours, theirs, "tracking_error") < AGREEMENT
+    assert difference(theirs, smooth.simulate(0.1, plant="mujoco"), "tracking_error") > 0.01
+
+
+def test_sampled_control_and_adaptive_methods_drive_mujoco_too() -> None:
+    experiment = pair("a460")
+    for options in ({"control_period": 2e-3}, {"integrator": "RK45"}):
+        ours = experiment.simulate(0.05, **options)
+        theirs = experiment.simulate(0.05, plant="mujoco", **options)
+        assert difference(ours, theirs, "tracking_error") < 1e-7
+
+
+def heavier(document: Document) -> Document:
+    """The document with a last moving link a tenth heavier."""
+    last = [link for link in document.links if link.inertial is not None][-1]
+    inertial: Inertial = replace(last.inertial, mass=1.1 * last.inertial.mass)
+    links = tuple(replace(link, inertial=inertial) if link is last else link for link in document.links)
+    return replace(document, links=links)
+
+
+def test_mujoco_reads_the_urdf_and_not_pinocchios_model() -> None:
+    robot = load_robot("a460")
+    other = Robot(robot.model, robot.tip, document=heavier(robot.document))
+    q, v, tau = np.random.default_rng(1).uniform(-1, 1, (3, robot.nv))
+    assert np.abs(MujocoArm(other).acceleration(q, v, tau) - robot.forward_dynamics(q, v, tau)).max() > 1e-3
+
+
+def test_mujoco_obeys_no_joint_limits_and_no_damping_of_its_own() -> None:
+    robot = load_robot("panda")
+    q, v = np.full(robot.nv, 5.0), np.full(robot.nv, 2.0)
+    arm = MujocoArm(robot)
+    expected = robot.forward_dynamics(q, v, np.zeros(robot.nv))
+    np.testing.assert_allclose(arm.acceleration(q, v, np.zeros(robot.nv)), expected, rtol=1e-9)
+
+
+def test_a_planar_arm_from_numbers_agrees() -> None:
+    description = describe(planar_arm([0.5, 0.4, 0.3], [2.0, 1.5, 1.0]))
+    robot = Robot(description.model, description.tip, document=description.document)
+    q, v, tau = np.random.default_rng(2).uniform(-2, 2, (3, 3))
+    found = MujocoArm(robot).acceleration(q, v, tau)
+    np.testing.assert_allclose(found, robot.forward_dynamics(q, v, tau), rtol=1e-10)
+
+
+def test_a_robot_without_a_urdf_is_refused() -> None:
+    robot = load_robot("a460")
+    other = robot.with_parameters(1.1 * robot.inertial_parameters)
+    with pytest.raises(InputError, match=r"robot 'a460' has none that describes it"):
+        MujocoArm(other)
+
+
+def test_without_mujoco_the_message_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(MissingDependencyError, match=r"synctrl\[mujoco\]"):
+        pair("a460").simulate(0.01, plant="mujoco")
+
+
+def test_the_function_simulate_takes_the_plant_too() -> None:
+    experiment = pair("planar2r")
+    result = simulate(experiment.cell, experiment.gains, 0.01, plant="mujoco")
+    assert result.info["plant"] == "mujoco"
+
+
+def test_an_unknown_plant_and_a_compiled_one_are_refused() -> None:
+    experiment = pair("planar2r")
+    with pytest.raises(InputError, match=f"one of '{next(iter(PHYSICS))}'"):
+        experiment.simulate(0.01, plant="bullet")
+    with pytest.raises(InputError, match=r"engine='compiled' does not have plant='mujoco'"):
+        experiment.simulate(0.01, plant="mujoco", engine="compiled")
