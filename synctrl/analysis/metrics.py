@@ -1,0 +1,206 @@
+"""Metrics: how large the errors of a run were, how long they lasted, and what torque it took.
+
+All metrics are per robot (or pair of robots) and axis. Units are SI; radians, not degrees.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from ..checks import instance, non_negative_number
+from ..errors import InputError, ResultError
+from ..simulation.result import Result
+
+FORMAT = "synctrl metrics 1"
+ERRORS = ("tracking_error", "sync_error")
+#: width of the settling band, as a share of the largest error it is made from
+SETTLING_FRACTION = 0.05
+
+DEFINITIONS: Mapping[str, str] = MappingProxyType(
+    {
+        "peak": "largest absolute value",
+        "rms": "root of the time average of the square, trapezoidal rule",
+        "ise": "integral of the square over the run, trapezoidal rule",
+        "settling_time": "first logged instant from which the absolute value stays within the settling band "
+        "until the end of the run; null if it is outside at the end",
+        "settling_band": f"{SETTLING_FRACTION:.0%} of the largest absolute value over all robots (or pairs) and "
+        "axes; runs that are compared share the band of the largest among them",
+        "final": "value at the last instant, with its sign",
+        "peak_torque": "largest absolute torque of the controller",
+    }
+)
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorMetrics:
+    """Metrics of one kind of error, each (rows, m): a row per robot or pair, a column per axis.
+
+    Attributes:
+        peak: largest |e|.
+        rms: root of the time average of e^2.
+        ise: integral of e^2.
+        settling_time: s; infinite where the error is outside the band at the end.
+        final: e at the end.
+        band: settling band, in the unit of e.
+    """
+
+    peak: np.ndarray
+    rms: np.ndarray
+    ise: np.ndarray
+    settling_time: np.ndarray
+    final: np.ndarray
+    band: float
+
+
+@dataclass(frozen=True, eq=False)
+class Metrics:
+    """Metrics of one run; `peak_torque` is (n, nv), N·m."""
+
+    tracking_error: ErrorMetrics
+    sync_error: ErrorMetrics
+    peak_torque: np.ndarray
+
+
+def metrics(result: Result, bands: Mapping[str, float] | None = None) -> Metrics:
+    """Metrics of a run.
+
+    Args:
+        result: the run, with at least one instant.
+        bands: settling bands by kind of error, see `settling_bands`; by default the run's own.
+
+    Raises:
+        InputError: no instants, or a band that is negative or not finite.
+    """
+    bands = settling_bands(result) if bands is None else bands
+    tracking, sync = (error_metrics(result.t, getattr(result, kind), bands[kind]) for kind in ERRORS)
+    return Metrics(tracking, sync, np.abs(result.tau).max(axis=0))
+
+
+def error_metrics(t: np.ndarray, e: np.ndarray, band: float) -> ErrorMetrics:
+    """Metrics of an error e, (T, ...), at the instants t, (T,), s."""
+    ise = integral_of_square(t, e)
+    span = t[-1] - t[0]
+    rms = np.sqrt(ise / span) if span > 0 else np.abs(e[-1])
+    band = non_negative_number("settling band", band)
+    return ErrorMetrics(np.abs(e).max(axis=0), rms, ise, settling_time(t, e, band), e[-1].copy(), band)
+
+
+def integral_of_square(t: np.ndarray, e: np.ndarray) -> np.ndarray:
+    """Integral of e^2 over time by the trapezoidal rule, (...), for e of shape (T, ...)."""
+    return np.trapezoid(np.square(e), t, axis=0)
+
+
+def settling_time(t: np.ndarray, e: np.ndarray, band: float) -> np.ndarray:
+    """First instant from which |e| <= band until the end, (...), s; infinite if the last value is outside."""
+    outside = np.abs(e) > band
+    settled_from = len(t) - np.argmax(outside[::-1], axis=0)  # one after the last instant outside
+    times = np.append(t, np.inf)[settled_from]
+    return np.where(outside.any(axis=0), times, t[0])
+
+
+def settling_bands(*results: Result, fraction: float = SETTLING_FRACTION) -> dict[str, float]:
+    """Settling bands that runs to be compared share: a fraction of the largest error among them.
+
+    A band of each run's own would call the run with the larger error the sooner settled.
+
+    Raises:
+        InputError: no run, or one without instants.
+    """
+    if not results:
+        raise InputError("settling bands: expected at least one run, found none")
+    for result in results:
+        instance("run", result, Result, "a Result")
+        if not len(result.t):
+            raise InputError(f"run '{result.info['title']}': expected at least one logged instant, found none")
+    return {kind: fraction * max(float(np.abs(getattr(r, kind)).max()) for r in results) for kind in ERRORS}
+
+
+# -- metrics as plain data --------------------------------------------------------------------------------
+
+
+def row_names(result: Result, kind: str) -> list[str]:
+    """Names of the rows of `tracking_error` (robots) or `sync_error` (pairs of robots)."""
+    if kind == "tracking_error":
+        return result.names
+    return [
+        f"{k}: {result.names[i]}, {result.names[j]}" for k, (i, j) in enumerate(result.info["pairs"], start=1)
+    ]
+
+
+def as_data(result: Result, computed: Metrics) -> dict[str, Any]:
+    """Metrics of a run under names and with units, as dictionaries of finite numbers.
+
+    `["sync_error"]["values"][row][axis]["rms"]` is one of them; a settling time that is not reached is None.
+    """
+    info = result.info
+    data: dict[str, Any] = {"title": info["title"], "status": result.status, "duration": float(result.t[-1])}
+    data["duration_unit"] = "s"
+    for kind in ERRORS:
+        data[kind] = _error_data(result, kind, getattr(computed, kind))
+    data["peak_torque"] = {"unit": result.unit("tau"), "values": _torque_data(result, computed)}
+    data["gains"], data["versions"] = info["gains"], info["versions"]
+    return data
+
+
+def _error_data(result: Result, kind: str, computed: ErrorMetrics) -> dict[str, Any]:
+    unit = result.unit(kind)
+    names = ("peak", "rms", "ise", "settling_time", "final")
+    values = {
+        row: {
+            axis: {name: _finite(getattr(computed, name)[k, a]) for name in names}
+            for a, axis in enumerate(result.info["axes"])
+        }
+        for k, row in enumerate(row_names(result, kind))
+    }
+    units = {"peak": unit, "rms": unit, "ise": f"{squared(unit)}·s", "settling_time": "s", "final": unit}
+    return {"units": units, "settling_band": computed.band, "settling_band_unit": unit, "values": values}
+
+
+def _torque_data(result: Result, computed: Metrics) -> dict[str, dict[str, float]]:
+    return {
+        robot["name"]: {joint: float(value) for joint, value in zip(robot["joints"], row, strict=False)}
+        for robot, row in zip(result.info["robots"], computed.peak_torque, strict=True)
+    }
+
+
+def squared(unit: str) -> str:
+    """The square of a unit: `rad²`, and `m⁴` of `m²`."""
+    return {"m²": "m⁴"}.get(unit, f"{unit}²" if unit.isalpha() else f"({unit})²")
+
+
+def write_metrics(path: str | Path, runs: Mapping[str, Mapping], claims: list[Mapping], **more: Any) -> Path:
+    """Write metrics and claims to a JSON file of finite numbers.
+
+    Args:
+        path: the file.
+        runs: `as_data` of each run, by name.
+        claims: `Claim.as_data()` of each claim.
+        more: further entries.
+
+    Raises:
+        InputError: a number that is not finite.
+        ResultError: the file cannot be written.
+    """
+    content = {"format": FORMAT, "definitions": dict(DEFINITIONS), "runs": runs, "claims": claims, **more}
+    try:
+        text = json.dumps(content, ensure_ascii=False, indent=1, allow_nan=False)
+    except ValueError as error:
+        raise InputError(f"metrics: expected finite numbers only ({error})") from error
+    path = Path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise ResultError(f"cannot write the metrics to '{path}': {error.strerror or error}") from error
+    return path
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
