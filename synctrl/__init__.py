@@ -7,6 +7,7 @@ from .robots.friction import Friction
 from .robots.parameters import FullParameters, LinearParameters
 from .robots.robot import Robot, load_robot
 from .simulation.disturbances import Disturbance
+from .simulation.payloads import Payload
 from .simulation.result import Result
 from .simulation.simulate import Experiment, simulate
 from .tasks.cell import Cell, Member
@@ -41,6 +42,7 @@ __all__ = [
     "JointSpace",
     "LinearParameters",
     "Member",
+    "Payload",
     "PoseSpace",
     "PoseTrajectory",
     "Redundancy",

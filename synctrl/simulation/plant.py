@@ -52,6 +52,7 @@ class Plant:
         viscous, coulomb: coefficients of friction, (n, nv), N·m·s/rad and N·m.
         smoothing: velocity at which Coulomb friction reaches tanh(1) of its value, (n, 1), rad/s.
         torque_limits: (n, nv), N·m; infinite without saturation.
+        robots: what stands there, with the loads it carries now.
         payloads: the payloads.
         schedule: when they are carried.
     """
@@ -126,7 +127,7 @@ class Plant:
         known: dict[int, Dynamics] = {}
         for stage, robots in zip(stages, self.schedule.robots, strict=True):
             known.update({id(robot): make(robot) for robot in robots if id(robot) not in known})
-            stage._stages = stages
+            stage.robots, stage._stages = robots, stages
             stage._arms = [(i, robot.nv, known[id(robot)]) for i, robot in enumerate(robots)]
 
     def _friction(self, v: np.ndarray) -> np.ndarray:
