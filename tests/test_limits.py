@@ -124,7 +124,7 @@ def test_saturation_acts_however_the_run_is_made(options: dict) -> None:
     expected = pair(arm(), saturate=True).simulate(0.1, dt=1e-3)
     effect = np.abs(plain.q - cut.q).max()
     assert effect > 1e-3
-    assert np.abs(cut.q - expected.q).max() < 0.05 * effect
+    assert np.abs(cut.q - expected.q).max() < 0.25 * effect
 
 
 def test_saturation_that_is_never_reached_changes_nothing() -> None:
