@@ -100,6 +100,10 @@ class ResultError(SynctrlError):
     """A result file that is missing, damaged, or of another kind."""
 
 
+class SweepError(SynctrlError):
+    """A sweep that cannot go on; runs that were finished are kept."""
+
+
 class CompilationError(SynctrlError):
     """Generated code that could not be compiled, kept, or trusted."""
 
