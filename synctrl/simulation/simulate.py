@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,11 @@ from .plant import PHYSICS, Plant
 from .recorder import Recorder
 from .result import Result
 from .sampled import sampled_rk4, steps_per_sample
+
+if TYPE_CHECKING:
+    from ctypes import CDLL
+
+    from .compiled.engine import Tables
 
 Progress = Callable[[float], Any]
 
@@ -113,7 +118,8 @@ class Experiment:
         choice("engine", engine, ("pinocchio", "compiled"))
         choice("plant", plant, tuple(PHYSICS))
         tolerances = positive_number("rtol", rtol), positive_number("atol", atol)
-        run = self._prepare(duration, dt, control_period, plant)
+        run = self.plan(duration, dt, control_period, plant)
+        run.check()
         if integrator != "rk4":
             _needs_rk4(integrator, engine, control_period)
             run.info.update(integrator=integrator, rtol=tolerances[0], atol=tolerances[1])
@@ -121,20 +127,18 @@ class Experiment:
                 run, adaptive(run.loop, run.clock, run.schedule, integrator, *tolerances), progress
             )
         if engine == "compiled":
-            return _compiled(run, progress)
-        if run.every is not None:
-            return _collect(run, sampled_rk4(run.loop, run.clock, run.schedule, run.every), progress)
-        return _collect(run, rk4(run.loop, run.clock, run.schedule), progress)
+            return run_compiled(run, progress)
+        return run_reference(run, progress)
 
-    def _prepare(self, duration: float | None, dt: float, control_period: float | None, plant: str) -> Run:
-        """Everything that a run needs, checked."""
+    def plan(
+        self, duration: float | None, dt: float, control_period: float | None = None, plant: str = "pinocchio"
+    ) -> Run:
+        """Everything that a run needs; arguments as in `simulate`."""
         duration = self.duration if duration is None else duration
         loop = self.closed_loop(plant)
         schedule = DisturbanceSchedule(self.cell, self.disturbances)
         clock = make_clock(duration, dt, (*schedule.edges, *loop.plant.schedule.edges), self.cell.breaks)
         every = None if control_period is None else steps_per_sample(control_period, dt)
-        check_reachable(self.cell, clock.logged)
-        self.cell.coupling.check_weights(clock.logged, self.cell.m)
         info: dict[str, Any] = {"integrator": "rk4", "dt": float(dt), "duration": float(duration)}
         info["engine"] = "pinocchio"
         info["plant"], info["saturate"] = plant, bool(self.saturate)
@@ -157,6 +161,17 @@ class Run(NamedTuple):
     schedule: DisturbanceSchedule
     every: int | None
     info: dict[str, Any]
+
+    def check(self) -> None:
+        """Look ahead, before anything runs.
+
+        Raises:
+            UnreachableError: a robot cannot reach its desired positions.
+            CouplingError: a weight loses its inverse on the way.
+        """
+        cell = self.experiment.cell
+        check_reachable(cell, self.clock.logged)
+        cell.coupling.check_weights(self.clock.logged, cell.m)
 
 
 def simulate(
@@ -210,16 +225,30 @@ def _collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> 
     return _finish(run, recorder, log)
 
 
-def _compiled(run: Run, progress: Progress | None) -> Result:
-    """The same run by generated code."""
+def run_reference(run: Run, progress: Progress | None = None) -> Result:
+    """A planned run by the reference engine and the fixed-step integrator."""
+    if run.every is not None:
+        return _collect(run, sampled_rk4(run.loop, run.clock, run.schedule, run.every), progress)
+    return _collect(run, rk4(run.loop, run.clock, run.schedule), progress)
+
+
+def run_compiled(
+    run: Run,
+    progress: Progress | None = None,
+    libraries: dict[str, CDLL] | None = None,
+    tables: Tables | None = None,
+) -> Result:
+    """A planned run by generated code; `libraries` and `tables` are what earlier runs have left."""
     from .compiled.engine import advance
     from .compiled.program import Program
 
     _needs_plain_plant(run.loop.plant)
     run.info["engine"] = "compiled"
-    recorder, program = Recorder(run.loop, len(run.clock.logged)), Program(run.loop)
+    recorder, program = Recorder(run.loop, len(run.clock.logged)), Program(run.loop, libraries)
     return _finish(
-        run, recorder, lambda: advance(program, run.clock, run.schedule, recorder, run.every, progress)
+        run,
+        recorder,
+        lambda: advance(program, run.clock, run.schedule, recorder, run.every, progress, tables),
     )
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterator
+import operator
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,6 +45,28 @@ def blocks(program: Program, clock: Clock) -> Iterator[Block]:
         yield Block(first, last, *_pack(cell.coupling.is_constant, tables))
 
 
+class Tables:
+    """What is desired in a run that fits into one block, kept for the next run with the same motions."""
+
+    def __init__(self) -> None:
+        self._made_for: tuple[Any, ...] = ()
+        self._times = np.zeros(0)
+        self._blocks: list[Block] = []
+
+    def blocks(self, program: Program, clock: Clock) -> Iterable[Block]:
+        """The steps of a run, made anew if the run before had other motions, weights or instants."""
+        cell = program.loop.cell
+        wanted = (cell.coupling, *(member.trajectory for member in cell.members))
+        same = len(wanted) == len(self._made_for) and all(map(operator.is_, wanted, self._made_for))
+        if not (same and np.array_equal(self._times, clock.times)):
+            fresh = blocks(program, clock)
+            first = next(fresh)
+            if first.last < len(clock.times) - 1:
+                return chain([first], fresh)
+            self._made_for, self._times, self._blocks = wanted, clock.times, [first]
+        return self._blocks
+
+
 def advance(
     program: Program,
     clock: Clock,
@@ -50,6 +74,7 @@ def advance(
     recorder: Recorder,
     every: int | None = None,
     progress: Callable[[float], Any] | None = None,
+    tables: Tables | None = None,
 ) -> None:
     """Run a compiled program and log into the recorder.
 
@@ -60,13 +85,14 @@ def advance(
         recorder: where logged instants go; after a failure it has those before it.
         every: with sampled control, how many logged instants one sample lasts.
         progress: called with the time reached, s, after every block.
+        tables: those of earlier runs.
 
     Raises:
         NonFiniteError, SingularJacobianError, OrientationError: as the reference engine.
     """
     y = program.loop.initial_state()
     steps = _Steps(program, clock, schedule, every)
-    for block in blocks(program, clock):
+    for block in blocks(program, clock) if tables is None else tables.blocks(program, clock):
         steps.advance(block, y, recorder)
         if progress is not None:
             progress(float(clock.times[block.last]))

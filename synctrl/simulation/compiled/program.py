@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import json
 from pathlib import Path
 from typing import Any
 
@@ -127,6 +128,7 @@ class Program:
 
     Args:
         loop: controller and plant of a cell.
+        libraries: libraries that are loaded already, by what they were made for; this program's is added.
 
     Attributes:
         kinds: number of different robots, each with generated functions of its own.
@@ -138,15 +140,13 @@ class Program:
         CompilationError: the code cannot be compiled, or computes something else than the reference engine.
     """
 
-    def __init__(self, loop: ClosedLoop):
-        version = require_casadi()
+    def __init__(self, loop: ClosedLoop, libraries: dict[str, ctypes.CDLL] | None = None):
         self.loop = loop
         kinds, index, bases = classify(loop.controller)
         self._keep: list[np.ndarray] = []
         self.cell = self._cell(index, bases)
         self.kinds = len(kinds)
-        key = content_key([kind.key() for kind in kinds], version)
-        self.library = cached_library(key, lambda: generate(kinds), self._check)
+        self.library = self._library(kinds, {} if libraries is None else libraries)
         self.scratch = _work_sizes(self.library)
         self.work = self._work(self.library)
 
@@ -160,6 +160,14 @@ class Program:
         """Address of an array that lives as long as the program."""
         self._keep.append(array)
         return array.ctypes.data
+
+    def _library(self, kinds: list[Kind], libraries: dict[str, ctypes.CDLL]) -> ctypes.CDLL:
+        keys = [kind.key() for kind in kinds]
+        name = json.dumps(keys)
+        if name not in libraries:
+            key = content_key(keys, require_casadi())
+            libraries[name] = cached_library(key, lambda: generate(kinds), self._check)
+        return libraries[name]
 
     def _cell(self, index: list[int], bases: list[Any]) -> CellStruct:
         controller, cell, plant = self.loop.controller, self.loop.cell, self.loop.plant
