@@ -3,13 +3,13 @@
 The synchronization function is f = R_2(t) x_1 - R_1(t) x_2 = 0, with the radii R_i(t) of the wheels' paths
 and the displacements x_i of the wheels. The left wheel, robot 1, is the inner one.
 
-What this means. The vehicle's heading is (x_2 - x_1) / b for wheels a track b apart. With R_2 - R_1 = b, f
-= 0 says that both x_1 / R_1 and x_2 / R_2 are this heading. On a circle R_i is its radius. On a path whose
+What this means. The vehicle's heading is (x_2 - x_1) / b for wheels a track b apart. With R_2 - R_1 = b,
+f = 0 says that both x_1 / R_1 and x_2 / R_2 are this heading. On a circle R_i is its radius. On a path whose
 curvature changes, x_i / R_i is the heading only if R_i(t) is the distance the wheel has covered since the
 start, divided by the angle the vehicle has turned since: a mean radius, and not the radius of curvature at
 that instant, which would relate the velocities x_1' / R_1 = x_2' / R_2. We take the paper's relation
-literally and choose the heading theta(t) and the mean radius rho(t) of the path freely; then R_i = rho -+ b
-/ 2, and x_i = R_i theta on the path.
+literally and choose the heading theta(t) and the mean radius rho(t) of the path freely; then
+R_i = rho -+ b / 2, and x_i = R_i theta on the path.
 
 The coordinates are the angles of the wheels, x_i / r, for which f is the same up to the factor r. The path,
 the vehicle and the gains are our choice.

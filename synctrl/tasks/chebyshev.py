@@ -18,7 +18,7 @@ DEGREE = 16
 ACCURACY = 1e-8
 #: how often a run may be halved
 DEPTH = 14
-MAX_PIECES = 500
+MAX_PIECES = 250
 #: instants, spread over the run, at which the polynomials are compared with the function itself
 CHECKS = 200
 

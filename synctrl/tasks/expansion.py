@@ -7,12 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import SynchronizationError
+
 #: central differences of eighth order: weights of f(x + k h) for the first and second derivative
 _FIRST = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}
 _SECOND = {1: 8 / 5, 2: -1 / 5, 3: 8 / 315, 4: -1 / 560}
 _SECOND_CENTRE = -205 / 72
 #: second-order terms below this share of the largest are rounding errors
 _NEGLIGIBLE = 1e-6
+#: and second derivatives that change by more than this share with the step are none
+_SMOOTH = 1e-4
+
+Function = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,58 +67,73 @@ class Expansion:
         return "\n".join(lines)
 
 
-def expand(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, t: float) -> Expansion:
+def expand(f: Function, x: np.ndarray, t: float) -> Expansion:
     """Expand f at positions x, (n, m), by central differences of eighth order.
 
     Args:
         f: positions, (n, m), -> values, (k,).
         x: where.
         t: the instant, for the record.
+
+    Raises:
+        SynchronizationError: f has no second derivatives there; two steps give different ones.
     """
     n, m = x.shape
     h = 2.0**-7 * max(1.0, np.abs(x).max())
-    value = f(x)
-    axes = list(np.eye(n * m).reshape(-1, n, m))
-    first = np.array([_first(f, x, h * axis) for axis in axes]) / h
-    hessian = np.zeros((len(value), n * m, n * m))
-    for a in range(n * m):
+    value, second = f(x), _second_derivatives(f, x, h)
+    change = np.abs(second - _second_derivatives(f, x, h / 2)).max()
+    if change > _SMOOTH * max(np.abs(second).max(), np.abs(value).max(), 1.0):
+        raise SynchronizationError(
+            f"f has no second derivatives at t = {t:g} s, x = {x.tolist()}: with half the step of {h:g} they "
+            f"change by {change:.3g}"
+        )
+    first = np.array([_first(f, x, h * axis) for axis in np.eye(n * m).reshape(-1, n, m)]) / h
+    c = -first.T.reshape(-1, n, m).swapaxes(0, 1)
+    return Expansion(t, value, c, second.reshape(-1, n, m, n, m).swapaxes(2, 3) / 2)
+
+
+def least_linear(f: Function, c: np.ndarray, x: np.ndarray) -> tuple[int, int, float]:
+    """Robots i >= j that make f(x) differ from f(0) - sum_i c_i x_i, and by how much they do.
+
+    Args:
+        f: positions, (n, m), -> values, (k,).
+        c: weights of f if it were linear, (n, k, m).
+        x: positions at which f is not linear.
+    """
+    base, robots = f(0 * x), np.arange(len(x))
+
+    def bend(moved: np.ndarray) -> float:
+        y = x * moved[:, None]
+        return float(np.abs(f(y) - base + np.matvec(c, y).sum(axis=0)).max())
+
+    alone = [bend(robots == i) for i in robots]
+    i = int(np.argmax(alone))
+    if alone[i] > 0.01 * bend(robots >= 0):
+        return i, i, alone[i]
+    pairs = {(i, j): bend((robots == i) | (robots == j)) for i in range(len(x)) for j in range(i)}
+    i, j = max(pairs, key=lambda pair: pairs[pair])
+    return i, j, pairs[i, j]
+
+
+def _second_derivatives(f: Function, x: np.ndarray, h: float) -> np.ndarray:
+    """Hessian of every output, (k, n m, n m)."""
+    value, axes = f(x), np.eye(x.size).reshape(-1, *x.shape)
+    hessian = np.zeros((len(value), x.size, x.size))
+    for a in range(x.size):
         hessian[:, a, a] = _second(f, x, h * axes[a], value)
         for b in range(a):
             plus = _second(f, x, h * (axes[a] + axes[b]), value)
             minus = _second(f, x, h * (axes[a] - axes[b]), value)
             hessian[:, a, b] = hessian[:, b, a] = (plus - minus) / 4
-    c = -first.T.reshape(-1, n, m).swapaxes(0, 1)
-    blocks = hessian.reshape(-1, n, m, n, m).swapaxes(2, 3)
-    return Expansion(t, value, c, blocks / (2 * h * h))
+    return hessian / (h * h)
 
 
-def largest_bend(
-    f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, steps: np.ndarray
-) -> tuple[int, int, float]:
-    """Robots i >= j in whose coordinates f is least linear, and by how much.
-
-    It is the largest second difference f(x + s_i + s_j) - f(x + s_i) - f(x + s_j) + f(x) for steps s, (n, m).
-    """
-    robots, value = range(len(x)), f(x)
-    moves = [steps * (np.arange(len(x)) == i)[:, None] for i in robots]
-    alone = [f(x + move) for move in moves]
-    bends = {
-        (i, j): float(np.abs(f(x + moves[i] + moves[j]) - alone[i] - alone[j] + value).max())
-        for i in robots
-        for j in range(i + 1)
-    }
-    i, j = max(bends, key=lambda pair: bends[pair])
-    return i, j, bends[i, j]
-
-
-def _first(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, step: np.ndarray) -> np.ndarray:
+def _first(f: Function, x: np.ndarray, step: np.ndarray) -> np.ndarray:
     terms = [w * (f(x + k * step) - f(x - k * step)) for k, w in _FIRST.items()]
     return np.sum(terms, axis=0)
 
 
-def _second(
-    f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, step: np.ndarray, value: np.ndarray
-) -> np.ndarray:
+def _second(f: Function, x: np.ndarray, step: np.ndarray, value: np.ndarray) -> np.ndarray:
     terms = [w * (f(x + k * step) + f(x - k * step)) for k, w in _SECOND.items()]
     return np.sum([_SECOND_CENTRE * value, *terms], axis=0)
 

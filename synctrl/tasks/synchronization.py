@@ -12,7 +12,7 @@ from ..checks import finite_array, finite_number, instance, positive_number
 from ..errors import CouplingError, InputError, SynchronizationError
 from .chebyshev import ACCURACY, NotSmoothError, certify
 from .coupling import Coupling
-from .expansion import Expansion, expand, largest_bend
+from .expansion import Expansion, expand, least_linear
 from .trajectories import Trajectory
 from .weights import ConstantWeights, FunctionWeights, SmoothWeights, WeightSource, as_matrices
 
@@ -239,22 +239,25 @@ class SynchronizationFunction:
             base, c, value = self(0 * x, t), self.c(t), self(x, t)
             size = np.abs(base) + np.abs(value) + np.matvec(np.abs(c), np.abs(x)).sum(axis=0)
             if (np.abs(value - base + np.matvec(c, x).sum(axis=0)) > LINEAR * size).any():
-                return self._describe_bend(xd[k], t, spread)
+                return self._describe_bend(c, x, xd[k], t)
         return None
 
-    def _describe_bend(self, x: np.ndarray, t: float, spread: float) -> str:
-        """Which robots' coordinates enter f other than linearly: the largest second difference."""
-        steps = spread * np.random.default_rng(1).standard_normal(x.shape)
-        i, j, bend = largest_bend(lambda positions: self(positions, t), x, steps)
+    def _describe_bend(self, c: np.ndarray, x: np.ndarray, xd: np.ndarray, t: float) -> str:
+        """Which robots' coordinates enter f other than linearly, and how."""
+        i, j, bend = least_linear(lambda positions: self(positions, t), c, x)
         robots = f"robot {i + 1}" if i == j else f"robots {j + 1} and {i + 1} together"
         text = (
-            f"it is not linear (assumption 1) in the coordinates of {robots}: at t = {t:g} s steps of "
-            f"{np.linalg.norm(steps[i]):.3g} change f by {bend:.3g} more than a linear function would"
+            f"it is not linear (assumption 1) in the coordinates of {robots}: at t = {t:g} s f is off by "
+            f"{bend:.3g} where x_{i + 1} = {x[i].tolist()}"
         )
-        if x.size <= 12:
-            terms = self.expand(x, t).second_order_terms()
-            text += f", and (5) has the second-order terms {', '.join(terms)}" if terms else ""
-        return text
+        return text if x.size > 12 else f"{text}; {self._second_order(xd, t)}"
+
+    def _second_order(self, xd: np.ndarray, t: float) -> str:
+        try:
+            terms = self.expand(xd, t).second_order_terms()
+        except SynchronizationError as error:
+            return str(error)
+        return f"the second-order terms of (5) are there {', '.join(terms) if terms else 'zero'}"
 
     def _check_satisfied(self, xd: np.ndarray, times: np.ndarray, source: WeightSource) -> None:
         """Equation (3): f = 0 on the desired motion."""
