@@ -31,13 +31,14 @@ def formation_scene(result: Result, fps: float = 25) -> Scene:
     Raises:
         InputError: a run in another space, or one without its experiment.
     """
+    if list(result.info["axes"]) != ["x", "y", "z"]:
+        found = ", ".join(result.info["axes"])
+        raise InputError(f"result: expected tips along x, y and z, found the coordinates {found}")
     frames = _frames(result, fps)
     scene = _robots(
         result, frames, fps, "Bars between compared tips turn red with the synchronization error."
     )
     tips = result.x[frames]
-    if tips.shape[2] != 3:
-        raise InputError(f"result: expected tips along x, y and z, found {tips.shape[2]} coordinates")
     for i, name in enumerate(result.names):
         scene.add_line(f"desired path of {name}", result.x_desired[frames, i], robot_color(i), LINE)
         scene.add_sphere(f"tip of {name}", BALL, tips[:, i], robot_color(i))
