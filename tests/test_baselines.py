@@ -10,7 +10,7 @@ from theory_cells import GAINS, coupling, experiment
 
 from synctrl.analysis.baselines import Comparison, ablation, compare, gravity_torque, trial
 from synctrl.analysis.matching import match_peak_torque, peak_torque
-from synctrl.errors import InputError
+from synctrl.errors import InputError, SimulationError
 from synctrl.experiments import a460_pair, planar_four
 
 SHORT = {"duration": 0.05, "dt": 1e-3}
@@ -54,11 +54,14 @@ def test_the_factor_is_found_above_and_below_one(share: float) -> None:
 
 
 def test_gains_under_which_a_run_has_to_stop_count_as_too_much_torque() -> None:
-    run = small()  # with K_r times 64 and this step, the run does not stay finite
-    options = {"duration": 0.4, "dt": 2e-2}
-    start = peak_torque(replace(run, gains=run.gains.independent()).simulate(**options))
-    match = match_peak_torque(run, ("K_r", "Lambda"), 3 * start, **options)
-    assert match.peak_torque == pytest.approx(3 * start, rel=1e-2)
+    run, options = small(), {"duration": 0.4, "dt": 0.04}
+    base = run.gains.independent()
+    with pytest.raises(SimulationError):  # the search tries a factor of 4
+        replace(run, gains=base.replace(K_r=4 * base.K_r, Lambda=4 * base.Lambda)).simulate(**options)
+    start = peak_torque(replace(run, gains=base).simulate(**options))
+    match = match_peak_torque(run, ("K_r", "Lambda"), 3.5 * start, **options)
+    assert match.peak_torque == pytest.approx(3.5 * start, rel=1e-2)
+    assert 2 < match.factor < 4
 
 
 def test_a_peak_torque_that_no_factor_gives_is_refused() -> None:

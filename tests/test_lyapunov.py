@@ -11,10 +11,25 @@ from hypothesis import strategies as st
 from scipy.interpolate import make_interp_spline
 from theory_cells import GAINS, coupling, experiment, planar_arm, swing, weights
 
-from synctrl import Cell, Coupling, Disturbance, Experiment, Friction, FullParameters, Gains, Member, Result
+from synctrl import (
+    Cell,
+    Coupling,
+    Disturbance,
+    Experiment,
+    Friction,
+    FullParameters,
+    Gains,
+    Member,
+    Payload,
+    Result,
+    Robot,
+)
 from synctrl.analysis.lyapunov import ENERGIES, POWERS, THEOREM, Lyapunov, first_growth, lyapunov
 from synctrl.errors import InputError
+from synctrl.robots import documents
 from synctrl.robots.parameters import LinearParameters
+from synctrl.robots.urdf import describe
+from synctrl.robots.urdf_document import Limit
 
 pytestmark = pytest.mark.filterwarnings("ignore::synctrl.errors.CouplingWarning")  # odd rings are meant
 
@@ -239,3 +254,25 @@ def test_another_experiment_than_the_one_that_made_the_result_is_refused() -> No
         lyapunov(result, result)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="Result"):
         lyapunov(None)  # type: ignore[arg-type]
+
+
+def test_torque_that_saturation_takes_away_is_named_and_the_balance_closes() -> None:
+    document = documents.planar_arm([0.3, 0.3], [1.0, 1.0])
+    joints = [replace(j, limit=Limit(0.2, 10.0, -3.0, 3.0)) if j.moves else j for j in document.joints]
+    weak = describe(replace(document, joints=tuple(joints)))
+    robot = Robot(weak.model, weak.tip, document=weak.document)
+    run = experiment(coupling("pair", 2, 2))
+    members = [replace(member, robot=robot) for member in run.cell.members]
+    record = lyapunov(replace(run, cell=Cell(members, run.cell.coupling), saturate=True).simulate(0.03, 1e-3))
+    assert np.abs(record.power["saturation"]).max() > 1e3 * record.rounding.max()
+    assert (np.abs(record.power["other"]) <= record.rounding).all()
+    assert record.closes
+
+
+def test_a_payload_is_a_force_that_the_model_does_not_contain_and_the_balance_closes() -> None:
+    run = replace(experiment(coupling("pair", 2, 2)), payloads=(Payload(0, 0.5, start=0.0103),))
+    record = lyapunov(run.simulate(0.03, 1e-3))
+    before, after = record.t < 0.0103, record.t > 0.0103
+    assert (np.abs(record.power["other"][before]) <= record.rounding[before]).all()
+    assert (np.abs(record.power["other"][after]) > record.rounding[after]).any()
+    assert record.closes

@@ -110,6 +110,7 @@ def _outside(run: Replay, record: Lyapunov, condition: GainCondition) -> list[st
 _WORDS = {
     "friction": "friction that the model does not contain",
     "disturbance": "torque from outside",
+    "saturation": "torque that saturation takes away",
     "model error": "parameters that are wrong and not adapted",
     "damped inverse": "a reference that damped inverse kinematics do not follow",
     "other": "forces that the model does not contain",

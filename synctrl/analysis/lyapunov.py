@@ -31,7 +31,7 @@ ENERGIES = ("kinetic", "parameter", "synchronization", "integral")
 #: what the theorem knows; each is at most 0
 THEOREM = ("damping", "synchronization rate", "coupling")
 #: what it does not: each may have either sign
-OUTSIDE = ("friction", "disturbance", "weight rate", "model error", "damped inverse", "other")
+OUTSIDE = ("friction", "disturbance", "saturation", "weight rate", "model error", "damped inverse", "other")
 POWERS = THEOREM + OUTSIDE
 EPS = float(np.finfo(float).eps)
 
@@ -197,6 +197,7 @@ def _power(run: Replay) -> dict[str, np.ndarray]:
         -x.sigma * K_eps * controller.beta * x.sigma,
         x.s_q * x.friction,
         -x.s_q * x.disturbance,
+        x.s_q * x.cut_off,
         x.s_q * np.matvec(x.M, _reference_gap(run)),
         x.s_q * x.Y_frozen,
         (s - moved) * force,

@@ -28,7 +28,9 @@ class Row(NamedTuple):
     """What the closed loop computes at one instant; with one more axis in front, at all of them.
 
     Attributes:
-        v, v_dot, v_ref, a_ref, s_q, tau, disturbance, friction: (n, nv).
+        v, v_dot, v_ref, a_ref, s_q, tau, disturbance: (n, nv).
+        friction: torque of friction that is not in Y, (n, nv).
+        cut_off: torque that saturation takes from tau, (n, nv).
         tilde, theta_hat_dot: theta - theta_hat, and the rate of theta_hat, (n, P).
         epsilon, epsilon_dot: (p, m).
         E, sigma, e_star, u, r: (n, m).
@@ -48,6 +50,7 @@ class Row(NamedTuple):
     tau: np.ndarray
     disturbance: np.ndarray
     friction: np.ndarray
+    cut_off: np.ndarray
     tilde: np.ndarray
     theta_hat_dot: np.ndarray
     epsilon: np.ndarray
@@ -105,11 +108,12 @@ def replay(result: Result, experiment: Experiment | None = None) -> Replay:
         experiment: what made it; may be left out while the result still knows.
 
     Raises:
-        InputError: no experiment for a result loaded from a file, or another than the one that made it.
+        InputError: no experiment for a result loaded from a file, another than the one that made it, or a
+            plant with joints whose motion is not in the result.
     """
     instance("result", result, Result, "a Result")
     experiment = experiment_of(result, experiment)
-    loop = experiment.closed_loop()
+    loop = experiment.closed_loop(result.info.get("plant", "pinocchio"))
     _check_sizes(result, loop)
     jumps, crossed = _jumps(result.t, loop, experiment)
     rows = Row(*(np.array(column) for column in zip(*_rows(result, loop, jumps), strict=True)))
@@ -140,7 +144,7 @@ def experiment_of(result: Result, experiment: Experiment | None) -> Experiment:
 
 def _jumps(t: np.ndarray, loop: ClosedLoop, experiment: Experiment) -> tuple[list[int], list[int]]:
     """Logged instants at which something jumps, and those before a jump that falls between two."""
-    edges = DisturbanceSchedule(loop.cell, experiment.disturbances).edges
+    edges = (*DisturbanceSchedule(loop.cell, experiment.disturbances).edges, *loop.plant.schedule.edges)
     tolerance = 1e-9 * float(np.diff(t).max(initial=0.0))
     on_log, between = set(), set()
     for jump in (*edges, *loop.cell.breaks):
@@ -172,8 +176,8 @@ def _rows(result: Result, loop: ClosedLoop, jumps: list[int]) -> Iterator[Row]:
         for k, reference in enumerate(references(t[start : start + BLOCK]), start):
             if k in jumps:
                 from_left = references(np.array([before(t[k])]))[0]
-                yield _row(result, loop, k, from_left, result.disturbance[k - 1])
-            yield _row(result, loop, k, reference, result.disturbance[k])
+                yield _row(result, loop.at(before(t[k])), k, from_left, result.disturbance[k - 1])
+            yield _row(result, loop.at(t[k]), k, reference, result.disturbance[k])
 
 
 def _row(result: Result, loop: ClosedLoop, k: int, reference: Reference, disturbance: np.ndarray) -> Row:
@@ -183,9 +187,10 @@ def _row(result: Result, loop: ClosedLoop, k: int, reference: Reference, disturb
     theta, adapted = loop.cell.theta, loop.controller.Gamma > 0
     J, J_inv = _jacobians(loop, s)
     M, C_s = _dynamics(loop, q, v, s.s_q)
+    friction = _friction_outside_y(loop, q, v, s, M)
     return Row(
         v, loop.split(y_dot)[1], s.v_ref, s.a_ref, s.s_q, s.tau, disturbance,
-        loop.plant.friction(v) + np.zeros_like(v), theta - theta_hat, s.theta_hat_dot, s.epsilon,
+        friction, s.tau - loop.plant.applied(s.tau), theta - theta_hat, s.theta_hat_dot, s.epsilon,
         s.epsilon_dot, s.E, s.sigma, s.e_star, s.u, s.r, reference.c, reference.c_dot, reference.c_inv,
         J, J_inv, M, C_s, np.matvec(s.Y, np.where(adapted, 0.0, theta - theta_hat)),
         np.matvec(np.abs(s.Y), np.abs(theta_hat) + np.abs(theta)),
@@ -212,6 +217,21 @@ def _dynamics(
     return M, C_s
 
 
+def _friction_outside_y(
+    loop: ClosedLoop, q: np.ndarray, v: np.ndarray, s: Signals, M: np.ndarray
+) -> np.ndarray:
+    """Friction of the plant minus what Y theta has beyond M a_ref + C v_ref + g, (n, nv)."""
+    friction = np.zeros_like(v) + loop.plant.friction(v)
+    if not friction.any():
+        return friction
+    for i, robot in enumerate(loop.cell.robots):
+        k = robot.nv
+        C, g = robot.coriolis_matrix(q[i, :k], v[i, :k]), robot.gravity(q[i, :k])
+        rigid = M[i, :k, :k] @ s.a_ref[i, :k] + C @ s.v_ref[i, :k] + g
+        friction[i, :k] -= s.Y[i, :k] @ loop.cell.theta[i] - rigid
+    return friction
+
+
 # -- checks -----------------------------------------------------------------------------------------------
 
 
@@ -231,6 +251,11 @@ def _check_sizes(result: Result, loop: ClosedLoop) -> None:
             )
     if not len(result.t):
         raise InputError("result: expected at least one logged instant, found none")
+    if loop.plant.hidden0.size:
+        raise InputError(
+            "experiment: expected a plant whose whole state is logged; this one has joints that the "
+            "controller does not know, and the energy in their motion cannot be told from the result"
+        )
 
 
 def _check_same(result: Result, rows: Row) -> None:
