@@ -193,7 +193,7 @@ def _axis_handles(result: Result) -> list[Any]:
     from matplotlib.lines import Line2D
 
     return [
-        Line2D([], [], color="#555555", linestyle=line_style(a), label=name)
+        Line2D([], [], color="#555555", ls=line_style(a), label=name)
         for a, name in enumerate(result.info["axes"])
     ]
 

@@ -1,0 +1,117 @@
+"""Every experiment of the paper: runs, figures, metrics, claims, animations, and the page that shows them.
+
+python scripts/reproduce.py [--out out] [--workers 2]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from synctrl.analysis.claims import a460_claims, own_findings, planar_four_claims
+from synctrl.analysis.metrics import as_data, metrics, settling_bands, write_metrics
+from synctrl.errors import SynctrlError
+from synctrl.experiments.reproduction import JOBS, run_all
+from synctrl.show.animation import payload_pair_scene, planar_scene
+from synctrl.show.paper_sections import (
+    a460_section,
+    animation_section,
+    honesty_section,
+    introduction,
+    planar_section,
+)
+from synctrl.show.report import Section, write_page
+from synctrl.show.style import display
+from synctrl.simulation.result import Result
+
+ANIMATED = (
+    "a460_pair_synchronized",
+    "a460_pair_independent",
+    "planar_four_synchronized",
+    "planar_four_independent",
+    "planar_four_synchronized_disturbed",
+    "planar_four_independent_disturbed",
+)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for everything that is written")
+    parser.add_argument("--workers", type=int, default=2, help="number of processes")
+    options = parser.parse_args()
+    try:
+        page = reproduce(options.out, options.workers)
+    except SynctrlError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    print(f"\nOpen {page}")
+    return 0
+
+
+def reproduce(out: Path, workers: int) -> Path:
+    """Run everything and write it into a folder; returns the path of the page."""
+    runs = run_all(out / "runs", workers)
+    a460, planar = select(runs, "a460_pair_"), select(runs, "planar_four_")
+    print("\nwriting figures, animations and the page ...", flush=True)
+    claims = [*a460_claims(a460), *planar_four_claims(planar), *own_findings(planar)]
+    data = {
+        name: as_data(run, metrics(run, settling_bands(*peers(runs, name)))) for name, run in runs.items()
+    }
+    write_metrics(out / "metrics.json", data, [claim.as_data() for claim in claims])
+    layout = JOBS["planar_four_synchronized"].make()
+    sections = [
+        introduction(),
+        a460_section(a460, out / "figures"),
+        planar_section(planar, layout, out / "figures"),
+        honesty_section(planar),
+        animations(runs, out),
+    ]
+    page = write_page(out / "index.html", "Adaptive synchronized control, reproduced", sections)
+    print_table(runs)
+    held = sum(claim.holds for claim in claims)
+    print(f"\n{held} of {len(claims)} claims hold; the page says which do not, and why.")
+    return page
+
+
+def select(runs: Mapping[str, Result], prefix: str) -> dict[str, Result]:
+    """The runs of one cell, without its name."""
+    return {name.removeprefix(prefix): run for name, run in runs.items() if name.startswith(prefix)}
+
+
+def peers(runs: Mapping[str, Result], name: str) -> list[Result]:
+    """The synchronized and the independent run that are compared with each other, of which this is one."""
+    twins = {name.replace("independent", "synchronized"), name.replace("synchronized", "independent")}
+    return [runs[twin] for twin in sorted(twins)]
+
+
+def animations(runs: Mapping[str, Result], out: Path) -> Section:
+    """Write the animations; those that are compared share the error at which a mark is fully red."""
+    files = {}
+    for name in ANIMATED:
+        scene = payload_pair_scene if name.startswith("a460") else planar_scene
+        limit = max(float(np.linalg.norm(run.sync_error, axis=2).max()) for run in peers(runs, name))
+        path = scene(runs[name], JOBS[name].make(), limit).write(out / "animations" / f"{name}.html")
+        files[path.relative_to(out).as_posix()] = str(runs[name].info["title"])
+    return animation_section(files)
+
+
+def print_table(runs: Mapping[str, Result]) -> None:
+    """The largest errors and torques of all runs."""
+    print(f"\n{'run':36} {'peak e':>14} {'RMS e':>14} {'peak ε':>16} {'RMS ε':>16} {'torque':>10}")
+    for name, run in runs.items():
+        row = metrics(run)
+        cells = []
+        for kind, width in (("tracking_error", 14), ("sync_error", 16)):
+            unit, factor = display(run.unit(kind))
+            for part in ("peak", "rms"):
+                largest = factor * getattr(getattr(row, kind), part).max()
+                cells.append(f"{f'{largest:.4g} {unit}':>{width}}")
+        print(f"{name:36} {' '.join(cells)} {f'{row.peak_torque.max():.3g} N·m':>10}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
