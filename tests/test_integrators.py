@@ -170,5 +170,5 @@ def test_the_last_step_may_be_shorter():
     [(0.0, 0.1), (-1.0, 0.1), (1.0, 0.0), (1.0, -0.1), (1.0, 2.0), (np.nan, 0.1), (1.0, np.inf), (1.0, 1e-9)],
 )
 def test_steps_that_make_no_clock_are_refused(duration, dt):
-    with pytest.raises(InputError, match="duration|dt"):
+    with pytest.raises(InputError, match=r"duration|dt"):
         make_clock(duration, dt, [])

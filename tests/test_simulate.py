@@ -1,4 +1,4 @@
-"""Runs: repeatable to the bit, causal, the same wherever the cell stands, and decentralized where they should be."""
+"""Runs: repeatable to the bit, causal, the same wherever the cell stands, decentralized where promised."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_overlapping_pushes_add_up():
     both = [Disturbance(0, 0.2, 0.0, 0.06), Disturbance(0, (0.1, 0.3), 0.03, 0.08)]
     split = [
         Disturbance(0, 0.2, 0.0, 0.03),
-        Disturbance(0, np.array([0.2, 0.2]) + [0.1, 0.3], 0.03, 0.06),
+        Disturbance(0, (0.2 + 0.1, 0.2 + 0.3), 0.03, 0.06),
         Disturbance(0, (0.1, 0.3), 0.06, 0.08),
     ]
     runs = [simulate(cell, SMALL_GAINS, 0.1, dt=5e-3, disturbances=d) for d in (both, split)]
