@@ -230,9 +230,10 @@ def test_11_the_literal_cartesian_form_diverges_within_half_a_second(synchronize
         stopped.append(failure.value)
     assert stopped[0].time < 0.5
     assert stopped[1].time == pytest.approx(stopped[0].time, rel=0.02)  # an escape, whatever the step
-    ends, result = np.abs(stopped[1].result.tracking_error).max(axis=(1, 2)), ours.simulate(0.5, 2.5e-3)
-    assert ends[-1] > 2 * np.abs(result.tracking_error).max()
-    assert np.abs(stopped[1].result.tau).max() > 5 * np.abs(result.tau).max()
+    escaped, result = stopped[1].result, ours.simulate(0.5, 2.5e-3)
+    assert np.abs(escaped.tracking_error[-1]).max() > 2 * np.abs(result.tracking_error).max()
+    half = len(escaped.t) // 2
+    assert np.nanmax(np.abs(escaped.tau)) > 10 * np.abs(escaped.tau[:half]).max()
     assert np.abs(result.tracking_error[-1]).max() < 0.1 * np.abs(result.tracking_error).max()
 
 
@@ -393,7 +394,7 @@ def test_18_with_phi_of_a_tenth_the_cell_is_nearly_square() -> None:
 
 
 def test_19_the_desired_motion_of_the_four_arms_does_not_satisfy_46() -> None:
-    """Robots 1, 2 and robots 4, 3 move along mirrored arcs: across, (3) fails in y by a tenth of the motion."""
+    """Robots 1, 2 and 4, 3 move along mirrored arcs: across, (3) fails in y by a tenth of the motion."""
     c = np.array([R + D, -R, R, -(R + D)])
     paths = [m.trajectory for m in planar_four().cell.members]
     moved = np.array([path.end - path.start for path in paths])
