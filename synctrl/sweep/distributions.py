@@ -1,0 +1,156 @@
+"""Where the values of a factor come from: distributions, and grids."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..checks import finite_number, positive_number
+from ..errors import InputError
+
+Value = float | str
+
+
+class Values(Protocol):
+    """Values a factor can have."""
+
+    def describe(self) -> dict[str, Any]:
+        """Kind and parameters, as plain data."""
+
+
+class Distribution(Values, Protocol):
+    """Values that are drawn."""
+
+    def draw(self, rng: np.random.Generator) -> Value:
+        """One value."""
+
+
+class _Interval:
+    """From `low` to `high`, with a way to go through it."""
+
+    low: float
+    high: float
+
+    def at(self, share: float) -> float:
+        """The value below which a share of the distribution lies, 0 <= share <= 1."""
+        raise NotImplementedError
+
+    def draw(self, rng: np.random.Generator) -> float:
+        return self.at(rng.random())
+
+    def describe(self) -> dict[str, Any]:
+        return {"kind": type(self).__name__, "low": self.low, "high": self.high}
+
+    def _check_order(self) -> None:
+        if not self.low < self.high:
+            raise InputError(
+                f"{type(self).__name__}: expected low < high, found {self.low:g} and {self.high:g}"
+            )
+
+
+@dataclass(frozen=True)
+class Uniform(_Interval):
+    """Every number from low to high is as likely as every other.
+
+    Raises:
+        InputError: not finite, or not low < high.
+    """
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        for name in ("low", "high"):
+            object.__setattr__(self, name, finite_number(f"Uniform, {name}", getattr(self, name)))
+        self._check_order()
+
+    def at(self, share: float) -> float:
+        return min(self.low + share * (self.high - self.low), self.high)
+
+
+@dataclass(frozen=True)
+class LogUniform(_Interval):
+    """Every order of magnitude between low and high is as likely as every other.
+
+    Raises:
+        InputError: not above 0, or not low < high.
+    """
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        for name in ("low", "high"):
+            object.__setattr__(self, name, positive_number(f"LogUniform, {name}", getattr(self, name)))
+        self._check_order()
+
+    def at(self, share: float) -> float:
+        return float(np.clip(self.low * (self.high / self.low) ** share, self.low, self.high))
+
+
+@dataclass(frozen=True)
+class Normal:
+    """The normal distribution.
+
+    Raises:
+        InputError: not finite, or a standard deviation that is not positive.
+    """
+
+    mean: float
+    std: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mean", finite_number("Normal, mean", self.mean))
+        object.__setattr__(self, "std", positive_number("Normal, std", self.std))
+
+    def draw(self, rng: np.random.Generator) -> float:
+        return float(rng.normal(self.mean, self.std))
+
+    def describe(self) -> dict[str, Any]:
+        return {"kind": "Normal", "mean": self.mean, "std": self.std}
+
+
+class _Listed:
+    """Values that were listed: numbers or words."""
+
+    def __init__(self, values: Sequence[Value]):
+        kind = type(self).__name__
+        if isinstance(values, str) or not len(values):
+            raise InputError(f"{kind}: expected a list of numbers or words, found {values!r}")
+        self.values = tuple(v if isinstance(v, str) else finite_number(kind, v) for v in values)
+        if len(set(self.values)) != len(self.values):
+            raise InputError(f"{kind}: expected different values, found {list(self.values)}")
+
+    def describe(self) -> dict[str, Any]:
+        return {"kind": type(self).__name__, "values": list(self.values)}
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({list(self.values)})"
+
+
+class Choice(_Listed):
+    """One of some values, each as likely as every other.
+
+    Args:
+        values: numbers or words.
+
+    Raises:
+        InputError: none, two equal ones, or something else.
+    """
+
+    def draw(self, rng: np.random.Generator) -> Value:
+        return self.values[int(rng.integers(len(self.values)))]
+
+
+class Grid(_Listed):
+    """Every one of some values, together with every combination of the other factors' grids.
+
+    Args:
+        values: numbers or words.
+
+    Raises:
+        InputError: none, two equal ones, or something else.
+    """

@@ -1,0 +1,136 @@
+"""Making runs and writing them down: what sweeps and tuning have in common."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from ..checks import choice, instance
+from ..errors import InputError
+from . import backends
+from .journal import KEPT, Journal, Row
+from .worker import Job, Outcome, Runner, Task
+
+BACKENDS = ("joblib", "dask", "serial")
+#: how long a batch should take, s: what it costs to send one is then far below a hundredth of it
+BATCH_TIME = 1.0
+#: batches per worker at least, so that all of them have something to do until the end
+SHARES = 4
+#: how often the rest is begun again after a worker has died without a single run being finished in between
+RETRIES = 2
+
+
+class Evaluation:
+    """Makes runs of a job, some at a time, and knows those made before.
+
+    Args:
+        job: what is run.
+        journal: where rows go, or None to keep them in memory only.
+        workers: number of processes.
+        backend: "joblib", "dask" or "serial".
+        client: for "dask", a client or the address of a scheduler.
+        batch: runs per task; by default as many as take about a second.
+    """
+
+    def __init__(
+        self,
+        job: Job,
+        journal: Journal | None,
+        workers: int,
+        backend: str,
+        client: Any = None,
+        batch: int | None = None,
+    ):
+        self.workers, self._batch = count("workers", workers), batch
+        self._backend, self._client = choice("backend", backend, BACKENDS), client
+        if batch is not None:
+            count("batch", batch)
+        self._runner, self._journal = Runner(job), journal  # whatever has to be compiled is compiled here
+        self.rows: dict[int, Row] = {} if journal is None else journal.rows
+
+    @contextlib.contextmanager
+    def open(self) -> Iterator[None]:
+        """Have the workers ready."""
+        job = self._runner.job
+        crews = {
+            "serial": lambda: backends.serial(self._runner),
+            "joblib": lambda: backends.joblib(job, self.workers),
+            "dask": lambda: backends.dask(job, self.workers, self._client),
+        }
+        with crews[self._backend]() as self._crew:
+            yield
+
+    def run(self, tasks: Sequence[Task]) -> Iterator[list[Row]]:
+        """Make those of the runs that are not made yet; yields rows as soon as they are written.
+
+        Raises:
+            ResultError: a row cannot be written.
+            SweepError: workers die again and again, or a function of the user fails.
+        """
+        todo = [task for task in tasks if task.run not in self.rows]
+        if todo and self._batch is None:
+            yield self._first(todo.pop(0), len(todo))
+        attempts = RETRIES
+        while todo:
+            try:
+                for outcomes in self._crew(batches(todo, self._batch or 1)):
+                    yield self._write(outcomes)
+                return
+            except backends.WorkerDied:
+                left = [task for task in todo if task.run not in self.rows]
+                attempts = RETRIES if len(left) < len(todo) else attempts - 1
+                if attempts < 0:
+                    raise
+                todo = left
+
+    def _first(self, task: Task, left: int) -> list[Row]:
+        """Make one run here, to see how long it takes."""
+        start = perf_counter()
+        outcome = self._runner.outcome(task)
+        took = perf_counter() - start
+        share = -(-left // (SHARES * self.workers))
+        self._batch = max(1, min(int(BATCH_TIME / took), share))
+        return self._write([outcome])
+
+    def _write(self, outcomes: Sequence[Outcome]) -> list[Row]:
+        rows = [outcome.row for outcome in outcomes]
+        if self._journal is None:
+            self.rows.update({row[0]: row for row in rows})
+            return rows
+        for outcome in outcomes:
+            result = outcome.result()
+            if result is not None:
+                result.save(kept_file(self._journal.folder, outcome.row[0]))
+        self._journal.append(rows)
+        return rows
+
+
+def batches(tasks: Sequence[Task], size: int) -> Iterator[list[Task]]:
+    """The tasks in lists of a size."""
+    waiting = iter(tasks)
+    while batch := list(islice(waiting, size)):
+        yield batch
+
+
+def kept_file(folder: str | Path, run: int) -> Path:
+    """Where the trajectories of a run are kept."""
+    return Path(folder) / KEPT / f"{run:06d}.npz"
+
+
+def count(name: str, value: object, least: int = 1) -> int:
+    """`value` as a whole number of at least `least`."""
+    instance(name, value, int, "a whole number")
+    if isinstance(value, bool) or value < least:  # type: ignore[operator]
+        raise InputError(f"{name}: expected a whole number of at least {least}, found {value!r}")
+    return int(value)  # type: ignore[call-overload]
+
+
+def progress_bar(total: int, done: int, shown: bool) -> Any:
+    """A progress bar with rate and time left."""
+    from tqdm import tqdm
+
+    return tqdm(total=total, initial=done, unit="run", disable=not shown, smoothing=0.1)

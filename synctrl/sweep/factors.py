@@ -1,0 +1,177 @@
+"""Factors of a sweep: what is varied, where its values come from, and how a value changes the experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..checks import choice, instance, positive_number
+from ..control.gains import Gains
+from ..errors import InputError
+from ..simulation.result import Result
+from ..simulation.simulate import Experiment
+from . import variations
+from .distributions import Grid, Value, Values
+
+Change = Callable[[Experiment, Any], Experiment]
+GAINS = tuple(field.name for field in fields(Gains))
+
+
+class Setup(NamedTuple):
+    """An experiment and how it is run: duration and dt in s; control_period in s, or None."""
+
+    experiment: Experiment
+    duration: float
+    dt: float
+    engine: str
+    control_period: float | None
+
+    def simulate(self) -> Result:
+        """Run it; see `Experiment.simulate`."""
+        return self.experiment.simulate(
+            self.duration, self.dt, engine=self.engine, control_period=self.control_period
+        )
+
+
+@dataclass(frozen=True)
+class Factor:
+    """Something that differs from run to run.
+
+    Args:
+        name: its column in the table.
+        values: a distribution or a `Grid`.
+        change: a function of an experiment and a value that returns the changed experiment. It must be pure:
+            leave the experiment it is given as it is, and depend on nothing else.
+
+    Raises:
+        InputError: a name that is no word, values that are neither, or no function.
+    """
+
+    name: str
+    values: Values
+    change: Change
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name.strip():
+            raise InputError(f"factor: expected a name, found {self.name!r}")
+        if not isinstance(self.values, Grid) and not hasattr(self.values, "draw"):
+            raise InputError(
+                f"factor '{self.name}': expected a distribution or a Grid, found {self.values!r}"
+            )
+        if not callable(self.change):
+            raise InputError(f"factor '{self.name}': expected a function, found {self.change!r}")
+
+    def apply(self, setup: Setup, value: Value) -> Setup:
+        """The setup with this factor at a value.
+
+        Raises:
+            InputError: the function returned something else than an experiment.
+        """
+        changed = self.change(setup.experiment, value)
+        instance(f"factor '{self.name}': what its function returns", changed, Experiment, "an Experiment")
+        return setup._replace(experiment=changed)
+
+    def describe(self) -> dict[str, Any]:
+        """Name, values and function, as plain data."""
+        function = self.change.func if isinstance(self.change, partial) else self.change
+        arguments = self.change.keywords if isinstance(self.change, partial) else {}
+        name = getattr(function, "__qualname__", type(function).__qualname__)
+        return {"name": self.name, "values": self.values.describe(), "change": name, "with": dict(arguments)}
+
+
+class _PeriodFactor(Factor):
+    """The period of sampled control, which belongs to the run and not to the experiment."""
+
+    def apply(self, setup: Setup, value: Value) -> Setup:
+        return setup._replace(control_period=positive_number(self.name, value))
+
+
+def gain(name: str, values: Values) -> Factor:
+    """One number for all entries of the gain Lambda, beta, K_r, K_eps or Gamma, in its unit."""
+    choice("gain", name, GAINS)
+    return Factor(name, values, partial(variations.with_gain, gain=name))
+
+
+def gain_scale(name: str, values: Values) -> Factor:
+    """Factor by which all entries of a gain are multiplied."""
+    choice("gain", name, GAINS)
+    return Factor(f"{name}_scale", values, partial(variations.with_scaled_gain, gain=name))
+
+
+def true_parameters(values: Values, robot: int | None = None, body: int | None = None) -> Factor:
+    """Factor by which true masses and inertias are multiplied; the initial estimates stay what they are.
+
+    Args:
+        values: factors above 0.
+        robot, body: which ones, counted from 0; by default all.
+    """
+    name = _indexed("true_parameters", robot=robot, body=body)
+    return Factor(name, values, partial(variations.with_scaled_bodies, robot=robot, body=body))
+
+
+def initial_estimates(values: Values, robot: int | None = None) -> Factor:
+    """Factor by which the initial estimates theta_hat(0) are multiplied."""
+    name = _indexed("initial_estimates", robot=robot)
+    return Factor(name, values, partial(variations.with_scaled_estimates, robot=robot))
+
+
+def model_error(values: Values, robot: int | None = None) -> Factor:
+    """Relative error of the initial estimates: theta_hat(0) = (1 + value) theta; -1 is to know nothing."""
+    name = _indexed("model_error", robot=robot)
+    return Factor(name, values, partial(variations.with_model_error, robot=robot))
+
+
+def initial_positions(values: Values, robot: int | None = None, joint: int | None = None) -> Factor:
+    """Angle (or length) that is added to initial joint positions, rad (or m)."""
+    name = _indexed("initial_positions", robot=robot, joint=joint)
+    change = partial(variations.with_moved_start, quantity="q0", robot=robot, joint=joint)
+    return Factor(name, values, change)
+
+
+def initial_velocities(values: Values, robot: int | None = None, joint: int | None = None) -> Factor:
+    """Velocity that is added to initial joint velocities, rad/s (or m/s)."""
+    name = _indexed("initial_velocities", robot=robot, joint=joint)
+    change = partial(variations.with_moved_start, quantity="v0", robot=robot, joint=joint)
+    return Factor(name, values, change)
+
+
+def disturbance_scale(values: Values, disturbance: int = 0) -> Factor:
+    """Factor by which the torque of one of the experiment's disturbances is multiplied."""
+    name = _indexed("disturbance_scale", disturbance=disturbance or None)
+    return Factor(name, values, partial(variations.with_scaled_disturbance, disturbance=disturbance))
+
+
+def disturbance_start(values: Values, disturbance: int = 0) -> Factor:
+    """Instant at which one of the experiment's disturbances starts; it lasts as long as before, s."""
+    name = _indexed("disturbance_start", disturbance=disturbance or None)
+    return Factor(name, values, partial(variations.with_disturbance_from, disturbance=disturbance))
+
+
+def weights(values: Values, robot: int | None = None) -> Factor:
+    """Factor by which the coupling's weights c_i are multiplied."""
+    name = _indexed("weights", robot=robot)
+    return Factor(name, values, partial(variations.with_scaled_weights, robot=robot))
+
+
+def control_period(values: Values) -> Factor:
+    """Period of sampled control, multiples of the step, s."""
+    return _PeriodFactor("control_period", values, _keep)
+
+
+def _keep(experiment: Experiment, value: Value) -> Experiment:
+    return experiment
+
+
+def _indexed(name: str, **indices: int | None) -> str:
+    """`name`, with the indices that are given: `true_parameters_robot0_body1`."""
+    for what, index in indices.items():
+        if index is None:
+            continue
+        if isinstance(index, bool) or not isinstance(index, (int, np.integer)) or index < 0:
+            raise InputError(f"{name}: expected the index of a {what}, counted from 0, found {index!r}")
+        name += f"_{what}{index}"
+    return name

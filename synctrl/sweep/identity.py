@@ -1,0 +1,65 @@
+"""What a base experiment is, as plain data that can be compared with what a folder says."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+import numpy as np
+
+from ..simulation.disturbances import DisturbanceSchedule
+from ..simulation.recorder import describe
+from .factors import Setup
+
+#: instants at which desired motion and closed loop are looked at
+INSTANTS = 40
+#: digits that count: fewer than those in which machines may differ
+DIGITS = 9
+
+
+def describe_base(setup: Setup) -> dict[str, Any]:
+    """Names, gains and options of an experiment, and digests of what cannot be told in words."""
+    experiment = setup.experiment
+    loop, cell = experiment.closed_loop(), experiment.cell
+    schedule = DisturbanceSchedule(cell, experiment.disturbances)
+    times = np.linspace(0, setup.duration, INSTANTS)
+    described = {key: value for key, value in describe(loop).items() if key != "versions"}
+    table = cell.reference_table(times)
+    disturbances = [np.array(schedule.edges), schedule.torques]
+    return {
+        **described,
+        "digest": {
+            "initial state": digest([loop.initial_state()]),
+            "desired motion": digest([table.desired]),
+            "weights": digest(table.weights),
+            "disturbances": digest(disturbances),
+            "dynamics": digest(_flow(setup, times)),
+        },
+    }
+
+
+def digest(arrays: Any) -> str:
+    """A short digest of arrays, to the digits that count."""
+    text = "\n".join(" ".join(f"{value:.{DIGITS - 1}e}" for value in array.ravel() + 0.0) for array in arrays)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _flow(setup: Setup, times: np.ndarray) -> list[np.ndarray]:
+    """y' of the closed loop at some instants, near its initial state: robots, friction, options and all."""
+    loop = setup.experiment.closed_loop()
+    rng = np.random.default_rng(0)
+    y, none = loop.initial_state(), np.zeros((loop.cell.n, loop.cell.nv))
+    spread = 0.01 * _used(loop)
+    return [
+        loop.at(float(t)).evaluate(reference, y + spread * rng.standard_normal(y.size), none)[0]
+        for t, reference in zip(times, loop.cell.references(times), strict=True)
+    ]
+
+
+def _used(loop: Any) -> np.ndarray:
+    """1 for joints that a robot has, 0 for padding and everything that is no joint."""
+    used = np.zeros(loop.size)
+    for part in loop.split(used)[:2]:
+        for i, robot in enumerate(loop.cell.robots):
+            part[i, : robot.nv] = 1
+    return used

@@ -1,0 +1,80 @@
+"""What a sweep keeps of a run: a few numbers over all robots, pairs and axes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+
+from ..analysis.metrics import DEFINITIONS, ERRORS, SETTLING_FRACTION, ErrorMetrics, Metrics, metrics
+from ..analysis.metrics import squared as squared_unit
+from ..simulation.result import Result
+from ..tasks.cell import Cell
+
+
+class Measure(NamedTuple):
+    """A column of the table: its definition and its unit."""
+
+    definition: str
+    unit: str
+
+
+#: how the values of all robots (or pairs) and axes become one
+_OVER_ALL: Mapping[str, str] = MappingProxyType(
+    {
+        "peak": "the largest over all {rows} and axes",
+        "rms": "the root of the mean of the squares over all {rows} and axes",
+        "ise": "the sum over all {rows} and axes",
+        "final": "the largest over all {rows} and axes, without its sign",
+        "settling_time": "the latest over all {rows} and axes; empty if one has not settled; the band is "
+        f"{SETTLING_FRACTION:.0%} of the largest error of the run of the base experiment",
+    }
+)
+_SHORT = {"tracking_error": "tracking", "sync_error": "sync"}
+_ROWS = {"tracking_error": "robots", "sync_error": "pairs"}
+
+#: names of the measures, in the order of the table
+MEASURES = (*(f"{_SHORT[kind]}_{name}" for kind in ERRORS for name in _OVER_ALL), "peak_torque")
+
+
+def definitions(cell: Cell) -> dict[str, Measure]:
+    """What each measure means, with the units of a cell."""
+    units = {"tracking_error": cell.space.unit, "sync_error": cell.weighted_unit}
+    found = {}
+    for kind, unit in units.items():
+        special = {"ise": f"{squared_unit(unit)}·s", "settling_time": "s"}
+        for name, how in _OVER_ALL.items():
+            text = f"{DEFINITIONS[name].split(';')[0]}; {how.format(rows=_ROWS[kind])}"
+            found[f"{_SHORT[kind]}_{name}"] = Measure(text, special.get(name, unit))
+    text = f"{DEFINITIONS['peak_torque']}; the largest over all robots and joints"
+    return {**found, "peak_torque": Measure(text, "N·m")}
+
+
+def measures(result: Result, bands: Mapping[str, float]) -> list[float | None]:
+    """The measures of a run, in the order of `MEASURES`; None where there is no finite number.
+
+    Args:
+        result: the run.
+        bands: settling bands by kind of error, see `analysis.metrics.settling_bands`.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        computed: Metrics = metrics(result, bands)
+        values = [value for kind in ERRORS for value in _over_all(getattr(computed, kind))]
+    return [_finite(value) for value in (*values, computed.peak_torque.max())]
+
+
+def _over_all(error: ErrorMetrics) -> list[float]:
+    """In the order of `_OVER_ALL`."""
+    return [
+        error.peak.max(),
+        np.sqrt(np.mean(error.rms**2)),
+        error.ise.sum(),
+        np.abs(error.final).max(),
+        error.settling_time.max(),
+    ]
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,119 @@
+"""Study: one experiment, what is varied in it, and how it is run; whoever chooses the values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from ..analysis.metrics import ERRORS, settling_bands
+from ..checks import choice, instance, non_negative_number, positive_number
+from ..errors import InputError, SimulationError
+from ..simulation.prepared import Prepared
+from ..simulation.recorder import versions
+from ..simulation.simulate import Experiment
+from .evaluation import count
+from .factors import Factor, Setup
+from .identity import describe_base
+from .journal import ABOUT, read_about
+from .measures import MEASURES, definitions
+from .worker import Job, columns
+
+
+class Study:
+    """What all runs of a sweep or a search share.
+
+    Args:
+        base: the experiment that is varied.
+        factors: what differs from run to run; applied in this order.
+        seed: whole number from 0.
+        duration: s; by default the experiment's.
+        dt: step, s.
+        engine: "compiled" or "pinocchio", see `Experiment.simulate`.
+        control_period: None for continuous control, or the period of sampled control, s.
+        bands: settling bands by kind of error, in its unit; by default 5% of the largest error of the base
+            experiment's run, which then has to run to its end.
+
+    Raises:
+        InputError: a value of the wrong kind, no factor, or two factors of one name.
+    """
+
+    def __init__(
+        self,
+        base: Experiment,
+        factors: Sequence[Factor],
+        seed: int = 0,
+        duration: float | None = None,
+        dt: float = 1e-3,
+        engine: str = "compiled",
+        control_period: float | None = None,
+        bands: Mapping[str, float] | None = None,
+    ):
+        instance("base", base, Experiment, "an Experiment")
+        duration = base.duration if duration is None else positive_number("duration", duration)
+        choice("engine", engine, ("compiled", "pinocchio"))
+        period = None if control_period is None else positive_number("control_period", control_period)
+        self.base = Setup(base, duration, positive_number("dt", dt), engine, period)
+        self.factors = _checked_factors(factors)
+        self.seed = count("seed", seed, least=0)
+        self._bands = None if bands is None else _checked_bands(bands)
+
+    def job(self, folder: str | Path | None = None, keep_every: int | None = None) -> Job:
+        """What workers are told; with the settling bands of the folder, if it has some."""
+        if self._bands is None and folder is not None and (Path(folder) / ABOUT).exists():
+            bands = _checked_bands(read_about(folder).get("settling_bands"))
+        else:
+            bands = self._found_bands
+        return Job(self.base, self.factors, bands, keep_every)
+
+    def about(self, job: Job, **more: Any) -> dict[str, Any]:
+        """Everything that a row depends on, as plain data, and what its entries mean."""
+        setup = self.base
+        measured = definitions(setup.experiment.cell)
+        return {
+            "base": describe_base(setup),
+            "factors": [factor.describe() for factor in self.factors],
+            "seed": self.seed,
+            **more,
+            "duration": setup.duration,
+            "dt": setup.dt,
+            "engine": setup.engine,
+            "control_period": setup.control_period,
+            "settling_bands": dict(job.bands),
+            "columns": job.columns,
+            "measures": {name: measured[name]._asdict() for name in MEASURES},
+            "versions": versions(),
+        }
+
+    @cached_property
+    def _found_bands(self) -> dict[str, float]:
+        if self._bands is not None:
+            return self._bands
+        setup = self.base
+        try:
+            result = Prepared(*setup[:4]).simulate(setup.experiment, setup.control_period)
+        except SimulationError as error:
+            raise InputError(
+                f"base: its own run stops, so there is no scale for settling times: {error}; give `bands`, "
+                "or start from an experiment that runs to its end"
+            ) from error
+        return settling_bands(result)
+
+
+def _checked_factors(factors: Sequence[Factor]) -> tuple[Factor, ...]:
+    for factor in factors:
+        instance("factors", factor, Factor, "Factor objects")
+    names = [factor.name for factor in factors]
+    taken = [name for name in names if names.count(name) > 1 or name in columns(())]
+    if taken:
+        raise InputError(f"factors: the name '{taken[0]}' is taken; give each column a name of its own")
+    if not names:
+        raise InputError("factors: expected at least one, found none")
+    return tuple(factors)
+
+
+def _checked_bands(bands: Any) -> dict[str, float]:
+    if not isinstance(bands, Mapping) or set(bands) != set(ERRORS):
+        raise InputError(f"bands: expected numbers for {' and '.join(ERRORS)}, found {bands!r}")
+    return {kind: non_negative_number(f"bands, {kind}", bands[kind]) for kind in ERRORS}

@@ -1,0 +1,157 @@
+"""Sweep: many runs of one experiment, each with other values of some factors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..simulation.result import Result
+from ..simulation.simulate import Experiment
+from .distributions import Grid, Value
+from .evaluation import Evaluation, count, progress_bar
+from .factors import Factor, Setup
+from .journal import Journal
+from .study import Study
+from .worker import Job, Runner, Task
+
+
+class Sweep:
+    """Runs of an experiment under drawn and listed values of factors.
+
+    Every run has a number, and random numbers of its own from the seed and that number alone: any run can be
+    made again by itself, and no result depends on the number of workers or on their order. All combinations
+    of the factors' grids are run, each `samples` times with new draws.
+
+    Args:
+        base: the experiment that is varied.
+        factors: what differs from run to run; applied in this order.
+        samples: draws per combination of grid values; with no grid, the number of runs.
+        seed: whole number from 0.
+        duration: s; by default the experiment's.
+        dt: step, s.
+        engine: "compiled" or "pinocchio", see `Experiment.simulate`.
+        control_period: None for continuous control, or the period of sampled control, s.
+        bands: settling bands by kind of error, in its unit; by default 5% of the largest error of the base
+            experiment's run, which then has to run to its end.
+
+    Raises:
+        InputError: a value of the wrong kind, no factor, or two factors of one name.
+    """
+
+    def __init__(
+        self,
+        base: Experiment,
+        factors: Sequence[Factor],
+        *,
+        samples: int = 1,
+        seed: int = 0,
+        duration: float | None = None,
+        dt: float = 1e-3,
+        engine: str = "compiled",
+        control_period: float | None = None,
+        bands: Mapping[str, float] | None = None,
+    ):
+        self.study = Study(base, factors, seed, duration, dt, engine, control_period, bands)
+        self.samples = count("samples", samples)
+        self._sizes = [len(f.values.values) if isinstance(f.values, Grid) else 1 for f in self.study.factors]
+
+    # -- single runs --------------------------------------------------------------------------------------
+
+    def __len__(self) -> int:
+        """Number of runs."""
+        return self.samples * prod(self._sizes)
+
+    def values(self, run: int) -> dict[str, Value]:
+        """Values of the factors in a run."""
+        names = (factor.name for factor in self.study.factors)
+        return dict(zip(names, self._task(run).values, strict=True))
+
+    def setup(self, run: int) -> Setup:
+        """A run's experiment, and how it is run."""
+        return Job(self.study.base, self.study.factors, {}).setup(self._task(run).values)
+
+    def experiment(self, run: int) -> Experiment:
+        """A run's experiment."""
+        return self.setup(run).experiment
+
+    def simulate(self, run: int) -> Result:
+        """The whole result of a run, made again.
+
+        Raises:
+            SynctrlError: the run stops or is refused.
+        """
+        return self.setup(run).simulate()
+
+    def run_one(self, run: int) -> dict[str, Any]:
+        """A run's row of the table, made again."""
+        job = self.study.job()
+        return dict(zip(job.columns, Runner(job).outcome(self._task(run)).row, strict=True))
+
+    # -- all runs -----------------------------------------------------------------------------------------
+
+    def run(
+        self,
+        folder: str | Path,
+        workers: int = 2,
+        backend: str = "joblib",
+        *,
+        client: Any = None,
+        keep_every: int | None = None,
+        batch: int | None = None,
+        progress: bool = True,
+    ) -> Path:
+        """Make all runs that the folder does not have yet.
+
+        Rows are on the disk as soon as they are there. Whatever ends the sweep, the same call goes on from
+        them.
+
+        Args:
+            folder: where, see `Journal`; made if it does not exist.
+            workers: number of processes (or of workers of a new Dask cluster).
+            backend: "joblib" for processes of this machine, "dask" for a cluster, "serial" for none of both.
+            client: for "dask", a client or the address of a scheduler; by default a cluster of this machine.
+            keep_every: keep the trajectories of every run, each so many-th instant, in `runs/`; by default
+                not.
+            batch: runs per task of a worker; by default as many as take about a second.
+            progress: show a progress bar.
+
+        Returns:
+            The path of the table, `table.csv`.
+
+        Raises:
+            InputError: an unknown backend, or a number of the wrong kind.
+            MissingDependencyError: the backend or the engine cannot be had.
+            ResultError: the folder holds another sweep, is damaged, or cannot be written.
+            SweepError: workers die again and again, or a function of a factor fails.
+        """
+        if keep_every is not None:
+            count("keep_every", keep_every)
+        job = self.study.job(folder, keep_every)
+        about = self.study.about(job, samples=self.samples, runs=len(self), keep_every=keep_every)
+        with Journal(folder, about) as journal:
+            evaluation = Evaluation(job, journal, workers, backend, client, batch)
+            tasks = [self._task(run) for run in range(len(self))]
+            with progress_bar(len(tasks), len(journal.rows), progress) as bar, evaluation.open():
+                for rows in evaluation.run(tasks):
+                    bar.update(len(rows))
+            return journal.finish()
+
+    # -- internals ----------------------------------------------------------------------------------------
+
+    def _task(self, run: int) -> Task:
+        """A run and its values: grid values by its number, drawn ones by its own random numbers."""
+        if isinstance(run, bool) or not isinstance(run, (int, np.integer)) or not 0 <= run < len(self):
+            raise InputError(f"run: expected a number from 0 to {len(self) - 1}, found {run!r}")
+        run = int(run)
+        rng = np.random.default_rng(np.random.SeedSequence(self.study.seed, spawn_key=(run,)))
+        point = np.unravel_index(run // self.samples, self._sizes)
+        values = (
+            factor.values.values[k] if isinstance(factor.values, Grid) else factor.values.draw(rng)  # type: ignore[attr-defined]
+            for factor, k in zip(self.study.factors, point, strict=True)
+        )
+        return Task(run, tuple(values))

@@ -1,0 +1,164 @@
+"""Variations of an experiment: pure functions from an experiment and a value to another experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..robots.parameters import FullParameters, LinearParameters, Parameters
+from ..robots.robot import Robot
+from ..simulation.disturbances import Disturbance
+from ..simulation.simulate import Experiment
+from ..tasks.cell import Cell, Member
+from ..tasks.coupling import Coupling
+
+
+def with_gain(experiment: Experiment, value: float, gain: str) -> Experiment:
+    """Another value for all entries of a gain."""
+    return replace(experiment, gains=experiment.gains.replace(**{gain: value}))
+
+
+def with_scaled_gain(experiment: Experiment, value: float, gain: str) -> Experiment:
+    """All entries of a gain times a number."""
+    return with_gain(experiment, value * getattr(experiment.gains, gain), gain)
+
+
+def with_scaled_bodies(
+    experiment: Experiment, value: float, robot: int | None = None, body: int | None = None
+) -> Experiment:
+    """True inertial parameters of bodies times a number; the controller's initial estimate stays."""
+
+    def change(i: int, member: Member) -> Member:
+        pi = member.robot.inertial_parameters.reshape(-1, 10)
+        pi[_index("body", body, len(pi))] *= value
+        scaled = member.robot.with_parameters(pi.ravel())
+        parameters = same_parameters(experiment.cell.parameters[i], scaled)
+        return replace(member, robot=scaled, parameters=parameters)
+
+    return _with_members(experiment, change, robot)
+
+
+def with_scaled_estimates(experiment: Experiment, value: float, robot: int | None = None) -> Experiment:
+    """Initial estimates theta_hat(0) times a number."""
+    return _with_estimates(experiment, lambda theta, theta_hat0: value * theta_hat0, robot)
+
+
+def with_model_error(experiment: Experiment, value: float, robot: int | None = None) -> Experiment:
+    """Initial estimates theta_hat(0) = (1 + value) theta."""
+    return _with_estimates(experiment, lambda theta, theta_hat0: (1 + value) * theta, robot)
+
+
+def with_moved_start(
+    experiment: Experiment, value: float, quantity: str, robot: int | None = None, joint: int | None = None
+) -> Experiment:
+    """Joint positions "q0" or velocities "v0" at t = 0 plus a number."""
+    cell = experiment.cell
+
+    def change(i: int, member: Member) -> Member:
+        start = getattr(cell, quantity)[i, : member.robot.nv].copy()
+        start[_index("joint", joint, len(start))] += value
+        return replace(member, **{quantity: start})
+
+    return _with_members(experiment, change, robot)
+
+
+def with_scaled_disturbance(experiment: Experiment, value: float, disturbance: int) -> Experiment:
+    """Torque of a disturbance times a number."""
+    return _with_disturbance(experiment, disturbance, lambda d: replace(d, torque=value * d.torque))
+
+
+def with_disturbance_from(experiment: Experiment, value: float, disturbance: int) -> Experiment:
+    """A disturbance that starts at another time and lasts as long as before."""
+
+    def move(d: Disturbance) -> Disturbance:
+        return replace(d, start=value, stop=value + (d.stop - d.start))
+
+    return _with_disturbance(experiment, disturbance, move)
+
+
+def with_scaled_weights(experiment: Experiment, value: float, robot: int | None = None) -> Experiment:
+    """Weights c_i of the coupling times a number."""
+    cell = experiment.cell
+    scale = np.ones((cell.n, 1, 1))
+    scale[_index("robot", robot, cell.n)] = value
+    coupling = scaled_coupling(cell.coupling, cell.m, scale)
+    return replace(experiment, cell=Cell(cell.members, coupling, cell.space, cell.name))
+
+
+def scaled_coupling(coupling: Coupling, m: int, scale: np.ndarray) -> Coupling:
+    """A coupling with its weights times a number for each robot, (n, 1, 1); in space of dimension m."""
+
+    def at(t: float) -> tuple[Any, ...]:
+        return tuple(scale * part[0] for part in coupling.weights(np.array([t]), m)[:3])
+
+    c = at(0.0)[0] if coupling.is_constant else at
+    return Coupling(coupling.robots, coupling.edges, coupling.signs, c, coupling.name, coupling.unit)
+
+
+def same_parameters(parameters: Parameters, robot: Robot) -> Parameters:
+    """Parameters of the same kind for a robot with other true inertial parameters.
+
+    Raises:
+        InputError: a kind whose true values cannot be found out, or one that cannot describe this robot.
+    """
+    if isinstance(parameters, FullParameters):
+        return FullParameters(robot)
+    if isinstance(parameters, LinearParameters):
+        theta = _fit(parameters.matrix, robot)
+        return LinearParameters(robot, parameters.matrix, theta, parameters.names)
+    raise InputError(
+        f"true parameters: expected full or linear parameters, found {type(parameters).__name__} for robot "
+        f"'{robot.name}'; vary them with a function of your own"
+    )
+
+
+def _fit(matrix: np.ndarray, robot: Robot) -> np.ndarray:
+    """theta for which Y B theta is the robot's torque, by least squares over random states."""
+    rng = np.random.default_rng(0)
+    states = rng.uniform(-2, 2, (20, 3, robot.nv))
+    Y = np.concatenate([robot.regressor(q, v, v, a) for q, v, a in states])
+    return np.linalg.lstsq(Y @ matrix, Y @ robot.inertial_parameters, rcond=None)[0]
+
+
+def _with_members(
+    experiment: Experiment, change: Callable[[int, Member], Member], robot: int | None
+) -> Experiment:
+    cell = experiment.cell
+    members = list(cell.members)
+    for i in np.arange(cell.n)[_index("robot", robot, cell.n)]:
+        members[i] = change(int(i), members[i])
+    return replace(experiment, cell=Cell(members, cell.coupling, cell.space, cell.name))
+
+
+def _with_estimates(
+    experiment: Experiment, estimate: Callable[[np.ndarray, np.ndarray], np.ndarray], robot: int | None
+) -> Experiment:
+    cell = experiment.cell
+
+    def change(i: int, member: Member) -> Member:
+        theta = cell.parameters[i].theta
+        return replace(member, theta_hat0=estimate(theta, cell.theta_hat0[i, : len(theta)]))
+
+    return _with_members(experiment, change, robot)
+
+
+def _with_disturbance(
+    experiment: Experiment, index: int, change: Callable[[Disturbance], Disturbance]
+) -> Experiment:
+    disturbances = list(experiment.disturbances)
+    here = _index("disturbance", index, len(disturbances))
+    disturbances[here] = [change(d) for d in disturbances[here]]
+    return replace(experiment, disturbances=disturbances)
+
+
+def _index(what: str, index: int | None, count: int) -> slice:
+    """One of so many, or all of them."""
+    if index is None:
+        return slice(None)
+    if not 0 <= index < count:
+        raise InputError(f"{what}: expected an index from 0 to {count - 1}, found {index}")
+    return slice(index, index + 1)

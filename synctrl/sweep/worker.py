@@ -1,0 +1,144 @@
+"""One process's share of a sweep: single runs, each of which ends as a row."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+from ..errors import SimulationError, SweepError, SynctrlError
+from ..simulation.prepared import Prepared
+from ..simulation.result import LAYOUT, Result
+from .distributions import Value
+from .factors import Factor, Setup
+from .journal import Row
+from .measures import MEASURES, measures
+
+COMPLETED, STOPPED, REFUSED = "completed", "stopped", "refused"
+
+
+class Task(NamedTuple):
+    """A run to be made: its number, and the values of its factors."""
+
+    run: int
+    values: tuple[Value, ...]
+
+
+class Outcome(NamedTuple):
+    """A run that was made: its row and, if it is to be kept, arrays and info of its decimated result."""
+
+    row: Row
+    kept: tuple[dict[str, Any], dict[str, Any]] | None = None
+
+    def result(self) -> Result | None:
+        """The decimated result."""
+        return None if self.kept is None else Result(**self.kept[0], info=self.kept[1])
+
+
+class Job(NamedTuple):
+    """What all runs of a sweep share.
+
+    Attributes:
+        base: what is varied.
+        factors: how.
+        bands: settling bands by kind of error.
+        keep_every: which of the logged instants are kept, or None for no trajectories.
+    """
+
+    base: Setup
+    factors: tuple[Factor, ...]
+    bands: Mapping[str, float]
+    keep_every: int | None = None
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of the entries of a row."""
+        return columns(self.factors)
+
+    def setup(self, values: Sequence[Value]) -> Setup:
+        """The base with all factors applied, in their order."""
+        setup = self.base
+        for factor, value in zip(self.factors, values, strict=True):
+            setup = factor.apply(setup, value)
+        return setup
+
+
+def columns(factors: Sequence[Factor]) -> list[str]:
+    """Names of the entries of a row of a sweep over some factors."""
+    return ["run", *(factor.name for factor in factors), "status", "cause", "stop_time", *MEASURES]
+
+
+class Runner:
+    """Makes the runs of a job in this process.
+
+    Raises:
+        MissingDependencyError, CompilationError: the engine cannot be had, and why.
+        UnreachableError, CouplingError: the base experiment cannot run.
+    """
+
+    def __init__(self, job: Job):
+        self.job = job
+        self._prepared = Prepared(*job.base[:4])
+
+    def outcome(self, task: Task) -> Outcome:
+        """Make a run. One that stops or is refused is a row too, with its cause.
+
+        Raises:
+            SweepError: a function of the user failed.
+        """
+        try:
+            result = self.simulate(task)
+        except SimulationError as error:
+            return self._outcome(task, STOPPED, error, error.result)
+        except SweepError:
+            raise
+        except SynctrlError as error:
+            return self._outcome(task, REFUSED, error, None)
+        return self._outcome(task, COMPLETED, None, result)
+
+    def simulate(self, task: Task) -> Result:
+        """The whole result of a run.
+
+        Raises:
+            SynctrlError: it stops or is refused.
+            SweepError: a function of the user failed.
+        """
+        try:
+            setup = self.job.setup(task.values)
+        except SynctrlError:
+            raise
+        except Exception as error:
+            raise SweepError(
+                f"run {task.run}: a factor's function failed with {type(error).__name__}: {error}"
+            ) from error
+        return self._prepared.simulate(setup.experiment, setup.control_period)
+
+    def _outcome(self, task: Task, status: str, error: SynctrlError | None, result: Result | None) -> Outcome:
+        cause = None if error is None else f"{type(error).__name__}: {error}"
+        time = error.time if isinstance(error, SimulationError) else None
+        values: list[Any] = [None] * len(MEASURES)
+        if status == COMPLETED and result is not None:
+            values = measures(result, self.job.bands)
+        row = [task.run, *task.values, status, cause, None if time is None else float(time), *values]
+        return Outcome(row, self._keep(task, result))
+
+    def _keep(self, task: Task, result: Result | None) -> tuple[dict[str, Any], dict[str, Any]] | None:
+        if self.job.keep_every is None or result is None:
+            return None
+        thin = result.decimated(self.job.keep_every)
+        return {name: getattr(thin, name) for name in LAYOUT}, {**thin.info, "run": task.run}
+
+
+def run_batch(payload: bytes, tasks: Sequence[Task]) -> list[Outcome]:
+    """Make some runs of a pickled job; what a worker process is asked to do."""
+    runner = _runner(payload, threading.get_ident())
+    return [runner.outcome(task) for task in tasks]
+
+
+@lru_cache(maxsize=8)
+def _runner(payload: bytes, thread: int) -> Runner:
+    """The runner of a job, made once per thread: robots must not be shared between threads."""
+    import pickle
+
+    return Runner(pickle.loads(payload))

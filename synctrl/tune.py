@@ -1,0 +1,210 @@
+"""Tune: values of factors, such as gains, that make a measure as small as possible under a torque limit."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .checks import choice, instance, positive_number
+from .control.gains import Gains
+from .errors import InputError, SweepError
+from .simulation.simulate import Experiment
+from .sweep.distributions import LogUniform, Uniform
+from .sweep.evaluation import Evaluation, count, progress_bar
+from .sweep.factors import Factor, gain
+from .sweep.journal import Journal
+from .sweep.measures import MEASURES
+from .sweep.study import Study
+from .sweep.worker import COMPLETED, Job, Task, columns
+
+Range = Uniform | LogUniform
+
+
+@dataclass(frozen=True, eq=False)
+class Tuned:
+    """What tuning has found.
+
+    Attributes:
+        values: the best value of each factor.
+        experiment: the experiment with them.
+        measures: the measures of its run, under the names of a sweep's table.
+        history: every run that was made, in order, as a row of a sweep's table.
+    """
+
+    values: dict[str, float]
+    experiment: Experiment
+    measures: dict[str, float | None]
+    history: list[dict[str, Any]]
+
+    @property
+    def gains(self) -> Gains:
+        """The gains of the best run."""
+        return self.experiment.gains
+
+
+def tune(
+    experiment: Experiment,
+    search: Mapping[str, Range] | Sequence[Factor],
+    *,
+    minimize: str = "sync_rms",
+    torque_limit: float | None = None,
+    generations: int = 20,
+    population: int = 24,
+    seed: int = 0,
+    duration: float | None = None,
+    dt: float = 1e-3,
+    engine: str = "compiled",
+    control_period: float | None = None,
+    bands: Mapping[str, float] | None = None,
+    folder: str | Path | None = None,
+    workers: int = 2,
+    backend: str = "joblib",
+    client: Any = None,
+    progress: bool = True,
+) -> Tuned:
+    """Search by differential evolution, a generation of runs at a time.
+
+    A run that exceeds the torque limit counts as worse than every run that does not, and one that stops as
+    worse still; among them the smaller excess and the later end are better. The same seed gives the same
+    search, whatever the number of workers.
+
+    Args:
+        experiment: where to start: everything that is not searched stays as it is.
+        search: ranges of gains by name, `{"beta": LogUniform(1, 1000)}`, or factors of a sweep; each with
+            `Uniform` or `LogUniform` values.
+        minimize: one of the measures of a sweep's table.
+        torque_limit: largest |tau| allowed on any joint, N·m.
+        generations: how often the population is renewed.
+        population: runs per generation, at least 5.
+        seed: whole number from 0.
+        duration, dt, engine, control_period, bands: see `Sweep`.
+        folder: write every run there, and read runs made there before instead of making them again.
+        workers, backend, client, progress: see `Sweep.run`.
+
+    Raises:
+        InputError: a value of the wrong kind.
+        SweepError: no run stayed below the torque limit and ran to its end.
+    """
+    study = Study(experiment, _factors(search), seed, duration, dt, engine, control_period, bands)
+    finder = _Search(study, minimize, torque_limit, population)
+    job = study.job(folder)
+    with contextlib.ExitStack() as stack:
+        journal = None if folder is None else stack.enter_context(Journal(folder, finder.about(job)))
+        evaluation = Evaluation(job, journal, workers, backend, client)
+        stack.enter_context(evaluation.open())
+        runs = population * (1 + count("generations", generations))
+        bar = stack.enter_context(progress_bar(runs, 0, progress))
+        finder.run(generations, evaluation, bar)
+        if journal is not None:
+            journal.finish()
+    return finder.best()
+
+
+class _Search:
+    """Differential evolution over the unit cube, whose edges are the ranges of the factors."""
+
+    def __init__(self, study: Study, minimize: str, torque_limit: float | None, population: int):
+        self.study, self.minimize = study, choice("minimize", minimize, MEASURES)
+        self.limit = np.inf if torque_limit is None else positive_number("torque_limit", torque_limit)
+        self.population = count("population", population, least=5)
+        self.columns = columns(study.factors)
+        self.history: list[dict[str, Any]] = []
+
+    def about(self, job: Job) -> dict[str, Any]:
+        """What the search is, but not how long: it can go on for more generations."""
+        limit = self.limit if np.isfinite(self.limit) else None
+        more = {"minimize": self.minimize, "torque_limit": limit, "population": self.population}
+        return self.study.about(job, search=more)
+
+    def run(self, generations: int, evaluation: Evaluation, bar: Any) -> None:
+        """Make the runs of the first population and of all further ones."""
+        from scipy.optimize import differential_evolution
+
+        def costs(shares: np.ndarray) -> np.ndarray:
+            rows = self._generation(shares.T, evaluation, bar)
+            return np.array([self.cost(row) for row in rows])
+
+        rng = np.random.default_rng(self.study.seed)
+        differential_evolution(
+            costs,
+            [(0.0, 1.0)] * len(self.study.factors),
+            init=_spread(rng, self.population, len(self.study.factors)),
+            maxiter=generations,
+            tol=0,
+            polish=False,
+            updating="deferred",
+            vectorized=True,
+            rng=rng,
+        )
+
+    def cost(self, row: Mapping[str, Any]) -> float:
+        """What is compared: up to 1 within the torque limit, from there to 2 outside, to 3 if the run stops.
+
+        Differential evolution only asks which of two is smaller, so that any increasing function will do.
+        """
+        value, torque = row[self.minimize], row["peak_torque"]
+        if row["status"] != COMPLETED or value is None or torque is None:
+            return 3 - (row["stop_time"] or 0.0) / self.study.base.duration
+        if torque > self.limit:
+            return 2 - self.limit / torque
+        return value / (1 + value)
+
+    def best(self) -> Tuned:
+        """The best run of all.
+
+        Raises:
+            SweepError: none was within the limit and ran to its end.
+        """
+        best = min(self.history, key=self.cost)
+        if self.cost(best) >= 1:
+            torques = [row["peak_torque"] for row in self.history if row["peak_torque"] is not None]
+            least = f"the smallest peak torque was {min(torques):.4g} N·m" if torques else "all runs stopped"
+            raise SweepError(
+                f"tune: none of {len(self.history)} runs stayed within a torque of {self.limit:g} N·m to its "
+                f"end; {least}; search other ranges, or allow more torque"
+            )
+        values = {factor.name: best[factor.name] for factor in self.study.factors}
+        experiment = self.study.base.experiment
+        for factor in self.study.factors:
+            experiment = factor.change(experiment, values[factor.name])
+        return Tuned(values, experiment, {name: best[name] for name in MEASURES}, self.history)
+
+    def _generation(self, shares: np.ndarray, evaluation: Evaluation, bar: Any) -> list[dict[str, Any]]:
+        tasks = [
+            Task(
+                len(self.history) + k,
+                tuple(self._value(f, s) for f, s in zip(self.study.factors, share, strict=True)),
+            )
+            for k, share in enumerate(shares)
+        ]
+        for _ in evaluation.run(tasks):
+            pass
+        bar.update(len(tasks))
+        rows = [dict(zip(self.columns, evaluation.rows[task.run], strict=True)) for task in tasks]
+        self.history += rows
+        return rows
+
+    @staticmethod
+    def _value(factor: Factor, share: float) -> float:
+        return factor.values.at(float(share))  # type: ignore[attr-defined]
+
+
+def _factors(search: Mapping[str, Range] | Sequence[Factor]) -> list[Factor]:
+    factors = [gain(*pair) for pair in search.items()] if isinstance(search, Mapping) else list(search)
+    for factor in factors:
+        instance("search", factor, Factor, "ranges of gains by name, or Factor objects")
+        instance(f"search, {factor.name}", factor.values, (Uniform, LogUniform), "Uniform or LogUniform")
+        if type(factor) is not Factor:
+            raise InputError(f"search: '{factor.name}' belongs to the run and cannot be searched")
+    return factors
+
+
+def _spread(rng: np.random.Generator, count: int, dimensions: int) -> np.ndarray:
+    """Points of a Latin hypercube, (count, dimensions): every axis is covered evenly."""
+    columns = [rng.permutation(count) for _ in range(dimensions)]
+    return (np.stack(columns, axis=1) + rng.random((count, dimensions))) / count
