@@ -13,7 +13,7 @@ from typing import Any, Self
 import numpy as np
 
 from ..checks import instance
-from ..errors import ResultError
+from ..errors import InputError, ResultError
 
 FORMAT = "synctrl result 1"
 
@@ -95,6 +95,20 @@ class Result:
         """Unit of one of the arrays."""
         kind = LAYOUT[array][1]
         return kind.replace("task", self.info["task_unit"]).replace("weighted", self.info["weighted_unit"])
+
+    def decimated(self, every: int) -> Self:
+        """The first of every so many logged instants, and the last; `info["decimated"]` says how many.
+
+        Raises:
+            InputError: no whole number above 0.
+        """
+        instance("every", every, (int, np.integer), "a whole number")
+        if isinstance(every, bool) or every < 1:
+            raise InputError(f"every: expected a whole number above 0, found {every!r}")
+        last = max(len(self.t) - 1, 0)
+        kept = np.union1d(np.arange(0, last, every), [last] if len(self.t) else []).astype(int)
+        arrays = {name: getattr(self, name)[kept] for name in LAYOUT}
+        return type(self)(**arrays, info={**self.info, "decimated": int(every)}, experiment=self.experiment)
 
     def save(self, path: str | Path) -> Path:
         """Write everything to an .npz file; it appears under its name only once it is complete.
