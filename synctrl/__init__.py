@@ -4,6 +4,7 @@ from .control.controller import Controller
 from .control.gains import Gains
 from .errors import SynctrlError
 from .robots.friction import Friction
+from .robots.friction_parameters import FrictionParameters
 from .robots.parameters import FullParameters, LinearParameters
 from .robots.robot import Robot, load_robot
 from .simulation.disturbances import Disturbance
@@ -34,6 +35,7 @@ __all__ = [
     "Experiment",
     "ExponentialApproach",
     "Friction",
+    "FrictionParameters",
     "FullParameters",
     "FunctionOrientation",
     "FunctionTrajectory",

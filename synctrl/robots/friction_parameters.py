@@ -1,0 +1,73 @@
+"""Friction and rotors among the parameters that the controller adapts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError
+from .friction import Friction
+from .parameters import FullParameters, Parameters
+from .robot import Robot
+
+
+class FrictionParameters:
+    """Parameters of the rigid bodies, and per joint a viscous, a Coulomb and, on request, a rotor's one.
+
+    Y theta = Y_b theta_b + F_v v_ref + F_c tanh(v / smoothing) + I_a a_ref, with diagonal F_v, F_c and I_a.
+
+    The proof keeps: M contains I_a, the plant is M v' + C v + g + F_v v + F_c tanh(v / smoothing) = tau,
+    so that for s = v_ref - v
+
+        M s' + C s = Y theta - F_v s - tau.
+
+    The viscous column is taken at v_ref because v = v_ref - s then leaves -F_v s, which adds -s^T F_v s <= 0
+    to V'. The Coulomb column is taken at v: it cancels the plant's, and nothing of it is left in V'. A rotor
+    turns with its joint alone, so that I_a is constant and has no share in C. V' is then what it is without
+    friction, less s^T F_v s; V itself has the errors of the friction coefficients among the others.
+
+    Args:
+        robot: the robot.
+        friction: true friction of its joints.
+        base: parameters of the rigid bodies; by default all of them.
+        armature: whether the rotors are adapted too.
+
+    Attributes:
+        base: parameters of the rigid bodies.
+        smoothing: velocity at which the Coulomb column reaches tanh(1), rad/s.
+        armature: whether the rotors are adapted too.
+
+    Raises:
+        InputError: coefficients that do not fit the robot, or parameters of another kind that have friction.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        friction: Friction,
+        base: Parameters | None = None,
+        armature: bool = False,
+    ):
+        if isinstance(base, FrictionParameters):
+            raise InputError("base: expected parameters of the rigid bodies, found some with friction")
+        self.base = FullParameters(robot) if base is None else base
+        self.smoothing, self.armature = friction.smoothing, bool(armature)
+        viscous, coulomb = (_spread(robot, name, getattr(friction, name)) for name in ("viscous", "coulomb"))
+        kinds = {"viscous": viscous, "coulomb": coulomb, **({"armature": robot.armature} if armature else {})}
+        self.theta = np.concatenate([self.base.theta, *kinds.values()])
+        self.names = (
+            *self.base.names,
+            *(f"{joint}.{kind}" for kind in kinds for joint in robot.joint_names),
+        )
+
+    def regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
+        """[Y_b, diag(v_ref), diag(tanh(v / smoothing)), diag(a_ref)], (nv, P)."""
+        columns = [np.diag(v_ref), np.diag(np.tanh(v / self.smoothing))]
+        if self.armature:
+            columns.append(np.diag(a_ref))
+        return np.concatenate([self.base.regressor(q, v, v_ref, a_ref), *columns], axis=1)
+
+
+def _spread(robot: Robot, name: str, value: np.ndarray) -> np.ndarray:
+    if value.shape not in ((), (1,), (robot.nv,)):
+        raise InputError(f"friction, {name}: expected a number or shape ({robot.nv},), found {value.shape}")
+    return np.broadcast_to(value, (robot.nv,)).copy()
