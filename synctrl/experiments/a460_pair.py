@@ -8,10 +8,13 @@ travel.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..control.gains import Gains
 from ..robots.friction import Friction
+from ..robots.friction_parameters import FrictionParameters
 from ..robots.robot import Robot, load_robot
 from ..simulation.simulate import Experiment
 from ..tasks.cell import Cell, Member
@@ -26,6 +29,8 @@ BASES = (((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), ((0.026, 1.334, -0.020), (0.0, 0.0,
 GAINS = Gains(Lambda=8.0, beta=8.0, K_r=(80.0, 80.0, 100.0), K_eps=10.0, Gamma=0.3)
 #: share of the true parameters that the controller starts with
 KNOWN = 0.7
+#: adaptation gain of friction coefficients, which have other units than masses and inertias; our choice
+GAMMA_FRICTION = 100.0
 #: synthetic; the controller does not know it
 FRICTION = Friction(viscous=(5.0, 6.0, 4.0), coulomb=(4.0, 6.0, 4.0), smoothing=0.01)
 
@@ -36,6 +41,7 @@ def a460_pair(
     gains: Gains | None = None,
     reference_acceleration: str = "exact",
     k_r_space: str = "joint",
+    adapt_friction: bool = False,
 ) -> Experiment:
     """The two-arm cell of section V-A, in joint space with epsilon = e_1 - e_2, eq. (45).
 
@@ -44,10 +50,13 @@ def a460_pair(
         friction: whether the plant has friction, which is outside the controller's model.
         gains: by default the paper's.
         reference_acceleration, k_r_space: see `Controller`.
+        adapt_friction: whether the controller's model has friction too, see `FrictionParameters`.
     """
     robot = load_robot("a460")
     members = [_member(robot, i, FRICTION if friction else Friction()) for i in range(2)]
-    gains = GAINS if gains is None else gains
+    if adapt_friction:
+        members = [_knowing_friction(member) for member in members]
+    gains = _gains(adapt_friction) if gains is None else gains
     kind = "synchronized" if synchronized else "independent"
     return Experiment(
         Cell(members, Coupling.pair(c=(1.0, -1.0)), JointSpace(), name="A460 pair"),
@@ -56,7 +65,8 @@ def a460_pair(
         (),
         reference_acceleration,
         k_r_space,
-        title=f"A460 pair, {kind}{'' if friction else ', without friction'}",
+        title=f"A460 pair, {kind}{'' if friction else ', without friction'}"
+        f"{', friction adapted' if adapt_friction else ''}",
     )
 
 
@@ -68,3 +78,15 @@ def _member(robot: Robot, i: int, friction: Friction) -> Member:
         theta_hat0=KNOWN * placed.inertial_parameters,
         friction=friction,
     )
+
+
+def _knowing_friction(member: Member) -> Member:
+    """The member with friction among what it adapts."""
+    parameters = FrictionParameters(member.robot, member.friction)
+    return replace(member, parameters=parameters, theta_hat0=KNOWN * parameters.theta)
+
+
+def _gains(adapt_friction: bool) -> Gains:
+    if not adapt_friction:
+        return GAINS
+    return replace(GAINS, Gamma=np.repeat([float(GAINS.Gamma), GAMMA_FRICTION], [30, 6]))

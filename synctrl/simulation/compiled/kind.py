@@ -21,6 +21,8 @@ class Kind:
         matrix: map from theta to inertial parameters, (10 bodies, P), or None for all of them.
         base_rotation: rotation of the first joint's placement if all robots share it, else None.
         reference_acceleration, k_r_space: options of the controller.
+        smoothing: velocity at which adapted Coulomb friction reaches tanh(1), or None without it.
+        rotors: whether rotors are adapted too.
     """
 
     fixed: Mechanism
@@ -31,6 +33,8 @@ class Kind:
     gravity: tuple[float, float, float]
     reference_acceleration: str
     k_r_space: str
+    smoothing: float | None = None
+    rotors: bool = False
 
     @property
     def nv(self) -> int:
@@ -45,6 +49,12 @@ class Kind:
     @property
     def parameters(self) -> int:
         """Number of adapted parameters."""
+        rub = 0 if self.smoothing is None else (2 + self.rotors) * self.nv
+        return self.rigid_parameters + rub
+
+    @property
+    def rigid_parameters(self) -> int:
+        """Number of adapted parameters of the rigid bodies; they come first."""
         return 10 * self.nv if self.matrix is None else self.matrix.shape[1]
 
     @property
@@ -57,4 +67,5 @@ class Kind:
         shared = None if self.base_rotation is None else self.base_rotation.tolist()
         matrix = None if self.matrix is None else self.matrix.tolist()
         options = [self.reference_acceleration, self.k_r_space, list(self.gravity)]
+        options += [self.smoothing, self.rotors]
         return [self.fixed.key(), self.space, list(self.rows), matrix, shared, options]

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...control.controller import Controller
 from ...errors import CompilationError, InputError
+from ...robots.friction_parameters import FrictionParameters
 from ...robots.mechanism import Mechanism, mechanism
 from ...robots.parameters import FullParameters, LinearParameters
 from ...tasks.cell import Reference
@@ -52,9 +53,10 @@ def classify(controller: Controller) -> tuple[list[Kind], list[int], list[Any]]:
 
 def _kind(controller: Controller, i: int, fixed: Mechanism, rotation: np.ndarray | None) -> Kind:
     cell, parameters = controller.cell, controller.cell.parameters[i]
-    if not isinstance(parameters, (FullParameters, LinearParameters)):
+    rigid = parameters.base if isinstance(parameters, FrictionParameters) else parameters
+    if not isinstance(rigid, (FullParameters, LinearParameters)):
         raise InputError(
-            f"engine='compiled' knows full and linear parameters, found {type(parameters).__name__} for "
+            f"engine='compiled' knows full and linear parameters, found {type(rigid).__name__} for "
             f"{cell.names[i]}; use engine='pinocchio'"
         )
     gravity = cell.robots[i].gravity_vector
@@ -63,11 +65,13 @@ def _kind(controller: Controller, i: int, fixed: Mechanism, rotation: np.ndarray
         fixed,
         space,
         rows,
-        getattr(parameters, "matrix", None),
+        getattr(rigid, "matrix", None),
         rotation,
         (float(gravity[0]), float(gravity[1]), float(gravity[2])),
         controller.reference_acceleration,
         controller.k_r_space,
+        getattr(parameters, "smoothing", None),
+        getattr(parameters, "armature", False),
     )
 
 

@@ -177,10 +177,15 @@ class Trace:
     ) -> tuple[np.ndarray, Any]:
         """Y theta_hat, and Gamma Y^T s_q as the derivative of s_q^T Y theta_hat with respect to theta_hat."""
         ca, kind = self.ca, self.kind
-        pi = theta_hat if kind.matrix is None else ca.mtimes(ca.SX(kind.matrix), theta_hat)
+        rigid = theta_hat[: kind.rigid_parameters]
+        pi = rigid if kind.matrix is None else ca.mtimes(ca.SX(kind.matrix), rigid)
         v_ref, a_ref, s_q = (self._back(part) for part in (v_ref, a_ref, s_q))
         symbols = Symbols(kind.fixed, self.q, self.sine, self.cosine)
         torque = symbols.torque(pi, self.v, v_ref, a_ref, self._gravity())
+        if kind.smoothing is not None:
+            columns = [v_ref, ca.tanh(self.v / kind.smoothing), *([a_ref] if kind.rotors else [])]
+            rubbing = theta_hat[kind.rigid_parameters :]
+            torque += sum(rubbing[k * kind.nv : (k + 1) * kind.nv] * c for k, c in enumerate(columns))
         return self._array(torque, kind.nv), Gamma * ca.jtimes(torque, theta_hat, s_q, True)
 
     # -- the plant ----------------------------------------------------------------------------------------
