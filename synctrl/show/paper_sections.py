@@ -35,9 +35,9 @@ def introduction() -> Section:
                 (
                     "Sun and Mills, “Adaptive Synchronized Control for Coordination of Multirobot Assembly "
                     "Tasks” (2002), computed again: every robot tracks its own path with an adaptive law and "
-                    "couples its error with its neighbours', so that tracking and synchronization errors both "
-                    "go to zero. Independent control, the paper's comparison, is the same controller with "
-                    "β = K_ε = 0.",
+                    "couples its error with its neighbours', so that tracking and synchronization errors "
+                    "both go to zero. Independent control, the paper's comparison, is the same controller "
+                    "with β = K_ε = 0.",
                 )
             ),
             Text((LAW,), "formula"),
@@ -156,29 +156,19 @@ def metrics_table(ours: Result, theirs: Result) -> Table:
                 at = (k, axis)
                 rows.append(
                     (
-                        f"{symbol}, {name}, {label}, {unit}",
+                        f"{symbol} {name}, {label}, {unit}",
                         *_both(factor * a.peak[at], factor * b.peak[at]),
                         *_both(factor * a.rms[at], factor * b.rms[at]),
-                        *_both(factor**2 * a.ise[at], factor**2 * b.ise[at]),
+                        *_both(factor**2 * a.ise[at], factor**2 * b.ise[at], ratio=False),
                         *_both(a.settling_time[at], b.settling_time[at], ratio=False),
                         *_both(factor * a.final[at], factor * b.final[at], ratio=False),
                     )
                 )
-    head = (
-        "",
-        "peak sync.",
-        "indep.",
-        "ratio",
-        "RMS sync.",
-        "indep.",
-        "ratio",
-        "ISE sync.",
-        "indep.",
-        "ratio",
-    )
-    head += ("settling s, sync.", "indep.", "final sync.", "indep.")
+    compared = ("sync.", "indep.", "ratio")
+    head = ("", *(f"{name} {part}" for name in ("peak", "RMS") for part in compared))
+    head = (*head, *(f"{name} {part}" for name in ("ISE", "settling, s,", "final") for part in compared[:2]))
     caption = (
-        f"{ours.info['title']} against {theirs.info['title']}. ISE in the square of the row's unit times s. "
+        f"{ours.info['title']} (sync.) against {theirs.info['title']} (indep.). ISE in the square of the row's unit times s. "
         f"Settling: from when the error stays within 5 % of the largest error of both runs; – if it does not "
         f"within {ours.t[-1]:g} s. Ratio: independent / synchronized."
     )

@@ -56,7 +56,8 @@ def style() -> Iterator[None]:
     """This package's look, for the figures made inside; what was set before comes back after."""
     from matplotlib import rc_context, rcParamsDefault
 
-    with rc_context({k: v for k, v in rcParamsDefault.items() if k != "backend"}), rc_context(_STYLE):
+    plain: Any = {k: v for k, v in rcParamsDefault.items() if k != "backend"}
+    with rc_context(plain), rc_context(_STYLE):
         yield
 
 
@@ -199,7 +200,8 @@ def _axis_handles(result: Result) -> list[Any]:
 
 
 def _legend(figure: Figure, handles: Sequence[Any]) -> None:
-    figure.legend(handles=list(handles), loc="outside upper right", ncols=min(len(handles), 6), handlelength=2.4)
+    columns = min(len(handles), 6)
+    figure.legend(handles=list(handles), loc="outside upper right", ncols=columns, handlelength=2.4)
 
 
 def _mark_disturbances(panel: Axes, result: Result) -> None:

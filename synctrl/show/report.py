@@ -85,9 +85,9 @@ class Table:
                 raise InputError(f"table: expected rows of {len(self.head)} cells, found {list(row)}")
         head = "".join(f"<th scope='col'>{escape(cell)}</th>" for cell in self.head)
         body = "".join(_table_row(row) for row in self.rows)
-        caption = f"<caption>{escape(self.caption)}</caption>" if self.caption else ""
-        table = f"<table>{caption}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-        return f'<div class="wide">{table}</div>'
+        caption = f'<p class="caption">{escape(self.caption)}</p>' if self.caption else ""
+        table = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+        return f'{caption}<div class="wide">{table}</div>'
 
 
 @dataclass(frozen=True)
