@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..checks import instance
 from ..control.gains import Gains
 from ..robots.friction import Friction
 from ..robots.friction_parameters import FrictionParameters

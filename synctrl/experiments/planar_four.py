@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..checks import choice, finite_number
+from ..checks import choice, finite_number, instance
 from ..control.gains import Gains
 from ..errors import InputError
 from ..robots.parameters import planar_two_link_parameters, theta_50
@@ -67,6 +67,7 @@ def planar_four(
     members = [_member(arm, i, phi, RADII[radii][i]) for i in range(4)]
     coupling = Coupling.ring(4, c=(R + D, -R, R, -(R + D)), unit="m")
     gains = GAINS if gains is None else gains
+    instance("gains", gains, Gains, "Gains")
     return Experiment(
         Cell(members, coupling, CartesianSpace("xy"), name="four planar arms"),
         gains if synchronized else gains.independent(),
