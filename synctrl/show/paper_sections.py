@@ -168,7 +168,8 @@ def metrics_table(ours: Result, theirs: Result) -> Table:
     head = ("", *(f"{name} {part}" for name in ("peak", "RMS") for part in compared))
     head = (*head, *(f"{name} {part}" for name in ("ISE", "settling, s,", "final") for part in compared[:2]))
     caption = (
-        f"{ours.info['title']} (sync.) against {theirs.info['title']} (indep.). ISE in the square of the row's unit times s. "
+        f"{ours.info['title']} (sync.) against {theirs.info['title']} (indep.). ISE in the square of "
+        "the row's unit times s. "
         f"Settling: from when the error stays within 5 % of the largest error of both runs; – if it does not "
         f"within {ours.t[-1]:g} s. Ratio: independent / synchronized."
     )

@@ -216,6 +216,7 @@ def _mark_disturbances(panel: Axes, result: Result) -> None:
             va="top",
             fontsize=8,
             color=ACCENT,
+            bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1},
         )
 
 
