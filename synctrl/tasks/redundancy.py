@@ -26,7 +26,8 @@ class Redundancy:
 
     The pseudo-inverse is J# = W^-1 J^T (J W^-1 J^T)^-1, and the preferred joint velocity
     zeta = gain (posture - q) acts in the null space of J: v_ref = J# xref' + (1 - J# J) zeta. Robots with as
-    many joints as task coordinates have no null space; nothing here has an effect on them.
+    many joints as task coordinates have no null space; nothing here has an effect on them. Damping that acts
+    in task space (`k_r_space="task"`) leaves motion in the null space undamped: prefer joint space.
 
     Args:
         posture: preferred joint positions, (nv,) for every robot, or a list with one (nv,) per robot, rad; by
