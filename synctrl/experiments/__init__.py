@@ -1,5 +1,6 @@
 """Ready cells: the paper's two, and its examples 1 to 3."""
 
+from .a460_full import a460_full_pair
 from .a460_pair import a460_pair
 from .mixed_four import mixed_four
 from .mobile_robot import mobile_robot
@@ -10,6 +11,7 @@ from .rigid_object import rigid_object
 from .ur5_payload import ur5_payload
 
 __all__ = [
+    "a460_full_pair",
     "a460_pair",
     "mixed_four",
     "mobile_robot",

@@ -59,8 +59,6 @@ class Plant:
 
     #: state of its own at t = 0, for instance of joints the controller does not know
     hidden0 = np.zeros(0)
-    _stages: list[Plant]
-    _arms: list[tuple[int, int, Dynamics]]
 
     def __init__(
         self,
@@ -73,17 +71,21 @@ class Plant:
     ):
         self.cell, self.physics = cell, physics
         self.payloads, self.saturate = tuple(payloads), saturate
-        self.robots = tuple(cell.robots if robots is None else robots)
-        self.schedule = PayloadSchedule(self.robots, self.payloads)
+        self.schedule = PayloadSchedule(cell.robots if robots is None else robots, self.payloads)
+        self.robots = self.schedule.robots[0]
         self._set_friction()
         self.torque_limits = torque_limits(cell) if saturate else np.full((cell.n, cell.nv), np.inf)
-        self._make_stages()
+        self._arms = self._dynamics(0)
+        self._stages: dict[int, Plant] = {0: self}
 
     # -- what happens -------------------------------------------------------------------------------------
 
     def at(self, t: float) -> Plant:
         """The plant as it is at time t: with the payloads carried then; at an edge from the right."""
-        return self._stages[int(self.schedule.windows(np.array(t)))]
+        window = int(self.schedule.windows(np.array(t)))
+        if window not in self._stages:
+            self._stages[window] = self._stage(window)
+        return self._stages[window]
 
     def applied(self, tau: np.ndarray) -> np.ndarray:
         """What reaches the joints of torques tau that the controller commands, (..., n, nv), N·m."""
@@ -93,8 +95,8 @@ class Plant:
         """v', (n, nv), under joint torques tau, (n, nv), and friction."""
         tau = tau - self.friction(v)
         v_dot = np.zeros(tau.shape)
-        for i, nv, dynamics in self._arms:
-            v_dot[i, :nv] = dynamics(q[i, :nv], v[i, :nv], tau[i, :nv])
+        for dynamics, *of_robot, accelerated in zip(self._arms, *map(self._rows, (q, v, tau, v_dot)), strict=True):
+            accelerated[...] = dynamics(*of_robot)
         return v_dot
 
     def move(
@@ -120,15 +122,16 @@ class Plant:
             self.smoothing[i] = member.friction.smoothing
         self.friction = self._friction if self.viscous.any() or self.coulomb.any() else _frictionless
 
-    def _make_stages(self) -> None:
-        """One plant per window of the schedule: this one, and copies of it with other loads."""
-        stages = [self, *(copy(self) for _ in self.schedule.edges)]
+    def _dynamics(self, window: int) -> list[tuple[int, int, Dynamics]]:
+        """Index, number of joints and dynamics of every robot in a window of the schedule."""
         make = PHYSICS[self.physics]
-        known: dict[int, Dynamics] = {}
-        for stage, robots in zip(stages, self.schedule.robots, strict=True):
-            known.update({id(robot): make(robot) for robot in robots if id(robot) not in known})
-            stage.robots, stage._stages = robots, stages
-            stage._arms = [(i, robot.nv, known[id(robot)]) for i, robot in enumerate(robots)]
+        return [(i, robot.nv, make(robot)) for i, robot in enumerate(self.schedule.robots[window])]
+
+    def _stage(self, window: int) -> Plant:
+        """A copy with the loads of another window."""
+        stage = copy(self)
+        stage.robots, stage._arms = self.schedule.robots[window], self._dynamics(window)
+        return stage
 
     def _friction(self, v: np.ndarray) -> np.ndarray:
         return self.viscous * v + self.coulomb * np.tanh(v / self.smoothing)

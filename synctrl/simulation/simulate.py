@@ -59,7 +59,7 @@ class Experiment:
     title: str | None = None
     payloads: Sequence[Payload] = ()
     saturate: bool = False
-    plant_type: type[Plant] = Plant
+    plant_type: Callable[..., Plant] = Plant
 
     def __post_init__(self) -> None:
         instance("cell", self.cell, Cell, "a Cell")
@@ -116,6 +116,8 @@ class Experiment:
         """
         choice("integrator", integrator, ("rk4", *ADAPTIVE))
         choice("engine", engine, ("pinocchio", "compiled"))
+        if progress is not None and not callable(progress):
+            raise InputError(f"progress: expected a function of the time reached, found {progress!r}")
         choice("plant", plant, tuple(PHYSICS))
         tolerances = positive_number("rtol", rtol), positive_number("atol", atol)
         run = self.plan(duration, dt, control_period, plant)

@@ -66,6 +66,6 @@ class Kind:
         """Plain data that is equal for robots of one kind."""
         shared = None if self.base_rotation is None else self.base_rotation.tolist()
         matrix = None if self.matrix is None else self.matrix.tolist()
-        options = [self.reference_acceleration, self.k_r_space, list(self.gravity)]
+        options: list[Any] = [self.reference_acceleration, self.k_r_space, list(self.gravity)]
         options += [self.smoothing, self.rotors]
         return [self.fixed.key(), self.space, list(self.rows), matrix, shared, options]

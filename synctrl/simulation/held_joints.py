@@ -1,0 +1,138 @@
+"""A plant with more joints than the controller knows: the others are held by controllers of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..checks import finite_array
+from ..errors import InputError
+from ..robots.limits import joint_limits
+from ..robots.robot import Robot
+from ..tasks.cell import Cell
+from .plant import Plant
+
+
+@dataclass(frozen=True, eq=False)
+class Pid:
+    """Controllers that hold joints where they are at t = 0: tau = P d - D v + I int d, d = q(0) - q.
+
+    Args:
+        P, I, D: gains, numbers or one per joint, N·m/rad, N·m/(rad s) and N·m·s/rad.
+
+    Raises:
+        InputError: not finite, or negative.
+    """
+
+    P: Any
+    I: Any
+    D: Any
+
+    def __post_init__(self) -> None:
+        for name in "PID":
+            gain = finite_array(name, getattr(self, name))
+            if gain.size and gain.min() < 0:
+                raise InputError(f"{name}: expected gains of at least 0, found {gain.min():g}")
+            object.__setattr__(self, name, gain)
+
+
+class HeldJointsPlant(Plant):
+    """Robots of which the controller commands some joints, while PID controllers hold the others.
+
+    Its own state has, for every robot, positions, velocities and the integral of d of its held joints,
+    (n, 3, held joints). The integral starts where it carries the weight of what the joints hold.
+
+    Args:
+        cell: what the controller knows: robots of which every joint is, by name, one of the real robot's.
+        robots: what really stands there, one per robot of the cell, all with the same number of held joints.
+        pid: their controllers.
+        at: where the joints are held, number or one per joint, rad.
+        options: of `Plant`.
+
+    Raises:
+        InputError: robots that do not fit those of the cell.
+    """
+
+    def __init__(self, cell: Cell, *, robots: Sequence[Robot], pid: Pid, at: ArrayLike = 0.0, **options: Any):
+        if len(robots) != cell.n:
+            raise InputError(f"robots: expected {cell.n}, one per robot of the cell, found {len(robots)}")
+        super().__init__(cell, robots=robots, **options)
+        self.pid = pid
+        split = [_split(known, real) for known, real in zip(cell.robots, robots, strict=True)]
+        self._known, self._held = ([part[k] for part in split] for k in range(2))
+        self._count = len(self._held[0])
+        if any(len(held) != self._count for held in self._held):
+            raise InputError("robots: expected the same number of held joints for all of them")
+        self.at_rest = np.broadcast_to(finite_array("at", at), (self._count,))
+        limits = [joint_limits(robot).torque[held] for robot, held in zip(robots, self._held, strict=True)]
+        self._held_limits = np.array(limits) if self.saturate else np.full((cell.n, self._count), np.inf)
+        self.hidden0 = self._start()
+
+    def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
+        """v', (n, nv), with the held joints as they are at t = 0."""
+        return self.move(q, v, tau, self.hidden0)[0]
+
+    def move(
+        self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, hidden: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        if hidden.size != self.hidden0.size:
+            raise InputError(
+                f"state: expected {self.hidden0.size} numbers of the held joints, found {hidden.size}"
+            )
+        rows = hidden.reshape(-1, 3, self._count)
+        held_tau = np.clip(self._torque(rows), -self._held_limits, self._held_limits)
+        tau = tau - self.friction(v)
+        v_dot, hidden_dot = np.zeros(v.shape), np.empty(rows.shape)
+        for i, nv, dynamics in self._arms:
+            known, held = self._known[i], self._held[i]
+            state = np.empty((3, nv))
+            state[:, known] = q[i, : len(known)], v[i, : len(known)], tau[i, : len(known)]
+            state[:, held] = rows[i, 0], rows[i, 1], held_tau[i]
+            a = dynamics(*state)
+            v_dot[i, : len(known)] = a[known]
+            hidden_dot[i] = rows[i, 1], a[held], self.at_rest - rows[i, 0]
+        return v_dot, hidden_dot.ravel()
+
+    def report(self, hidden: np.ndarray) -> dict[str, Any]:
+        """How far the held joints were moved, in rad: `held_joints`, one entry per robot."""
+        moved = np.abs(hidden.reshape(len(hidden), -1, 3, self._count)[:, :, 0] - self.at_rest)
+        return {
+            "held_joints": [
+                {
+                    "joints": [robot.joint_names[k] for k in held],
+                    "largest": moved[:, i].max(axis=0, initial=0.0).tolist(),
+                    "final": moved[-1, i].tolist() if len(moved) else [],
+                }
+                for i, (robot, held) in enumerate(zip(self.robots, self._held, strict=True))
+            ]
+        }
+
+    def _torque(self, rows: np.ndarray) -> np.ndarray:
+        pid = self.pid
+        return pid.P * (self.at_rest - rows[:, 0]) - pid.D * rows[:, 1] + pid.I * rows[:, 2]
+
+    def _start(self) -> np.ndarray:
+        hidden = np.zeros((self.cell.n, 3, self._count))
+        hidden[:, 0] = self.at_rest
+        for i, robot in enumerate(self.robots):
+            q = np.zeros(robot.nv)
+            q[self._known[i]], q[self._held[i]] = self.cell.q0[i, : len(self._known[i])], self.at_rest
+            weight = robot.gravity(q)[self._held[i]]
+            hidden[i, 2] = np.divide(weight, self.pid.I, out=np.zeros(self._count), where=self.pid.I > 0)
+        return hidden.ravel()
+
+
+def _split(known: Robot, real: Robot) -> tuple[list[int], list[int]]:
+    """Joints of the real robot that the controller knows, in its order, and the others."""
+    missing = [name for name in known.joint_names if name not in real.joint_names]
+    if missing:
+        raise InputError(
+            f"robots: expected robot '{real.name}' to have the joints of '{known.name}', found none called "
+            f"{', '.join(missing)}"
+        )
+    found = [real.joint_names.index(name) for name in known.joint_names]
+    return found, [k for k in range(real.nv) if k not in found]

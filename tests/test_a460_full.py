@@ -1,0 +1,142 @@
+"""The A460 with six joints in the plant, of which the controller knows three."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from synctrl import Payload, Result, load_robot
+from synctrl.errors import InputError, NonFiniteError
+from synctrl.experiments import a460_full_pair, a460_pair
+from synctrl.experiments.a460_full import WRIST
+from synctrl.robots.documents import lock
+from synctrl.robots.urdf import describe
+from synctrl.simulation.guard import Guard
+from synctrl.simulation.held_joints import HeldJointsPlant, Pid
+from synctrl.simulation.integrators import Sample
+
+HELD = {"joint4": 0.0, "joint5": 0.0, "joint6": 0.0}
+
+
+@pytest.fixture(scope="module")
+def full_run():
+    """Runs with six joints, each computed once."""
+    runs = {kind: a460_full_pair(synchronized=kind).simulate(2.5, dt=2e-3) for kind in (True, False)}
+    return runs.__getitem__
+
+
+def test_the_three_joint_arm_is_the_six_joint_arm_with_its_wrist_locked() -> None:
+    reduced, known = describe(lock("a460_full", HELD)).model, load_robot("a460")
+    for ours, theirs in zip(reduced.inertias, known.model.inertias, strict=True):
+        np.testing.assert_allclose(ours.toDynamicParameters(), theirs.toDynamicParameters(), atol=1e-12)
+
+
+def test_the_plant_moves_as_six_joints_under_the_torques_of_both_controllers() -> None:
+    rng = np.random.default_rng(0)
+    loop = a460_full_pair(friction=False).closed_loop()
+    plant = loop.plant
+    q, v, tau = rng.normal(size=(3, 2, 3))
+    hidden = rng.normal(size=(2, 3, 3))
+    v_dot, hidden_dot = plant.move(q, v, tau, hidden.ravel())
+    hidden_dot = hidden_dot.reshape(2, 3, 3)
+    for i, robot in enumerate(plant.robots):
+        q_wrist, v_wrist, integral = hidden[i]
+        held = -WRIST.P * q_wrist - WRIST.D * v_wrist + WRIST.I * integral
+        a = np.concatenate([v_dot[i], hidden_dot[i, 1]])
+        needed = robot.inverse_dynamics(np.append(q[i], q_wrist), np.append(v[i], v_wrist), a)
+        np.testing.assert_allclose(needed, np.append(tau[i], held), atol=1e-9)
+        np.testing.assert_array_equal(hidden_dot[i, 0], v_wrist)
+        np.testing.assert_array_equal(hidden_dot[i, 2], -q_wrist)
+
+
+def test_the_wrist_starts_in_balance() -> None:
+    loop = a460_full_pair().closed_loop()
+    cell, plant = loop.cell, loop.plant
+    tau = np.array(
+        [robot.gravity(np.append(q, np.zeros(3)))[:3] for robot, q in zip(plant.robots, cell.q0, strict=True)]
+    )
+    v_dot, hidden_dot = plant.move(cell.q0, cell.v0, tau, plant.hidden0)
+    assert np.abs(v_dot).max() < 1e-9
+    assert np.abs(hidden_dot).max() < 1e-9
+
+
+def test_with_a_stiffer_wrist_the_run_comes_closer_to_the_ideal_one() -> None:
+    ideal = a460_pair().simulate(0.4)
+    gaps = []
+    for speed in (0.4, 1, 2.5):
+        wrist = Pid(speed**2 * WRIST.P, speed**3 * WRIST.I, speed * WRIST.D)
+        gaps.append(np.abs(a460_full_pair(wrist=wrist).simulate(0.4).q - ideal.q).max())
+    assert gaps[0] > 2 * gaps[1] > 4 * gaps[2] > 0
+
+
+def test_synchronization_helps_on_every_joint_here_too(full_run) -> None:
+    synchronized, independent = (np.abs(full_run(kind).sync_error).max(axis=(0, 1)) for kind in (True, False))
+    assert (synchronized < independent).all()
+
+
+def test_the_result_says_how_far_the_wrist_gave_way(full_run, tmp_path) -> None:
+    result = full_run(True)
+    for held in result.info["held_joints"]:
+        assert held["joints"] == ["joint4", "joint5", "joint6"]
+        assert 0 < max(held["largest"]) < np.deg2rad(0.5)
+        assert all(final <= largest for final, largest in zip(held["final"], held["largest"], strict=True))
+    assert Result.load(result.save(tmp_path / "run.npz")) == result
+
+
+def test_mujoco_moves_six_joints_the_same_way() -> None:
+    experiment = a460_full_pair()
+    ours, theirs = experiment.simulate(0.1), experiment.simulate(0.1, plant="mujoco")
+    np.testing.assert_allclose(theirs.tracking_error, ours.tracking_error, atol=1e-13)
+
+
+@pytest.mark.parametrize("options", [{"integrator": "RK45"}, {"control_period": 1e-3}])
+def test_other_ways_through_time_carry_the_wrist_along(options: dict) -> None:
+    experiment = a460_full_pair()
+    expected, found = experiment.simulate(0.15), experiment.simulate(0.15, **options)
+    np.testing.assert_allclose(found.q, expected.q, atol=1e-5)
+    assert found.info["held_joints"][0]["largest"][1] > 1e-5
+
+
+def test_the_flange_can_carry_a_payload() -> None:
+    experiment = a460_full_pair()
+    loaded = replace(experiment, payloads=(Payload(0, 1.0, frame="flange", start=0.1),))
+    free, carried = experiment.simulate(0.2), loaded.simulate(0.2)
+    np.testing.assert_allclose(carried.q[free.t <= 0.1], free.q[free.t <= 0.1], atol=1e-12)
+    wrist = [run.info["held_joints"][0]["largest"][1] for run in (free, carried)]
+    assert wrist[1] > 2 * wrist[0]
+
+
+def test_a_state_without_the_wrist_is_refused() -> None:
+    loop = a460_full_pair().closed_loop()
+    known = loop.initial_state()[: loop.size - loop.plant.hidden0.size]
+    with pytest.raises(InputError, match="18 numbers of the held joints, found 0"):
+        loop.evaluate(loop.cell.references(np.array([0.0]))[0], known, np.zeros((2, 3)))
+
+
+def test_a_wrist_that_is_no_longer_finite_stops_the_run() -> None:
+    loop = a460_full_pair().closed_loop()
+    y = loop.initial_state()
+    y[-1] = np.nan
+    with pytest.raises(NonFiniteError, match="plant's own state"):
+        Guard(loop).check(Sample(0.3, y, np.zeros((2, 3)), None))
+
+
+def test_the_compiled_engine_says_that_it_has_no_held_joints() -> None:
+    with pytest.raises(InputError, match="HeldJointsPlant"):
+        a460_full_pair().simulate(0.1, engine="compiled")
+
+
+def test_robots_that_are_not_those_of_the_cell_are_refused() -> None:
+    experiment = a460_pair()
+    for robots, said in (
+        ([load_robot("a460_full")], "expected 2"),
+        ([load_robot("ur5")] * 2, "joint1, joint2, joint3"),
+        ([load_robot("a460_full"), load_robot("a460")], "same number"),
+    ):
+        with pytest.raises(InputError, match=said):
+            replace(experiment, plant_type=partial(HeldJointsPlant, robots=robots, pid=WRIST))
+    with pytest.raises(InputError, match="at least 0"):
+        Pid(1.0, -1.0, 0.0)
