@@ -171,7 +171,8 @@ def others_move_along(undisturbed: Result, disturbed: Result) -> Claim:
     """The disturbance of robot 1 moves robots 2 to 4 the same way when they are synchronized."""
     response = disturbed.tracking_error - undisturbed.tracking_error  # (T, n, m)
     first, others = response[:, 0].ravel(), response[:, 1:].swapaxes(0, 1).reshape(response.shape[1] - 1, -1)
-    cosines = others @ first / (np.linalg.norm(others, axis=1) * np.linalg.norm(first))
+    lengths = np.linalg.norm(others, axis=1) * np.linalg.norm(first)
+    cosines = others @ first / np.where(lengths > 0, lengths, np.inf)  # 0 for a robot that does not respond
     sizes = np.abs(response).max(axis=(0, 2))
     figures = [Quantity(f"response of {n}", s, "m") for n, s in zip(disturbed.names, sizes, strict=True)]
     return Claim(

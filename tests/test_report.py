@@ -1,0 +1,141 @@
+"""The page: self-contained, escaped, complete; and the script that makes it."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import pytest
+from browser import open_page, require_browser
+
+from synctrl.analysis.claims import Claim, Quantity
+from synctrl.errors import InputError, ResultError, SimulationError
+from synctrl.experiments import planar_four
+from synctrl.experiments.planar_four import GAINS
+from synctrl.experiments.reproduction import Job, run_all
+from synctrl.show.report import Links, Picture, Row, Section, Table, Text, Verdicts, number, write_page
+from synctrl.simulation.result import Result
+
+ROOT = Path(__file__).parents[1]
+NASTY = "</p><script>alert('x')</script><img src=x onerror=alert(1)>"
+
+
+def page_of(tmp_path, *blocks):
+    return write_page(tmp_path / "page.html", "title", [Section("section", blocks)]).read_text("utf-8")
+
+
+def test_words_from_data_never_become_markup(tmp_path):
+    claim = Claim(NASTY, NASTY, False, (Quantity(NASTY, 1.0, NASTY),), NASTY)
+    svg = tmp_path / "f.svg"
+    svg.write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")
+    blocks = [Text((NASTY,)), Table((NASTY,), ((NASTY,),), NASTY), Verdicts((claim,)), Picture(svg, NASTY)]
+    text = page_of(tmp_path, *blocks, Row((Text((NASTY,)),)), Links(((NASTY, NASTY),)))
+    assert "<script" not in text
+    assert "<img src=x" not in text
+    assert text.count("&lt;script&gt;") >= 10
+
+
+def test_a_claim_that_does_not_hold_says_so(tmp_path):
+    text = page_of(tmp_path, Verdicts((Claim("it is so", "here", False, (), "because"),)))
+    assert "does not hold" in text
+
+
+def test_a_row_that_does_not_fit_its_table_is_refused(tmp_path):
+    with pytest.raises(InputError, match="rows of 2 cells"):
+        page_of(tmp_path, Table(("a", "b"), (("1",),)))
+
+
+def test_a_missing_figure_and_an_unwritable_page_are_clear_errors(tmp_path):
+    with pytest.raises(ResultError, match="cannot read the figure"):
+        page_of(tmp_path, Picture(tmp_path / "none.svg", ""))
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ResultError, match="cannot write the page"):
+        write_page(tmp_path / "file" / "page.html", "t", [])
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.0123456, "0.0123"), (1.5e-7, "1.5·10⁻⁷"), (264.1, "264"), (-3e12, "-3·10¹²")]
+)
+def test_numbers_are_short(value, text):
+    assert number(value) == text
+
+
+def test_a_run_that_stops_does_not_take_the_others_along(tmp_path):
+    jobs = {
+        "unstable": Job(partial(planar_four, gains=GAINS.replace(Gamma=1e9)), 0.05),
+        "fine": Job(planar_four, 0.05),
+    }
+    with pytest.raises(SimulationError, match="robot"):
+        run_all(tmp_path, workers=1, jobs=jobs)
+    assert Result.load(tmp_path / "fine.npz").status == "completed"
+    assert Result.load(tmp_path / "unstable.npz").status.startswith("stopped")
+
+
+@pytest.fixture(scope="module")
+def reproduced(tmp_path_factory):
+    """Everything `make reproduce` writes."""
+    out = tmp_path_factory.mktemp("reproduced") / "out"
+    command = [sys.executable, str(ROOT / "scripts" / "reproduce.py"), "--out", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert done.stdout.rstrip().endswith(str(out / "index.html"))
+    return out
+
+
+def test_all_figures_of_the_paper_are_there_as_png_and_svg(reproduced):
+    for k in (*range(2, 17),):
+        png = (reproduced / "figures" / f"figure_{k:02d}.png").read_bytes()
+        svg = (reproduced / "figures" / f"figure_{k:02d}.svg").read_text("utf-8")
+        assert png.startswith(b"\x89PNG")
+        assert svg.rstrip().endswith("</svg>")
+
+
+def test_the_page_loads_nothing_from_elsewhere_and_every_link_leads_somewhere(reproduced):
+    text = (reproduced / "index.html").read_text("utf-8")
+    assert not re.search(r"""(src|href)\s*=\s*["'](https?:)?//""", text)
+    links = re.findall(r'href="([^"#][^"]*)"', text)
+    assert len(links) >= 6
+    for link in links:
+        assert (reproduced / link).is_file(), link
+
+
+def test_every_claim_of_the_page_is_in_the_metrics(reproduced):
+    text = (reproduced / "index.html").read_text("utf-8")
+    data = json.loads((reproduced / "metrics.json").read_text("utf-8"))
+    verdicts = re.findall(r'<li class="(holds|fails)">', text)
+    assert verdicts.count("holds") == sum(claim["holds"] for claim in data["claims"])
+    assert verdicts.count("fails") == sum(not claim["holds"] for claim in data["claims"])
+    assert set(data["runs"]) == {path.stem for path in (reproduced / "runs").glob("*.npz")}
+
+
+def test_every_run_can_be_loaded_and_says_what_it_is(reproduced):
+    for path in (reproduced / "runs").glob("*.npz"):
+        run = Result.load(path)
+        assert run.status == "completed"
+        assert run.info["gains"]
+        assert run.info["versions"]["pin"]
+
+
+def test_the_page_opens_in_a_browser_without_asking_for_anything(reproduced):
+    require_browser()
+    with open_page(reproduced / "index.html") as page:
+        assert page.evaluate("document.querySelectorAll('figure img').length") >= 15
+        broken = "[...document.images].filter(i => !i.complete || !i.naturalWidth).length"
+        assert page.evaluate(broken) == 0
+        assert page.requests == []
+        assert page.errors == []
+
+
+def test_every_animation_plays_without_a_network(reproduced):
+    require_browser()
+    animations = sorted((reproduced / "animations").glob("*.html"))
+    assert len(animations) >= 6
+    for path in animations:
+        with open_page(path) as page:
+            page.check_plays()
+            assert page.requests == []
+            assert page.errors == []
