@@ -15,6 +15,8 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | No
         InputError: not numbers, another shape, or not finite.
     """
     try:
+        if np.asarray(value).dtype.kind in "USc":  # neither "1" nor 1j is a number here
+            raise TypeError
         array = np.array(value, dtype=float)
     except (TypeError, ValueError) as error:
         raise InputError(f"{name}: expected numbers, found {value!r}") from error
@@ -63,7 +65,7 @@ def instance(name: str, value: object, kind: type | tuple[type, ...], expected: 
 
 def choice(name: str, value: object, known: tuple[str, ...]) -> str:
     """`value` if it is one of the known words."""
-    if value not in known:
+    if not isinstance(value, str) or value not in known:
         raise InputError(f"{name}: expected one of {', '.join(map(repr, known))}, found {value!r}")
     return str(value)
 

@@ -58,6 +58,7 @@ def a460_pair(
     if adapt_friction:
         members = [_knowing_friction(member) for member in members]
     gains = _gains(adapt_friction) if gains is None else gains
+    instance("gains", gains, Gains, "Gains")
     kind = "synchronized" if synchronized else "independent"
     return Experiment(
         Cell(members, Coupling.pair(c=(1.0, -1.0)), JointSpace(), name="A460 pair"),

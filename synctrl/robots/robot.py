@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array
+from ..checks import finite_array, instance
 from ..errors import FrameNotFound, InputError, RobotError
 from .catalog import load_description
 from .model_checks import check_inertia, check_numbering
@@ -47,6 +47,7 @@ class Robot:
         name: str | None = None,
         document: Document | None = None,
     ):
+        instance("model", model, pin.Model, "a Pinocchio model, for example from load_robot")
         self.model = model
         self.name = name or model.name
         self.visual = visual

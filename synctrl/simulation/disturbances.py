@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array, finite_number
+from ..checks import finite_array, finite_number, instance
 from ..errors import InputError
 from ..tasks.cell import Cell
 
@@ -55,6 +55,7 @@ class DisturbanceSchedule:
     """
 
     def __init__(self, cell: Cell, disturbances: Sequence[Disturbance]):
+        instance("disturbances", disturbances, Sequence, "a sequence of Disturbance objects")
         for disturbance in disturbances:
             _check(cell, disturbance)
         self.edges = tuple(sorted({edge for d in disturbances for edge in (d.start, d.stop)}))

@@ -172,7 +172,7 @@ _DAMAGE = (OSError, ValueError, KeyError, EOFError, RuntimeError, MemoryError, z
 
 
 def _read(path: Path) -> tuple[Any, dict[str, np.ndarray]]:
-    """Content of an archive such as `save` writes: uncompressed, so that it is no larger in memory than on disk."""
+    """Content of an archive as `save` writes it: uncompressed, so no larger in memory than on disk."""
     with zipfile.ZipFile(path) as archive:
         if any(entry.compress_type != zipfile.ZIP_STORED for entry in archive.infolist()):
             raise ValueError("expected uncompressed entries")

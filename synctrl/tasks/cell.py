@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -15,6 +15,7 @@ from ..robots.friction import Friction
 from ..robots.parameters import FullParameters, Parameters
 from ..robots.robot import Robot
 from .coupling import Coupling
+from .member_checks import check_friction, check_parameters, check_space, check_trajectory
 from .spaces import JointSpace, Space
 from .trajectories import Trajectory
 
@@ -75,6 +76,7 @@ class Cell:
     def __init__(
         self, members: Sequence[Member], coupling: Coupling, space: Space | None = None, name: str = "cell"
     ):
+        instance("members", members, Iterable, "Member objects")
         self.members = tuple(members)
         self.coupling = coupling
         self.space = JointSpace() if space is None else space
@@ -89,11 +91,12 @@ class Cell:
             )
         self.robots = tuple(member.robot for member in self.members)
         self.names = tuple(m.name or f"robot {i}" for i, m in enumerate(self.members, start=1))
+        check_space(self.space)
         self.labels = self.space.labels(self.robots)
         self.task = self.space.bind(self.robots)
+        self._check_members()
         self._set_parameters()
         self._set_initial_state()
-        self._check_trajectories()
 
     # -- sizes --------------------------------------------------------------------------------------------
 
@@ -138,7 +141,9 @@ class Cell:
     # -- internals ----------------------------------------------------------------------------------------
 
     def _set_parameters(self) -> None:
-        self.parameters = tuple(m.parameters or FullParameters(m.robot) for m in self.members)
+        self.parameters = tuple(
+            FullParameters(m.robot) if m.parameters is None else m.parameters for m in self.members
+        )
         self.theta = _pad([p.theta for p in self.parameters])
 
     def _set_initial_state(self) -> None:
@@ -159,13 +164,12 @@ class Cell:
             return member.trajectory(0.0).x
         raise InputError(f"{name}, q0: expected joint positions to start from, found none")
 
-    def _check_trajectories(self) -> None:
+    def _check_members(self) -> None:
         for name, member in zip(self.names, self.members, strict=True):
-            if member.trajectory.dimension != self.m:
-                raise InputError(
-                    f"{name}, trajectory: expected {self.m} coordinates ({', '.join(self.labels)}), "
-                    f"found {member.trajectory.dimension}"
-                )
+            check_trajectory(name, member.trajectory, self.labels)
+            check_friction(name, member.friction, member.robot)
+            if member.parameters is not None:
+                check_parameters(name, member.parameters, member.robot)
 
     def __repr__(self) -> str:
         return f"Cell('{self.name}', {self.n} robots, {self.space!r}, {self.coupling!r})"

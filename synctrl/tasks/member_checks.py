@@ -1,0 +1,85 @@
+"""Checks of what a member of a cell is made of, before anything relies on it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..checks import finite_array, instance
+from ..errors import InputError
+from ..robots.friction import Friction
+from ..robots.robot import Robot
+
+
+def check_space(space: Any) -> None:
+    """Refuse what is no space.
+
+    Raises:
+        InputError: no object with `labels`, `unit` and `bind`.
+    """
+    if isinstance(space, type) or not all(hasattr(space, part) for part in ("labels", "unit", "bind")):
+        raise InputError(f"space: expected a space, for example CartesianSpace('xy'), found {space!r}")
+
+
+def check_trajectory(name: str, trajectory: Any, labels: tuple[str, ...]) -> None:
+    """Refuse what is no desired motion of the task's dimension.
+
+    Args:
+        name: whose it is.
+        trajectory: the desired motion.
+        labels: names of the task coordinates, (m,).
+
+    Raises:
+        InputError: no trajectory, another dimension, or a motion at t = 0 that is not finite.
+    """
+    if not callable(trajectory) or not hasattr(trajectory, "dimension") or not hasattr(trajectory, "breaks"):
+        raise InputError(f"{name}, trajectory: expected a trajectory such as Hold, found {trajectory!r}")
+    m = len(labels)
+    if trajectory.dimension != m:
+        raise InputError(
+            f"{name}, trajectory: expected {m} coordinates ({', '.join(labels)}), "
+            f"found {trajectory.dimension}"
+        )
+    motion = trajectory(np.zeros(1))
+    if not isinstance(motion, tuple) or len(motion) != 3:
+        raise InputError(
+            f"{name}, trajectory: expected position, velocity and acceleration, found {motion!r}"
+        )
+    for part, value in zip(("position", "velocity", "acceleration"), motion, strict=True):
+        finite_array(f"{name}, trajectory, {part} at t = 0 s", value, (1, m))
+
+
+def check_friction(name: str, friction: Any, robot: Robot) -> None:
+    """Refuse what is no friction of the robot's joints.
+
+    Raises:
+        InputError: no Friction, or coefficients for another number of joints.
+    """
+    instance(f"{name}, friction", friction, Friction, "a Friction")
+    for part, coefficients in (("viscous", friction.viscous), ("coulomb", friction.coulomb)):
+        if coefficients.shape not in ((), (robot.nv,)):
+            raise InputError(
+                f"{name}, friction, {part}: expected a number or shape ({robot.nv},), "
+                f"found {coefficients.shape}"
+            )
+
+
+def check_parameters(name: str, parameters: Any, robot: Robot) -> None:
+    """Refuse what are no parameters of the robot.
+
+    Raises:
+        InputError: no parameters, or those of a robot with another number of joints.
+    """
+    if not all(hasattr(parameters, part) for part in ("names", "theta", "regressor")):
+        raise InputError(f"{name}, parameters: expected, for example, FullParameters, found {parameters!r}")
+    expected, still = (robot.nv, len(parameters.theta)), np.zeros(robot.nv)
+    try:
+        found = np.shape(parameters.regressor(still, still, still, still))
+    except ValueError as error:
+        raise InputError(f"{name}, parameters: they belong to another robot: {error}") from error
+    if found != expected:
+        raise InputError(
+            f"{name}, parameters: expected a regressor of shape {expected} for '{robot.name}', "
+            f"found {found}"
+        )
