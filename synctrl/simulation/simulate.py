@@ -118,8 +118,6 @@ class Experiment:
         choice("engine", engine, ("pinocchio", "compiled"))
         if progress is not None and not callable(progress):
             raise InputError(f"progress: expected a function of the time reached, found {progress!r}")
-        if progress is not None and not callable(progress):
-            raise InputError(f"progress: expected a function of the time reached, found {progress!r}")
         choice("plant", plant, tuple(PHYSICS))
         tolerances = positive_number("rtol", rtol), positive_number("atol", atol)
         run = self.plan(duration, dt, control_period, plant)
