@@ -95,8 +95,8 @@ class Plant:
         """v', (n, nv), under joint torques tau, (n, nv), and friction."""
         tau = tau - self.friction(v)
         v_dot = np.zeros(tau.shape)
-        for dynamics, *of_robot, accelerated in zip(self._arms, *map(self._rows, (q, v, tau, v_dot)), strict=True):
-            accelerated[...] = dynamics(*of_robot)
+        for i, nv, dynamics in self._arms:
+            v_dot[i, :nv] = dynamics(q[i, :nv], v[i, :nv], tau[i, :nv])
         return v_dot
 
     def move(
