@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from synctrl.analysis.claims import a460_claims, own_findings, planar_four_claims
+from synctrl.analysis.claims_a460 import a460_claims
+from synctrl.analysis.claims_planar import own_findings, planar_four_claims
 from synctrl.analysis.metrics import as_data, metrics, settling_bands, write_metrics
 from synctrl.errors import SynctrlError
 from synctrl.experiments.reproduction import JOBS, run_all

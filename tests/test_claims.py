@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from synctrl.analysis import claims
+from synctrl.analysis import claims, claims_a460, claims_planar
 from synctrl.errors import InputError
 
 
@@ -27,7 +27,7 @@ def with_error(run, **arrays):
 
 
 def test_the_claims_on_the_four_arms_hold(planar):
-    found = claims.planar_four_claims(planar)
+    found = claims_planar.planar_four_claims(planar)
     assert len(found) == 7
     for claim in found:
         assert claim.holds, claim.text
@@ -36,19 +36,21 @@ def test_the_claims_on_the_four_arms_hold(planar):
 
 def test_a_touched_robot_is_noticed(planar):
     before, after = planar["independent"], planar["independent_disturbed"]
-    assert claims.others_are_untouched(before, after).holds
+    assert claims_planar.others_are_untouched(before, after).holds
     x = np.array(after.x)
     x[-1, 2, 0] = np.nextafter(x[-1, 2, 0], np.inf)
-    assert not claims.others_are_untouched(before, with_error(after, x=x)).holds
-    assert not claims.others_are_untouched(before, before).holds, "nothing was disturbed"
+    assert not claims_planar.others_are_untouched(before, with_error(after, x=x)).holds
+    assert not claims_planar.others_are_untouched(before, before).holds, "nothing was disturbed"
 
 
 def test_a_changed_synchronization_error_is_noticed(planar):
     before, after = planar["independent"], planar["independent_disturbed"]
     epsilon = np.array(after.sync_error)
     epsilon[7, 1, 0] += 1e-12
-    assert not claims.only_adjacent_sync_errors_grow(before, with_error(after, sync_error=epsilon)).holds
-    assert not claims.only_adjacent_sync_errors_grow(before, before).holds
+    assert not claims_planar.only_adjacent_sync_errors_grow(
+        before, with_error(after, sync_error=epsilon)
+    ).holds
+    assert not claims_planar.only_adjacent_sync_errors_grow(before, before).holds
 
 
 def test_an_error_that_stays_does_not_converge(planar):
@@ -67,12 +69,12 @@ def test_synchronization_that_helps_one_axis_only_is_not_enough(planar):
 
 
 def test_robots_that_do_not_follow_are_noticed(planar):
-    assert not claims.others_move_along(planar["independent"], planar["independent_disturbed"]).holds
+    assert not claims_planar.others_move_along(planar["independent"], planar["independent_disturbed"]).holds
 
 
 def test_missing_runs_are_named():
     with pytest.raises(InputError, match="missing: independent, frictionless"):
-        claims.a460_claims({"synchronized": None})
+        claims_a460.a460_claims({"synchronized": None})
 
 
 def test_a_claim_is_plain_data(planar):

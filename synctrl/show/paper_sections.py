@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..analysis.claims import a460_claims, own_findings, planar_four_claims
+from ..analysis.claims_a460 import a460_claims
+from ..analysis.claims_planar import own_findings, planar_four_claims
 from ..analysis.metrics import metrics, row_names, settling_bands
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
