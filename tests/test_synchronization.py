@@ -80,6 +80,23 @@ def test_a_weight_with_one_feature_is_accurate_to_1e_8_in_every_derivative(rate,
         assert relative(-found[:, 0, 0, 0], expected) < 1e-8
 
 
+def test_a_narrow_bump_between_the_first_nodes_is_found():
+    bump = Wave(2, 0, 1, 0, 0, 1)
+    f = SynchronizationFunction(lambda x, y, t: (bump(t) + np.exp(-(((t - 2.62) / 0.02) ** 2))) * x - y, 2, 1)
+    w = f.coupling(still(2), DURATION).weights(TIMES, 1)
+    assert relative(-w.c[:, 0, 0, 0], 2 + np.exp(-(((TIMES - 2.62) / 0.02) ** 2))) < 1e-8
+
+
+def test_normalized_smooth_weights_are_divided_with_their_derivatives_by_one_constant():
+    f = SynchronizationFunction(lambda x, y, t: (3 + np.sin(t)) * x - 5 * y, 2, 2)
+    coupling = f.coupling(still(2, 2), DURATION)
+    one, other = coupling.weights(TIMES, 2), coupling.normalized(t=1.0).weights(TIMES, 2)
+    size = np.sqrt((3 + np.sin(1.0)) * 5)
+    for part, scaled in zip(one[:3], other[:3], strict=True):
+        np.testing.assert_allclose(scaled * size, part, rtol=1e-12)
+    np.testing.assert_allclose(one.c_inv * size, other.c_inv, rtol=1e-12)
+
+
 def matrices(t, order=0):
     """Three 2 by 2 matrices, not diagonal, (3, 2, 2), or a derivative of them."""
     rates = np.array([0.5, 1.0, 2.0])[:, None, None]

@@ -28,10 +28,10 @@ CENTER, RADIUS, SPEED = np.array([0.0, 0.35]), 0.08, np.pi / 2  # m, m, rad/s
 Q0 = ((1.9, -1.6), (1.2, 1.6))  # rad
 SPACE = CartesianSpace("xy")
 DURATION = 6.0  # s
-GAINS = Gains(Lambda=10.0, beta=20.0, K_r=2.0, K_eps=20.0, Gamma=3.0)
+GAINS = Gains(Lambda=10.0, beta=20.0, K_r=0.5, K_eps=20.0, Gamma=2.0)
 MASS_HAT, LENGTH_HAT = 0.8, 0.2  # kg, m: the initial guess of every link
 #: something pushes against the first arm
-PUSH = Disturbance(robot=0, torque=(1.0, 1.0), start=3.0, stop=3.25)
+PUSH = Disturbance(robot=0, torque=(1.0, 1.0), start=2.0, stop=2.2)
 
 
 def object_synchronization() -> SynchronizationFunction:
@@ -44,7 +44,7 @@ def rigid_object(synchronized: bool = True, disturbed: bool = True, gains: Gains
 
     Args:
         synchronized: False sets beta = K_eps = 0.
-        disturbed: whether the first arm is pushed, 1 N·m on both joints for 3 <= t < 3.25 s.
+        disturbed: whether the first arm is pushed, 1 N·m on both joints for 2 <= t < 2.2 s.
         gains: by default ours.
     """
     members = [_member(i) for i in range(2)]

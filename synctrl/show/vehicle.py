@@ -55,7 +55,7 @@ def vehicle_animation(result: Result, wheel_radius: float, track: float, fps: fl
             f"{result.x.shape[2]} coordinates"
         )
     times = np.arange(0, result.t[-1], 1 / positive_number("fps", fps))
-    frames = np.clip(np.searchsorted(result.t, times), 0, len(result.t) - 1)
+    frames = np.searchsorted(0.5 * (result.t[1:] + result.t[:-1]), times)  # the nearest logged instants
     driven = vehicle_path(result.x[:, :, 0], wheel_radius, track)
     desired = vehicle_path(result.x_desired[:, :, 0], wheel_radius, track)
     scene = Scene(fps=fps, title=str(result.info["title"]), caption="The wheels' angles move the vehicle.")
