@@ -3,6 +3,7 @@
 from .control.controller import Controller
 from .control.gains import Gains
 from .errors import SynctrlError
+from .robots.base_parameters import BaseParameters
 from .robots.friction import Friction
 from .robots.friction_parameters import FrictionParameters
 from .robots.parameters import FullParameters, LinearParameters
@@ -24,6 +25,7 @@ from .tasks.trajectories import Circle, Cubic, ExponentialApproach, FunctionTraj
 __all__ = [
     "Attached",
     "AxisRotation",
+    "BaseParameters",
     "CartesianSpace",
     "Cell",
     "Circle",
