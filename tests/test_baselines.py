@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from theory_cells import GAINS, coupling, experiment
 
-from synctrl.analysis.baselines import Comparison, ablation, compare, gravity_torque, trial
-from synctrl.analysis.matching import match_peak_torque, peak_torque
+from synctrl.analysis.baselines import Comparison, ablation, compare
+from synctrl.analysis.matching import match_peak_torque
+from synctrl.analysis.trials import Bench, measure
 from synctrl.errors import InputError, SimulationError
 from synctrl.experiments import a460_pair, planar_four
 
@@ -27,48 +28,47 @@ def small():
 
 def test_the_matched_controller_is_independent_and_has_the_same_peak_torque(planar: Comparison) -> None:
     match = planar.match
-    run = match.experiment
+    run = replace(planar_four(), gains=match.gains)
     assert not run.gains.beta.any()
     assert not run.gains.K_eps.any()
     assert match.factor == pytest.approx(float(run.gains.Lambda) / 10.0)
     np.testing.assert_array_equal(run.gains.K_r, planar_four().gains.K_r)
-    again = peak_torque(run.simulate(**SHORT))
+    again = np.abs(run.simulate(**SHORT).tau).max()
     assert again == match.peak_torque
     assert again == pytest.approx(planar.trials[0].peak_torque, rel=1e-3)
 
 
 def test_a_common_factor_scales_all_the_gains_named() -> None:
-    match = match_peak_torque(small(), ("Lambda", "K_r"), **SHORT)
-    np.testing.assert_allclose(match.experiment.gains.Lambda, match.factor * GAINS.Lambda)
-    np.testing.assert_allclose(match.experiment.gains.K_r, match.factor * GAINS.K_r)
+    match = match_peak_torque(Bench(small(), SHORT), 2.5, ("Lambda", "K_r"))
+    np.testing.assert_allclose(match.gains.Lambda, match.factor * GAINS.Lambda)
+    np.testing.assert_allclose(match.gains.K_r, match.factor * GAINS.K_r)
     assert match.peak_torque == pytest.approx(match.target, rel=1e-3)
 
 
 @pytest.mark.parametrize("share", [0.9, 1.1])
 def test_the_factor_is_found_above_and_below_one(share: float) -> None:
-    run = planar_four()
-    independent = peak_torque(replace(run, gains=run.gains.independent()).simulate(**SHORT))
-    match = match_peak_torque(run, target=share * independent, **SHORT)
+    bench = Bench(planar_four(), SHORT)
+    independent = bench.peak_torque(bench.experiment.gains.independent())
+    match = match_peak_torque(bench, share * independent)
     assert (match.factor > 1) == (share > 1)
     assert match.peak_torque == pytest.approx(share * independent, rel=1e-3)
 
 
 def test_gains_under_which_a_run_has_to_stop_count_as_too_much_torque() -> None:
-    run, options = small(), {"duration": 0.4, "dt": 0.04}
-    base = run.gains.independent()
+    bench, base = Bench(small(), {"duration": 0.4, "dt": 0.04}), small().gains.independent()
     with pytest.raises(SimulationError):  # the search tries a factor of 4
-        replace(run, gains=base.replace(K_r=4 * base.K_r, Lambda=4 * base.Lambda)).simulate(**options)
-    start = peak_torque(replace(run, gains=base).simulate(**options))
-    match = match_peak_torque(run, ("K_r", "Lambda"), 3.5 * start, **options)
+        bench.trial("", base.replace(K_r=4 * base.K_r, Lambda=4 * base.Lambda))
+    start = bench.peak_torque(base)
+    match = match_peak_torque(bench, 3.5 * start, ("K_r", "Lambda"))
     assert match.peak_torque == pytest.approx(3.5 * start, rel=1e-2)
     assert 2 < match.factor < 4
 
 
 def test_a_peak_torque_that_no_factor_gives_is_refused() -> None:
     with pytest.raises(InputError, match="found none"):
-        match_peak_torque(planar_four(), target=1e3, duration=0.01)
+        match_peak_torque(Bench(planar_four(), {"duration": 0.01}), 1e3)
     with pytest.raises(InputError, match="target"):
-        match_peak_torque(small(), target=-1.0, **SHORT)
+        match_peak_torque(Bench(small(), SHORT), -1.0)
 
 
 def test_an_independent_controller_with_lambda_110_tracks_better_than_the_papers(planar: Comparison) -> None:
@@ -88,23 +88,31 @@ def test_at_the_papers_four_arm_gains_beta_does_the_work(planar: Comparison) -> 
 
 
 def test_every_combination_of_the_parts_is_tried_once_and_named() -> None:
-    run = small()
-    trials = ablation(run, **SHORT)
+    bench = Bench(small(), SHORT)
+    trials = ablation(bench)
     on = {t.name: tuple(bool(np.any(t.gains[k])) for k in ("beta", "K_eps", "Gamma")) for t in trials}
     assert len(set(on.values())) == len(on) == 8
     assert on["none of them"] == (False, False, False)
     assert on["β"] == (True, False, False)
-    assert on["k_ε"] == (False, True, False)
+    assert on["K_ε"] == (False, True, False)
     assert on["adaptation"] == (False, False, True)
-    assert on["k_ε + adaptation"] == (False, True, True)
-    full, independent = trial("full", run, **SHORT), replace(run, gains=run.gains.independent())
-    assert replace(trials[-1], name="full") == full
-    assert replace(trials[3], name="independent") == trial("independent", independent, **SHORT)
+    assert on["K_ε + adaptation"] == (False, True, True)
+    assert trials[-1].gains == small().gains.as_dict()
+    assert trials[3].gains == small().gains.independent().as_dict()
+
+
+def test_gains_that_were_tried_are_not_run_again() -> None:
+    bench = Bench(small(), SHORT)
+    first = bench.trial("first", GAINS)
+    assert replace(bench.trial("again", GAINS), name="first") == first
+    assert bench.runs == 1
+    bench.trial("other", GAINS.independent())
+    assert bench.runs == 2
 
 
 def test_a_trial_measures_what_the_run_did() -> None:
-    run = small()
-    result, found = run.simulate(**SHORT), trial("run", run, **SHORT)
+    result = small().simulate(**SHORT)
+    found = measure("run", result)
     assert found.tracking_peak == np.abs(result.tracking_error).max()
     assert found.sync_peak == np.abs(result.sync_error).max()
     assert found.peak_torque == np.abs(result.tau).max()
@@ -125,15 +133,16 @@ def test_the_findings_are_computed_from_the_numbers(planar: Comparison) -> None:
 
 
 def test_it_is_said_where_gravity_takes_most_of_the_peak_torque(planar: Comparison) -> None:
-    heavy = replace(planar, gravity_torque=0.8 * planar.trials[0].peak_torque)
+    ours = replace(planar.trials[0], gravity_torque=0.8 * planar.trials[0].peak_torque)
+    heavy = replace(planar, trials=(ours, *planar.trials[1:]))
     assert any("means little" in s and "80%" in s for s in heavy.findings())
     assert not any("means little" in s for s in planar.findings())
 
 
 def test_gravity_takes_most_of_the_peak_torque_of_the_a460_and_nothing_of_the_planar_arms() -> None:
-    result = a460_pair().simulate(0.01)
-    assert gravity_torque(result) > 0.5 * peak_torque(result)
-    assert gravity_torque(planar_four().simulate(0.01)) == 0
+    loaded, level = (measure("", run.simulate(0.01)) for run in (a460_pair(), planar_four()))
+    assert loaded.gravity_torque > 0.5 * loaded.peak_torque
+    assert level.gravity_torque == 0
 
 
 def test_a_comparison_needs_a_synchronized_controller_and_known_gains() -> None:

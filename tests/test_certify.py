@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import json
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
 from theory_cells import GAINS, coupling, experiment
 
-from synctrl import Disturbance, Friction, Result
+from synctrl import Cell, Disturbance, Friction, Result
 from synctrl.analysis import Certificate, certify
 from synctrl.analysis.convergence import convergence
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, planar_four
+from synctrl.robots.friction_parameters import FrictionParameters
 
 pytestmark = pytest.mark.filterwarnings("ignore::synctrl.errors.CouplingWarning")  # odd rings are meant
 PUSH = Disturbance(robot=0, torque=2.0, start=0.01, stop=0.03)
@@ -61,6 +62,19 @@ def test_the_papers_reference_acceleration_is_certified_where_the_gain_condition
     assert certificate.gain_condition.needed
     assert certificate.gain_condition.holds
     assert certificate.certified
+
+
+def test_friction_that_is_adapted_is_inside_the_theorem_and_damps() -> None:
+    run = experiment(coupling("ring", 4, 2, "moving"), friction=Friction(0.5, 0.3, 0.1))
+    members = []
+    for member in run.cell.members:
+        known = FrictionParameters(member.robot, member.friction)
+        members.append(replace(member, parameters=known, theta_hat0=0.6 * known.theta))
+    adapted = replace(run, cell=Cell(members, run.cell.coupling))
+    certificate = certify(adapted.simulate(0.03, 1e-3))
+    assert certificate.certified, str(certificate)
+    assert certificate.lyapunov.supplied["friction in Y"] < 0
+    assert certify(run.simulate(0.03, 1e-3)).verdict == "outside the theorem"
 
 
 def test_a_run_that_is_too_coarse_is_not_certified() -> None:

@@ -210,7 +210,7 @@ class LiteralController(Controller):
         s = super().evaluate(*state)
         slip = np.matvec(s.reference.c_inv, s.r)
         force = np.vecmat(self.K_eps * s.sigma, s.reference.c)
-        tau = np.matvec(s.Y, state[3]) + self.K_r * slip + force
+        tau = np.matvec(s.Y, state[-2]) + self.K_r * slip + force
         return replace(s, tau=tau, theta_hat_dot=self.Gamma * np.vecmat(slip, s.Y))
 
 

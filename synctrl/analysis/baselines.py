@@ -8,39 +8,17 @@ are multiplied by a common factor until its peak torque is that of the synchroni
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from ..checks import instance
 from ..errors import InputError
-from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .matching import Match, match_peak_torque, peak_torque
+from .matching import Match, match_peak_torque
+from .trials import Bench, Trial
 
 PARTS = ("beta", "K_eps", "Gamma")
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One controller on one task, in numbers over all robots and axes.
-
-    Attributes:
-        name: what is different about the controller.
-        tracking_peak, tracking_rms: of e, rad or m.
-        sync_peak, sync_rms: of epsilon, in the unit of c e.
-        peak_torque: of any joint, N·m.
-        gains: as plain lists.
-    """
-
-    name: str
-    tracking_peak: float
-    tracking_rms: float
-    sync_peak: float
-    sync_rms: float
-    peak_torque: float
-    gains: dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +31,6 @@ class Comparison:
         trials: synchronized, independent as in the paper, with Lambda + beta, and with matched peak torque.
         ablation: the parts of the law switched on alone and together.
         match: how the gains were matched.
-        gravity_torque: largest torque that gravity alone asks for along the synchronized run, N·m.
         units: of e and epsilon.
     """
 
@@ -62,7 +39,6 @@ class Comparison:
     trials: tuple[Trial, ...]
     ablation: tuple[Trial, ...]
     match: Match
-    gravity_torque: float
     units: tuple[str, str]
 
     def findings(self) -> list[str]:
@@ -81,43 +57,21 @@ class Comparison:
                 "scaled": list(self.match.scaled),
                 "runs": self.match.runs,
             },
-            "gravity_torque": self.gravity_torque,
             "units": list(self.units),
             "findings": self.findings(),
         }
 
 
-def trial(name: str, experiment: Experiment, **options: Any) -> Trial:
-    """Run an experiment and measure it; `options` go to `Experiment.simulate`."""
-    return measure(name, experiment.simulate(**options))
-
-
-def measure(name: str, result: Result) -> Trial:
-    """A finished run in numbers."""
-    e, epsilon = result.tracking_error, result.sync_error
-    peaks = float(np.abs(e).max()), float(np.abs(epsilon).max())
-    rms = _rms(result.t, e), _rms(result.t, epsilon)
-    return Trial(name, peaks[0], rms[0], peaks[1], rms[1], peak_torque(result), dict(result.info["gains"]))
-
-
-def ablation(experiment: Experiment, **options: Any) -> tuple[Trial, ...]:
-    """What beta, K_eps and the adaptation contribute: each alone, and all without each.
-
-    Args:
-        experiment: the cell under the full controller.
-        options: for `Experiment.simulate`.
-    """
+def ablation(bench: Bench) -> tuple[Trial, ...]:
+    """What beta, K_eps and the adaptation contribute: each alone, all without each, and all together."""
     kept = [(), *((p,) for p in PARTS), *(tuple(p for p in PARTS if p != q) for q in reversed(PARTS)), PARTS]
-    return tuple(trial(_kept(names), _with_parts(experiment, names), **options) for names in kept)
-
-
-def gravity_torque(result: Result) -> float:
-    """Largest torque that gravity alone asks of a joint along a run, N·m, from up to fifty instants of it."""
-    robots, every = result.experiment.cell.robots, max(1, len(result.t) // 50)
-    return max(
-        float(np.abs(robot.gravity(q)).max())
-        for i, robot in enumerate(robots)
-        for q in result.q[::every, i, : robot.nv]
+    gains = bench.experiment.gains
+    return tuple(
+        bench.trial(
+            " + ".join(map(_symbol, names)) or "none of them",
+            gains.replace(**{name: 0 * getattr(gains, name) for name in PARTS if name not in names}),
+        )
+        for names in kept
     )
 
 
@@ -132,52 +86,33 @@ def compare(experiment: Experiment, scaled: Sequence[str] = ("Lambda",), **optio
     Raises:
         InputError: the gains do not synchronize, are unknown, or no factor matches the peak torque.
     """
-    instance("experiment", experiment, Experiment, "an Experiment")
-    gains = experiment.gains
+    bench = Bench(experiment, options)
+    gains, independent = experiment.gains, experiment.gains.independent()
     if not (gains.beta.any() or gains.K_eps.any()):
         raise InputError("experiment: expected a synchronized controller, found beta = K_eps = 0")
-    result = experiment.simulate(**options)
-    match = match_peak_torque(experiment, scaled, peak_torque(result), **options)
-    stiffer = gains.independent().replace(Lambda=gains.Lambda + gains.beta)
+    ours = bench.trial("synchronized", gains)
+    match = match_peak_torque(bench, ours.peak_torque, scaled)
     matched = f"independent, {' and '.join(map(_symbol, scaled))} times {match.factor:.3g}"
     trials = (
-        measure("synchronized", result),
-        trial("independent", replace(experiment, gains=gains.independent()), **options),
-        trial("independent, Λ + β for Λ", replace(experiment, gains=stiffer), **options),
-        trial(matched, match.experiment, **options),
+        ours,
+        bench.trial("independent", independent),
+        bench.trial("independent, Λ + β for Λ", independent.replace(Lambda=gains.Lambda + gains.beta)),
+        bench.trial(matched, match.gains),
     )
-    units = result.unit("tracking_error"), result.unit("sync_error")
-    parts, seconds = ablation(experiment, **options), float(result.t[-1])
-    return Comparison(_title(experiment), seconds, trials, parts, match, gravity_torque(result), units)
+    units = experiment.cell.space.unit, experiment.cell.weighted_unit
+    duration = float(options.get("duration") or experiment.duration)
+    return Comparison(
+        experiment.title or experiment.cell.name, duration, trials, ablation(bench), match, units
+    )
 
 
 # -- parts ------------------------------------------------------------------------------------------------
 
-_SYMBOLS = {"beta": "β", "K_eps": "k_ε", "Gamma": "adaptation", "Lambda": "Λ", "K_r": "K_r"}
+_SYMBOLS = {"beta": "β", "K_eps": "K_ε", "Gamma": "adaptation", "Lambda": "Λ", "K_r": "K_r"}
 
 
 def _symbol(name: str) -> str:
     return _SYMBOLS.get(name, name)
-
-
-def _kept(names: tuple[str, ...]) -> str:
-    return " + ".join(map(_symbol, names)) or "none of them"
-
-
-def _with_parts(experiment: Experiment, names: tuple[str, ...]) -> Experiment:
-    off = [name for name in PARTS if name not in names]
-    gains = experiment.gains.replace(**{name: 0 * getattr(experiment.gains, name) for name in off})
-    return replace(experiment, gains=gains)
-
-
-def _rms(t: np.ndarray, error: np.ndarray) -> float:
-    mean_square = np.square(error).mean(axis=(1, 2))
-    span = t[-1] - t[0]
-    return float(np.sqrt(np.trapezoid(mean_square, t) / span if span > 0 else mean_square[-1]))
-
-
-def _title(experiment: Experiment) -> str:
-    return experiment.title or experiment.cell.name
 
 
 # -- in words ---------------------------------------------------------------------------------------------
@@ -195,7 +130,7 @@ def _against_independent(c: Comparison) -> list[str]:
 
 
 def _about_torque(c: Comparison) -> str:
-    share = c.gravity_torque / c.trials[0].peak_torque
+    share = c.trials[0].gravity_torque / c.trials[0].peak_torque
     factors = f"{' and '.join(map(_symbol, c.match.scaled))} by {c.match.factor:.3g}"
     if share > 0.5:
         return (

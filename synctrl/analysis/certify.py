@@ -162,9 +162,8 @@ def _lines(c: Certificate) -> list[str]:
     supplied = ", ".join(f"{name} {record.supplied[name]:.3g}" for name in acting)
     lines = [f"{c.title}: {c.verdict}"]
     lines += [f"  outside: {text}" for text in c.outside] + [f"  doubt: {text}" for text in c.doubts]
-    lines.append(
-        f"  V goes from {record.V[0]:.5g} to {record.V[-1]:.5g}; its change by term: {supplied or 'none'}"
-    )
+    lines.append(f"  V goes from {record.V[0]:.5g} to {record.V[-1]:.5g}")
+    lines.append(f"  by term: {supplied or 'no change'}")
     lines.append(f"  V' is at most {record.V_dot.max():.3g} (rounding {record.rounding.max():.1g})")
     lines.append(
         f"  balance: off by {record.largest_drift:.2g}, numerical errors explain {record.drift_bound:.2g}"

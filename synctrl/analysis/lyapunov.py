@@ -8,6 +8,7 @@
     V' = - sum_i s_q^T K_r s_q                       damping
        - sum_k eps_k^T K_eps Lambda eps_k            synchronization rate
        - sum_i sigma_i^T K_eps beta sigma_i          coupling
+       - sum_i s_q^T F_v s_q                         friction in Y, where viscous friction F_v is adapted
        + power of what is outside the theorem
 
 with tilde = theta - theta_hat, E = S^T int eps, sigma = S^T eps; (19), (24), (34) and (39) for any coupling.
@@ -29,7 +30,7 @@ from .replay import Replay, replay
 
 ENERGIES = ("kinetic", "parameter", "synchronization", "integral")
 #: what the theorem knows; each is at most 0
-THEOREM = ("damping", "synchronization rate", "coupling")
+THEOREM = ("damping", "synchronization rate", "coupling", "friction in Y")
 #: what it does not: each may have either sign
 OUTSIDE = ("friction", "disturbance", "saturation", "weight rate", "model error", "damped inverse", "other")
 POWERS = THEOREM + OUTSIDE
@@ -195,6 +196,7 @@ def _power(run: Replay) -> dict[str, np.ndarray]:
         -damping,
         -x.epsilon * K_eps * controller.Lambda * x.epsilon,
         -x.sigma * K_eps * controller.beta * x.sigma,
+        -x.s_q * x.friction_damping,
         x.s_q * x.friction,
         -x.s_q * x.disturbance,
         x.s_q * x.cut_off,

@@ -22,6 +22,8 @@ from ..tasks.cell import Reference
 BLOCK = 256
 #: relative difference between logged and re-evaluated velocity errors that means "another experiment"
 MISMATCH = 1e-6
+#: share of the model's torque from which something in Y theta counts as friction, and not as rounding
+KNOWN = 1e-9
 
 
 class Row(NamedTuple):
@@ -30,6 +32,7 @@ class Row(NamedTuple):
     Attributes:
         v, v_dot, v_ref, a_ref, s_q, tau, disturbance: (n, nv).
         friction: torque of friction that is not in Y, (n, nv).
+        friction_damping: torque by which friction in Y damps, F_v s_q, (n, nv).
         cut_off: torque that saturation takes from tau, (n, nv).
         tilde, theta_hat_dot: theta - theta_hat, and the rate of theta_hat, (n, P).
         epsilon, epsilon_dot: (p, m).
@@ -50,6 +53,7 @@ class Row(NamedTuple):
     tau: np.ndarray
     disturbance: np.ndarray
     friction: np.ndarray
+    friction_damping: np.ndarray
     cut_off: np.ndarray
     tilde: np.ndarray
     theta_hat_dot: np.ndarray
@@ -187,12 +191,12 @@ def _row(result: Result, loop: ClosedLoop, k: int, reference: Reference, disturb
     theta, adapted = loop.cell.theta, loop.controller.Gamma > 0
     J, J_inv = _jacobians(loop, s)
     M, C_s = _dynamics(loop, q, v, s.s_q)
-    friction = _friction_outside_y(loop, q, v, s, M)
+    friction, friction_damping = _friction(loop, q, v, s, M)
     return Row(
-        v, loop.split(y_dot)[1], s.v_ref, s.a_ref, s.s_q, s.tau, disturbance,
-        friction, s.tau - loop.plant.applied(s.tau), theta - theta_hat, s.theta_hat_dot, s.epsilon,
-        s.epsilon_dot, s.E, s.sigma, s.e_star, s.u, s.r, reference.c, reference.c_dot, reference.c_inv,
-        J, J_inv, M, C_s, np.matvec(s.Y, np.where(adapted, 0.0, theta - theta_hat)),
+        v, loop.split(y_dot)[1], s.v_ref, s.a_ref, s.s_q, s.tau, disturbance, friction, friction_damping,
+        s.tau - loop.plant.applied(s.tau), theta - theta_hat, s.theta_hat_dot, s.epsilon, s.epsilon_dot,
+        s.E, s.sigma, s.e_star, s.u, s.r, reference.c, reference.c_dot, reference.c_inv, J, J_inv, M, C_s,
+        np.matvec(s.Y, np.where(adapted, 0.0, theta - theta_hat)),
         np.matvec(np.abs(s.Y), np.abs(theta_hat) + np.abs(theta)),
     )  # fmt: skip
 
@@ -217,19 +221,27 @@ def _dynamics(
     return M, C_s
 
 
-def _friction_outside_y(
+def _friction(
     loop: ClosedLoop, q: np.ndarray, v: np.ndarray, s: Signals, M: np.ndarray
-) -> np.ndarray:
-    """Friction of the plant minus what Y theta has beyond M a_ref + C v_ref + g, (n, nv)."""
-    friction = np.zeros_like(v) + loop.plant.friction(v)
-    if not friction.any():
-        return friction
+) -> tuple[np.ndarray, np.ndarray]:
+    """Torque of friction that is not in Y, and torque by which friction in Y damps, each (n, nv).
+
+    What Y theta has beyond M a_ref + C v_ref + g is friction that the controller knows. With the viscous part
+    taken at v_ref, F_v s_q of the plant's friction remains as damping.
+    """
+    unknown = np.zeros_like(v) + loop.plant.friction(v)
+    damping = np.zeros_like(v)
+    if not (loop.plant.viscous.any() or loop.plant.coulomb.any()):
+        return unknown, damping
     for i, robot in enumerate(loop.cell.robots):
         k = robot.nv
+        Y, theta = s.Y[i, :k], loop.cell.theta[i]
         C, g = robot.coriolis_matrix(q[i, :k], v[i, :k]), robot.gravity(q[i, :k])
-        rigid = M[i, :k, :k] @ s.a_ref[i, :k] + C @ s.v_ref[i, :k] + g
-        friction[i, :k] -= s.Y[i, :k] @ loop.cell.theta[i] - rigid
-    return friction
+        known = Y @ theta - (M[i, :k, :k] @ s.a_ref[i, :k] + C @ s.v_ref[i, :k] + g)
+        if (np.abs(known) > KNOWN * (np.abs(Y) @ np.abs(theta))).any():
+            damping[i, :k] = loop.plant.viscous[i, :k] * s.s_q[i, :k]
+            unknown[i, :k] += damping[i, :k] - known
+    return unknown, damping
 
 
 # -- checks -----------------------------------------------------------------------------------------------

@@ -1,0 +1,63 @@
+"""What the theory says about the runs of the paper: a certificate for each, and fair comparisons."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+from ..analysis.baselines import Comparison, compare
+from ..analysis.certify import Certificate, certify
+from ..simulation.result import Result
+from ..simulation.simulate import Experiment
+from .a460_pair import a460_pair
+from .planar_four import planar_four
+from .reproduction import JOBS
+
+#: the runs of figures 2 to 16, and the one without friction
+CERTIFIED = (
+    "a460_pair_frictionless",
+    "planar_four_synchronized",
+    "planar_four_independent",
+    "planar_four_synchronized_disturbed",
+    "planar_four_independent_disturbed",
+    "a460_pair_synchronized",
+    "a460_pair_independent",
+)
+#: cell and the time over which its controllers are compared, s: all peaks lie within
+COMPARED: Mapping[str, tuple[Callable[[], Experiment], float]] = {
+    "A460 pair": (a460_pair, 0.8),
+    "four planar arms": (planar_four, 0.25),
+}
+
+
+def examine(
+    folder: Path, workers: int = 2, names: Iterable[str] = CERTIFIED
+) -> tuple[dict[str, Certificate], list[Comparison]]:
+    """Certify saved runs, and compare the controllers of both cells, several at a time.
+
+    Args:
+        folder: where `run_all` has saved the runs.
+        workers: number of processes.
+        names: runs to certify.
+
+    Raises:
+        ResultError: a run is missing or damaged.
+    """
+    names = tuple(names)
+    for name in names:
+        Result.load(folder / f"{name}.npz")
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        compared = [pool.submit(_compare, name) for name in COMPARED]
+        certified = {name: pool.submit(_certify, name, folder) for name in names}
+        return {name: f.result() for name, f in certified.items()}, [f.result() for f in compared]
+
+
+def _certify(name: str, folder: Path) -> Certificate:
+    return certify(Result.load(folder / f"{name}.npz"), JOBS[name].make())
+
+
+def _compare(name: str) -> Comparison:
+    make, duration = COMPARED[name]
+    return compare(make(), duration=duration)

@@ -1,0 +1,92 @@
+"""The page's sections on the theory: every run has its verdict, and the tables show the trials."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from theory_cells import coupling, experiment
+
+from synctrl import Disturbance
+from synctrl.analysis import Certificate, certify
+from synctrl.analysis.baselines import Comparison, compare
+from synctrl.errors import ResultError
+from synctrl.experiments.reproduction import JOBS
+from synctrl.experiments.theory import CERTIFIED, examine
+from synctrl.show.lyapunov_plots import growth_mark, lyapunov_figure
+from synctrl.show.report import Table, write_page
+from synctrl.show.theory_sections import baseline_section, certificate_section
+
+PUSH = Disturbance(robot=0, torque=-60.0, start=0.01, stop=0.03)
+
+
+@pytest.fixture(scope="module")
+def certificates() -> dict[str, Certificate]:
+    link = coupling("ring", 4, 2)
+    runs = {"free": experiment(link), "pushed": experiment(link, disturbances=(PUSH,))}
+    return {name: certify(run.simulate(0.04, 1e-3)) for name, run in runs.items()}
+
+
+@pytest.fixture(scope="module")
+def comparison() -> Comparison:
+    return compare(experiment(coupling("pair", 2, 1), joints=1), duration=0.05, dt=2.5e-3)
+
+
+def test_the_section_has_a_figure_and_a_verdict_for_every_run(certificates, tmp_path: Path) -> None:
+    section = certificate_section(certificates, tmp_path)
+    page = write_page(tmp_path / "page.html", "page", [section]).read_text()
+    assert page.count("<img") == len(certificates)
+    table = next(block for block in section.blocks if isinstance(block, Table))
+    assert [row[1] for row in table.rows] == ["certified", "outside the theorem"]
+    for name in certificates:
+        assert (tmp_path / f"lyapunov_{name}.svg").is_file()
+    assert "V first grows at t = 0.01" in page
+
+
+def test_the_figure_shows_the_terms_that_act_and_marks_the_growth(certificates) -> None:
+    figure = lyapunov_figure(certificates["free"].lyapunov)
+    labels = [line.get_label() for line in figure.axes[1].get_lines()]
+    assert "damping" in labels
+    assert "disturbance" not in labels
+    pushed = certificates["pushed"]
+    figure = growth_mark(lyapunov_figure(pushed.lyapunov), pushed.growth)
+    assert "disturbance" in [line.get_label() for line in figure.axes[1].get_lines()]
+    assert any("disturbance" in text.get_text() for text in figure.axes[0].texts)
+    shown = next(line for line in figure.axes[0].get_lines() if line.get_label() == "V")
+    np.testing.assert_array_equal(shown.get_ydata(), pushed.lyapunov.V)
+
+
+def test_a_run_in_which_nothing_happens_can_be_drawn() -> None:
+    still = experiment(coupling("pair", 2, 1), joints=1, gravity=0.0, known=1.0)
+    record = certify(still.simulate(2e-3, 1e-3)).lyapunov
+    assert len(lyapunov_figure(record).axes) == 2
+
+
+def test_the_comparison_shows_every_trial_and_its_findings(comparison: Comparison, tmp_path: Path) -> None:
+    section = baseline_section([comparison])
+    page = write_page(tmp_path / "page.html", "page", [section]).read_text()
+    tables = [block for block in section.blocks if isinstance(block, Table)]
+    assert [len(table.rows) for table in tables] == [4, 8]
+    assert [row[0] for row in tables[0].rows] == [trial.name for trial in comparison.trials]
+    for sentence in comparison.findings():
+        assert sentence.split("'")[0] in page
+
+
+def test_certificates_and_comparisons_travel_between_processes(certificates, comparison: Comparison) -> None:
+    for name, certificate in certificates.items():
+        assert str(pickle.loads(pickle.dumps(certificate))) == str(certificates[name])
+    assert pickle.loads(pickle.dumps(comparison)).as_dict() == comparison.as_dict()
+
+
+def test_every_run_of_the_figures_is_certified() -> None:
+    assert set(CERTIFIED) <= set(JOBS)
+    assert {name for name in JOBS if name.endswith(("synchronized", "independent", "disturbed"))} < set(
+        CERTIFIED
+    )
+
+
+def test_a_missing_run_is_a_clear_error(tmp_path: Path) -> None:
+    with pytest.raises(ResultError, match="planar_four_synchronized"):
+        examine(tmp_path, 1, ["planar_four_synchronized"])
