@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Self
 
@@ -251,6 +252,11 @@ class Robot:
         if not self.model.existFrame(frame):
             raise FrameNotFound(self.name, frame, [f.name for f in self.model.frames])
         return int(self.model.getFrameId(frame))
+
+    def __reduce__(self) -> tuple:
+        """Copies and other processes make the scratch memory anew."""
+        parts = partial(type(self), visual=self.visual, name=self.name, document=self.document)
+        return parts, (self.model, self.tip)
 
     def __repr__(self) -> str:
         return f"Robot('{self.name}', {self.nv} joints, tip '{self.tip}')"

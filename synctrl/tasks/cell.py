@@ -171,6 +171,10 @@ class Cell:
             if member.parameters is not None:
                 check_parameters(name, member.parameters, member.robot)
 
+    def __reduce__(self) -> tuple:
+        """Copies and other processes bind the space anew: arrays that share memory would come apart."""
+        return type(self), (self.members, self.coupling, self.space, self.name)
+
     def __repr__(self) -> str:
         return f"Cell('{self.name}', {self.n} robots, {self.space!r}, {self.coupling!r})"
 
