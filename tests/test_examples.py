@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import open_page
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -147,6 +148,12 @@ def test_the_animation_shows_the_body_between_its_wheels_and_both_paths():
     np.testing.assert_allclose(((left + right) / 2)[:, :2], driven[:, :2], atol=1e-9)
     assert {"line desired path", "line driven path"} <= {node.name for node in scene.nodes}
     assert scene.page().startswith("<!DOCTYPE html>")
+
+
+def test_the_vehicle_drives_its_path_in_a_browser(tmp_path):
+    path = vehicle_animation(run(mobile_robot), WHEEL_RADIUS, TRACK).write(tmp_path / "vehicle.html")
+    with open_page(path) as page:
+        page.check_plays()
 
 
 def test_only_a_run_of_two_wheels_moves_a_vehicle():
