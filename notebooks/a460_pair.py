@@ -28,7 +28,7 @@ from IPython.display import HTML, display
 from synctrl.analysis import certify
 from synctrl.experiments import a460_pair
 from synctrl.show.animation import payload_pair_scene
-from synctrl.show.plots import common_limit, joint_trajectories, sync_errors
+from synctrl.show.plots import common_limits, joint_trajectories, sync_errors
 
 # %%
 DURATION = 4.0  # s
@@ -52,8 +52,8 @@ display(joint_trajectories(together, 0), joint_trajectories(together, 1))
 
 # %%
 alone = a460_pair(synchronized=False).simulate(DURATION)
-limit = common_limit("sync_error", together, alone)
-display(sync_errors(together, limit), sync_errors(alone, limit))
+limits = common_limits("sync_error", together, alone)
+display(sync_errors(together, limits), sync_errors(alone, limits))
 
 # %%
 ratio = np.abs(alone.sync_error).max(axis=(0, 1)) / np.abs(together.sync_error).max(axis=(0, 1))

@@ -27,7 +27,7 @@ from synctrl.analysis import certify
 from synctrl.experiments import planar_four
 from synctrl.show.animation import planar_scene
 from synctrl.show.layout import cell_layout
-from synctrl.show.plots import common_limit, sync_errors, tracking_errors
+from synctrl.show.plots import common_limits, sync_errors, tracking_errors
 
 # %%
 DURATION = 5.0  # s
@@ -56,12 +56,12 @@ cell_layout(together)
 
 # %%
 alone = planar_four(synchronized=False).simulate(DURATION)
-limit = common_limit("tracking_error", together, alone)
-display(tracking_errors(together, limit), tracking_errors(alone, limit))
+limits = common_limits("tracking_error", together, alone)
+display(tracking_errors(together, limits), tracking_errors(alone, limits))
 
 # %%
-limit = common_limit("sync_error", together, alone)
-display(sync_errors(together, limit), sync_errors(alone, limit))
+limits = common_limits("sync_error", together, alone)
+display(sync_errors(together, limits), sync_errors(alone, limits))
 
 # %%
 for name, run in (("synchronized", together), ("independent", alone)):
@@ -78,8 +78,8 @@ for name, run in (("synchronized", together), ("independent", alone)):
 # %%
 pushed_together = planar_four(disturbance="torque").simulate(DURATION)
 pushed_alone = planar_four(synchronized=False, disturbance="torque").simulate(DURATION)
-limit = common_limit("tracking_error", pushed_together, pushed_alone)
-display(tracking_errors(pushed_together, limit), tracking_errors(pushed_alone, limit))
+limits = common_limits("tracking_error", pushed_together, pushed_alone)
+display(tracking_errors(pushed_together, limits), tracking_errors(pushed_alone, limits))
 
 # %%
 print("robots 2 to 4 untouched:", np.array_equal(alone.x[:, 1:], pushed_alone.x[:, 1:]))

@@ -13,7 +13,7 @@ from ..analysis.metrics import metrics, row_names, settling_bands
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .layout import cell_layout
-from .plots import common_limit, joint_trajectories, save, sync_errors, tracking_errors
+from .plots import common_limits, joint_trajectories, save, sync_errors, tracking_errors
 from .report import Links, Picture, Row, Section, Table, Text, Verdicts, number
 from .style import display
 
@@ -55,14 +55,14 @@ def introduction() -> Section:
 def a460_section(runs: Mapping[str, Result], folder: Path) -> Section:
     """Section V-A with figures 2 to 7, from runs `synchronized`, `independent` and `frictionless`."""
     ours, theirs = runs["synchronized"], runs["independent"]
-    limit = common_limit("sync_error", ours, theirs)
+    limits = common_limits("sync_error", ours, theirs)
     figures = {
         2: joint_trajectories(ours, 0),
         3: joint_trajectories(ours, 1),
-        4: sync_errors(ours, limit),
+        4: sync_errors(ours, limits),
         5: joint_trajectories(theirs, 0),
         6: joint_trajectories(theirs, 1),
-        7: sync_errors(theirs, limit),
+        7: sync_errors(theirs, limits),
     }
     pictures = {k: _picture(folder, k, figure, _A460_CAPTIONS[k]) for k, figure in figures.items()}
     return Section(
@@ -103,7 +103,7 @@ def planar_section(runs: Mapping[str, Result], experiment: Experiment, folder: P
     pairs.append((runs["synchronized_disturbed"], runs["independent_disturbed"]))
     pictures = {8: _picture(folder, 8, cell_layout(pairs[0][0], experiment), _PLANAR_CAPTIONS[8])}
     for first, (ours, theirs) in zip((9, 13), pairs, strict=True):
-        e, epsilon = (common_limit(kind, ours, theirs) for kind in ("tracking_error", "sync_error"))
+        e, epsilon = (common_limits(kind, ours, theirs) for kind in ("tracking_error", "sync_error"))
         figures = [tracking_errors(ours, e), sync_errors(ours, epsilon)]
         figures += [tracking_errors(theirs, e), sync_errors(theirs, epsilon)]
         for k, figure in enumerate(figures, start=first):

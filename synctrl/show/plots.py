@@ -61,12 +61,14 @@ def style() -> Iterator[None]:
         yield
 
 
-def new_figure(height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, np.ndarray]:
-    """A figure of the page's width and its axes, (rows, columns); to be called within `style`."""
+def new_figure(
+    height: float, rows: int = 1, columns: int = 1, *, width: float = WIDTH, **options: Any
+) -> tuple[Figure, np.ndarray]:
+    """A figure, its size in inches, and its axes, (rows, columns); to be called within `style`."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
+    figure = Figure(figsize=(width, height), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
@@ -92,7 +94,16 @@ def save(figure: Figure, stem: str | Path) -> tuple[Path, Path]:
 
 
 def joint_trajectories(result: Result, robot: int) -> Figure:
-    """Actual (solid) and desired (dash-dot) joint angles of one robot, a panel per joint."""
+    """Actual (solid) and desired (dash-dot) coordinates of one robot, a panel per axis.
+
+    Args:
+        result: the run; in joint space its coordinates are the joint angles.
+        robot: which robot, counted from 0.
+
+    Raises:
+        InputError: there is no such robot.
+    """
+    _check_robot(result, robot)
     unit, factor = display(result.unit("x"))
     axes_names = result.info["axes"]
     with style():
@@ -104,78 +115,93 @@ def joint_trajectories(result: Result, robot: int) -> Figure:
             panel.set_ylabel(f"{axes_names[k]}, {unit}")
             panel.margins(x=0)
         panels[-1, 0].set_xlabel("time, s")
-        panels[0, 0].set_title(result.names[robot], loc="left")
+        panels[0, 0].set_title(plain(result.names[robot]), loc="left")
         _legend(figure, panels[0, 0].get_lines())
     return figure
 
 
-def tracking_errors(result: Result, limit: float | None = None) -> Figure:
+def tracking_errors(result: Result, limits: tuple[float, float] | None = None) -> Figure:
     """Tracking errors of all robots in one panel.
+
+    Where the run fills little of the limits, a second panel magnifies it.
 
     Args:
         result: the run.
-        limit: the panel shows -limit to limit, in the unit of the errors; by default what it needs. Figures
-            that are compared share it, see `common_limit`.
+        limits: lowest and highest value shown, in the unit of the errors; by default what the run needs.
+            Figures that are compared share them, see `common_limits`.
     """
-    return _errors(result, "tracking_error", "tracking error e", limit)
+    return _errors(result, "tracking_error", "tracking error e", limits)
 
 
-def sync_errors(result: Result, limit: float | None = None) -> Figure:
+def sync_errors(result: Result, limits: tuple[float, float] | None = None) -> Figure:
     """Synchronization errors of all pairs; an error has the colour of the first robot of its pair.
 
-    Where the run fills little of the common scale set by `limit`, a second panel magnifies it.
+    `limits` are as for `tracking_errors`.
     """
-    return _errors(result, "sync_error", "synchronization error ε", limit)
+    return _errors(result, "sync_error", "synchronization error ε", limits)
 
 
-def common_limit(kind: str, *results: Result) -> float:
-    """The scale that figures of an error share when their runs are compared: 1.05 times the largest."""
-    return 1.05 * max(_largest(result, kind) for result in results)
+def common_limits(kind: str, *results: Result) -> tuple[float, float]:
+    """Limits that figures of an error share when their runs are compared: all that the runs need."""
+    own = [_needed(result, kind) for result in results]
+    return min(low for low, _ in own), max(high for _, high in own)
 
 
 # -- work shared by the figures ---------------------------------------------------------------------------
 
-#: below this share of the common scale an error gets a magnified panel
+#: below this share of the common limits an error gets a magnified panel
 SMALL = 0.4
+#: heights of a panel and of a magnified one, and what labels need, inches
+PANEL, MAGNIFIED, LABELS = 2.2, 1.6, 0.75
+#: widths of the first and of the last line of a figure, points
+WIDE, NARROW = 2.8, 1.1
 
 
-def _errors(result: Result, kind: str, what: str, limit: float | None) -> Figure:
-    own = 1.05 * _largest(result, kind)
-    scales = [limit or own] + ([own] if limit and own < SMALL * limit else [])
+def _errors(result: Result, kind: str, what: str, limits: tuple[float, float] | None) -> Figure:
+    own = _needed(result, kind)
+    shown = [limits or own]
+    if limits and own[1] - own[0] < SMALL * (limits[1] - limits[0]):
+        shown.append(own)
     unit, factor = display(result.unit(kind))
     with style():
-        figure, panels = new_figure(2.9 if len(scales) == 1 else 4.6, len(scales), sharex=True)
-        for panel, scale in zip(panels[:, 0], scales, strict=True):
+        heights = [PANEL, MAGNIFIED][: len(shown)]
+        figure, panels = new_figure(
+            sum(heights) + LABELS, len(shown), sharex=True, gridspec_kw={"height_ratios": heights}
+        )
+        for panel, (low, high) in zip(panels[:, 0], shown, strict=True):
             _error_lines(panel, result, kind, factor)
-            _mark_disturbances(panel, result)
-            panel.set_ylim(-factor * scale, factor * scale)
-            panel.set_ylabel(f"{what}, {unit}" if len(scales) == 1 else f"{what.split()[-1]}, {unit}")
+            marks = _mark_disturbances(panel, result)
+            panel.set_ylim(factor * low, factor * high)
+            panel.set_ylabel(f"{what}, {unit}")
             panel.margins(x=0)
-        if len(scales) == 2:
-            panels[0, 0].set_title(f"{what}, the scale of its counterpart", loc="left")
-            panels[1, 0].set_title(f"the same magnified, ×{scales[0] / scales[1]:.2g}", loc="left")
+        if len(shown) == 2:
+            times = (shown[0][1] - shown[0][0]) / (shown[1][1] - shown[1][0])
+            panels[1, 0].set_title(f"the same, on 1/{times:.2g} of the range", loc="left")
+            panels[1, 0].set_ylabel(f"{what.split()[-1]}, {unit}")
         panels[-1, 0].set_xlabel("time, s")
-        _legend(figure, [*_row_handles(result, kind), *_axis_handles(result)])
+        _legend(figure, [*_row_handles(result, kind), *_axis_handles(result), *marks])
     return figure
 
 
 def _error_lines(panel: Axes, result: Result, kind: str, factor: float) -> None:
-    e = getattr(result, kind)
+    """All lines, each narrower than the one below it, so that lines that coincide are all seen."""
+    e = factor * getattr(result, kind)
+    panel.axhline(0.0, color="#8a929c", linewidth=0.7, zorder=1)
     for a in range(e.shape[2]):
-        for k in range(e.shape[1]):
+        for k, width in enumerate(_widths(e.shape[1])):
             color = _row_color(result, kind, k)
-            panel.plot(result.t, factor * e[:, k, a], line_style(a), color=color)
+            panel.plot(result.t, e[:, k, a], line_style(a), color=color, linewidth=width, zorder=2 + k)
+
+
+def _widths(rows: int) -> np.ndarray:
+    return np.linspace(WIDE, NARROW, rows) if rows > 1 else np.array([1.4])
 
 
 def _row_color(result: Result, kind: str, row: int) -> str:
-    if kind == "sync_error" and e_rows(result, kind) == 1:
-        return DESIRED  # one pair belongs to both robots
-    return robot_color(row if kind == "tracking_error" else result.info["pairs"][row][0])
-
-
-def e_rows(result: Result, kind: str) -> int:
-    """Number of rows of an error: robots or pairs."""
-    return int(getattr(result, kind).shape[1])
+    if kind == "tracking_error":
+        return robot_color(row)
+    pairs = result.info["pairs"]
+    return robot_color(pairs[row][0]) if len(pairs) > 1 else DESIRED  # a single pair belongs to both robots
 
 
 def _row_handles(result: Result, kind: str) -> list[Any]:
@@ -183,45 +209,59 @@ def _row_handles(result: Result, kind: str) -> list[Any]:
 
     names = row_names(result, kind)
     if kind == "sync_error":
-        names = [f"ε$_{{{name.split(':')[0]}}}$" for name in names]
+        names = [f"ε$_{{{k}}}$" for k in range(1, len(names) + 1)] if len(names) > 1 else []
+    widths = _widths(len(names))
     return [
-        Line2D([], [], color=_row_color(result, kind, k), linewidth=2.4, label=name)
+        Line2D([], [], color=_row_color(result, kind, k), linewidth=widths[k], label=plain(name))
         for k, name in enumerate(names)
     ]
+
+
+def plain(name: str) -> str:
+    """A name with nothing in it that matplotlib would read as a formula."""
+    return name if name.startswith("ε$") else name.replace("$", r"\$")
 
 
 def _axis_handles(result: Result) -> list[Any]:
     from matplotlib.lines import Line2D
 
     return [
-        Line2D([], [], color="#555555", ls=line_style(a), label=name)
+        Line2D([], [], color="#555555", ls=line_style(a), label=plain(name))
         for a, name in enumerate(result.info["axes"])
     ]
 
 
 def _legend(figure: Figure, handles: Sequence[Any]) -> None:
-    columns = min(len(handles), 6)
-    figure.legend(handles=list(handles), loc="outside upper right", ncols=columns, handlelength=2.4)
+    columns = min(len(handles), 7)
+    figure.legend(
+        handles=list(handles), loc="outside upper right", ncols=columns, handlelength=2.2, columnspacing=1.2
+    )
 
 
-def _mark_disturbances(panel: Axes, result: Result) -> None:
+def _mark_disturbances(panel: Axes, result: Result) -> list[Any]:
+    """Shade the windows in which torques act from outside; returns what the legend needs."""
+    marks = []
     for window in result.info.get("disturbances", ()):
-        panel.axvspan(window["start"], window["stop"], color=ACCENT, alpha=0.10, linewidth=0)
-        panel.annotate(
-            f"torque on {result.names[window['robot']]}",
-            (window["stop"], 0.97),
-            xycoords=("data", "axes fraction"),
-            xytext=(4, 0),
-            textcoords="offset points",
-            va="top",
-            fontsize=8,
-            color=ACCENT,
-            bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1},
+        name = plain(result.names[window["robot"]])
+        label = f"torque on {name}"
+        mark = panel.axvspan(
+            window["start"], window["stop"], color=ACCENT, alpha=0.12, linewidth=0, label=label
         )
+        marks.append(mark)
+    return marks
 
 
-def _largest(result: Result, kind: str) -> float:
+def _check_robot(result: Result, robot: int) -> None:
+    last = len(result.names) - 1
+    if isinstance(robot, bool) or not isinstance(robot, (int, np.integer)) or not 0 <= robot <= last:
+        raise InputError(f"robot: expected an index from 0 to {last}, found {robot!r}")
+
+
+def _needed(result: Result, kind: str) -> tuple[float, float]:
+    """Lowest and highest value of an error, zero among them, with some room."""
     e = getattr(result, kind)
     if not e.size:
         raise InputError(f"run '{result.info['title']}': nothing was logged, so there is nothing to draw")
-    return float(np.abs(e).max()) or 1.0
+    low, high = min(float(e.min()), 0.0), max(float(e.max()), 0.0)
+    room = 0.06 * (high - low) or 1.0
+    return low - room, high + room

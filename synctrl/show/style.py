@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 #: distinguishable with every kind of colour blindness, and dark enough on white
-PALETTE = ("#0072b2", "#d55e00", "#009e73", "#b5528e", "#8a6d00", "#3d3d8f", "#6b4423", "#4d4d4d")
+PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00", "#3d3d8f", "#6b4423", "#4d4d4d")
 DESIRED = "#444444"
 ACCENT = "#b3001b"
 #: first axis solid, second dash-dot as in the paper, third dotted
