@@ -99,8 +99,8 @@ def pickled(job: Job) -> bytes:
     Raises:
         InputError: a part of it cannot be sent.
     """
-    _need("joblib")
-    from joblib.externals import cloudpickle
+    _need("cloudpickle")
+    import cloudpickle
 
     try:
         return bytes(cloudpickle.dumps(job))

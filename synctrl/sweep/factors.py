@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import partial
+from types import NoneType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -79,8 +80,12 @@ class Factor:
         """Name, values and function, as plain data."""
         function = self.change.func if isinstance(self.change, partial) else self.change
         arguments = self.change.keywords if isinstance(self.change, partial) else {}
+        plain = {
+            key: value if isinstance(value, (int, float, str, NoneType)) else type(value).__qualname__
+            for key, value in arguments.items()
+        }
         name = getattr(function, "__qualname__", type(function).__qualname__)
-        return {"name": self.name, "values": self.values.describe(), "change": name, "with": dict(arguments)}
+        return {"name": self.name, "values": self.values.describe(), "change": name, "with": plain}
 
 
 class _PeriodFactor(Factor):

@@ -30,8 +30,8 @@ def describe_base(setup: Setup) -> dict[str, Any]:
         **described,
         "digest": {
             "initial state": digest([loop.initial_state()]),
-            "desired motion": digest([table.desired]),
-            "weights": digest(table.weights),
+            "desired motion": digest([table.xd, table.xd_dot, table.xd_ddot]),
+            "weights": digest([table.c, table.c_dot, table.c_ddot]),
             "disturbances": digest(disturbances),
             "dynamics": digest(_flow(setup, times)),
         },
@@ -39,8 +39,9 @@ def describe_base(setup: Setup) -> dict[str, Any]:
 
 
 def digest(arrays: Any) -> str:
-    """A short digest of arrays, to the digits that count."""
-    text = "\n".join(" ".join(f"{value:.{DIGITS - 1}e}" for value in array.ravel() + 0.0) for array in arrays)
+    """A short digest of arrays, to the digits that count; -0 counts as 0."""
+    rows = (" ".join(f"{value + 0.0:.{DIGITS - 1}e}" for value in array.ravel()) for array in arrays)
+    text = "\n".join(rows)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

@@ -127,7 +127,7 @@ def read_about(folder: str | Path) -> dict[str, Any]:
         about = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ResultError(f"no sweep in '{folder}': it has no {ABOUT}") from None
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ResultError(f"'{path}' cannot be read: {error}") from error
     if not isinstance(about, dict) or about.get("format") != FORMAT:
         found = about.get("format") if isinstance(about, dict) else type(about).__name__
@@ -164,7 +164,7 @@ def read_rows(folder: str | Path, columns: Sequence[str]) -> dict[int, Row]:
 def _read_row(line: bytes) -> Row | None:
     try:
         row = json.loads(line)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     fits = isinstance(row, list) and row and type(row[0]) is int and row[0] >= 0
     return row if fits and all(v is None or isinstance(v, (int, float, str)) for v in row) else None

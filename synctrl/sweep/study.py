@@ -72,7 +72,6 @@ class Study:
         setup = self.base
         measured = definitions(setup.experiment.cell)
         return {
-            "base": describe_base(setup),
             "factors": [factor.describe() for factor in self.factors],
             "seed": self.seed,
             **more,
@@ -80,6 +79,7 @@ class Study:
             "dt": setup.dt,
             "engine": setup.engine,
             "control_period": setup.control_period,
+            "base": describe_base(setup),
             "settling_bands": dict(job.bands),
             "columns": job.columns,
             "measures": {name: measured[name]._asdict() for name in MEASURES},
