@@ -49,7 +49,7 @@ def measurement(axes: str, seed: int):
 
     def measure(t: float):
         xd = [np.stack(part) for part in zip(*(d(t) for d in desired), strict=True)]
-        return bound.measure(q(t), q.dot(t), *xd)
+        return bound.measure(np.stack((q(t), q.dot(t))), np.stack(xd))
 
     return bound, measure, q
 

@@ -196,7 +196,7 @@ def pose_motion(seed: int):
 
     def measure(t: float):
         xd = [np.stack(part) for part in zip(*(d(t) for d in desired), strict=True)]
-        return bound.measure(q(t), q.dot(t), *xd)
+        return bound.measure(np.stack((q(t), q.dot(t))), np.stack(xd))
 
     return measure, q, desired
 

@@ -34,7 +34,7 @@ def motion(space, robots: list, seed: int):
     desired, xref = [desired_flow(rng, m) for _ in robots], Sines(rng, (n, m))
 
     def measure(t: float):
-        return bound.measure(q(t), q.dot(t), *stacked(desired, t))
+        return bound.measure(np.stack((q(t), q.dot(t))), np.stack(stacked(desired, t)))
 
     def references(t: float):
         return bound.to_joints(measure(t), xref.dot(t), xref.ddot(t))
@@ -123,7 +123,7 @@ def test_a_square_robot_moves_as_with_the_plain_inverse_in_a_mixed_cell_too(seed
     found = []
     for space, robots, nv in ((mixed, [UR5, PANDA], 7), (alone, [UR5], 6)):
         bound, k = space.bind(robots), len(robots)
-        task = bound.measure(q(0)[:k, :nv], q.dot(0)[:k, :nv], *stacked(desired[:k], 0.0))
+        task = bound.measure(np.stack((q(0), q.dot(0)))[:, :k, :nv], np.stack(stacked(desired[:k], 0.0)))
         assume(np.linalg.cond(task.J[0, :, :6]) < 100)
         found.append([part[0, :6] for part in bound.to_joints(task, xref_dot[:k], xref_ddot[:k])])
     np.testing.assert_allclose(found[0], found[1], rtol=1e-7, atol=1e-8)
@@ -152,7 +152,7 @@ def test_damped_reference_velocities_stay_bounded_through_a_singular_configurati
     bound = CartesianSpace("xy", singularity=damping).bind([PLANAR] * 2)
     q = np.array([[rng.uniform(-3, 3), angle]] * 2)
     still, xref_dot = np.zeros((2, 2)), rng.uniform(-1, 1, (2, 2))
-    task = bound.measure(q, still, still, still, still)
+    task = bound.measure(np.stack((q, still)), np.zeros((3, 2, 2)))
     v_ref, a_ref = bound.to_joints(task, xref_dot, still)
     assert (task.inversion.damping > 0.99 * damping.largest).all()
     assert (

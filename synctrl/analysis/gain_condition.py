@@ -171,8 +171,8 @@ class _Evaluation:
     def __call__(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         q, t = point[:-1], point[-1:]
         weights = self._coupling.weights(t, self._m)
-        still = np.zeros((1, self._m))
-        task = self._task.measure(q[None], np.zeros((1, q.size)), still, still, still)
+        motion = np.stack((q[None], np.zeros((1, q.size))))
+        task = self._task.measure(motion, np.zeros((3, 1, self._m)))
         J, J_inv = (
             (np.eye(self._m),) * 2 if task.J is None or task.J_inv is None else (task.J[0], task.J_inv[0])
         )

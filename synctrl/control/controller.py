@@ -10,12 +10,8 @@ from ..checks import choice
 from ..tasks.cell import Cell, Reference
 from ..tasks.spaces import Measurement
 from . import law
+from .commands import REFERENCE_ACCELERATIONS, Command, ConstantWeights, Law, MovingWeights
 from .gains import Gains, spread
-
-REFERENCE_ACCELERATIONS = {
-    "exact": law.reference_acceleration_exact,
-    "paper": law.reference_acceleration_paper,
-}
 
 
 @dataclass(slots=True)
@@ -27,22 +23,24 @@ class Signals:
 
     reference: Reference
     task: Measurement
-    e: np.ndarray
-    e_dot: np.ndarray
-    epsilon: np.ndarray
-    epsilon_dot: np.ndarray
-    E: np.ndarray
-    sigma: np.ndarray
-    e_star: np.ndarray
-    u: np.ndarray
-    u_dot: np.ndarray
-    r: np.ndarray
+    command: Command
     v_ref: np.ndarray
     a_ref: np.ndarray
     s_q: np.ndarray
     Y: np.ndarray
     tau: np.ndarray
     theta_hat_dot: np.ndarray
+
+    e = property(lambda self: self.task.error[0])
+    e_dot = property(lambda self: self.task.error[1])
+    epsilon = property(lambda self: self.command.compared[0])
+    epsilon_dot = property(lambda self: self.command.compared[1])
+    E = property(lambda self: self.command.shares[0])
+    sigma = property(lambda self: self.command.shares[1])
+    e_star = property(lambda self: self.command.e_star)
+    u = property(lambda self: self.command.u[0])
+    u_dot = property(lambda self: self.command.u[1])
+    r = property(lambda self: law.coupled_velocity_error(self.u, self.reference.c, self.task.x_dot))
 
 
 class Controller:
@@ -75,80 +73,56 @@ class Controller:
         self.K_eps = spread("K_eps", gains.K_eps, (m,))
         self.K_r = spread("K_r", gains.K_r, (n, nv if k_r_space == "joint" else m))
         self.Gamma = spread("Gamma", gains.Gamma, cell.theta.shape)
-        self._reference_acceleration = REFERENCE_ACCELERATIONS[reference_acceleration]
         self._damping = self._joint_damping if k_r_space == "joint" else self._task_damping
-        self._Y = np.zeros((n, nv, cell.theta.shape[1]))
-        self._regressors = [
-            (parameters.regressor, self._Y[i, : robot.nv, : len(parameters.theta)], robot.nv)
-            for i, (robot, parameters) in enumerate(zip(cell.robots, cell.parameters, strict=True))
-        ]
+        if cell.coupling.is_constant:
+            self._command: Law = ConstantWeights(cell, self.Lambda, self.beta, self.K_eps)
+        else:
+            self._command = MovingWeights(cell, self.Lambda, self.beta, self.K_eps, reference_acceleration)
+        self._regressors = [parameters.regressor for parameters in cell.parameters]
+        counts = [len(parameters.theta) for parameters in cell.parameters]
+        self._sizes = [(robot.nv, P) for robot, P in zip(cell.robots, counts, strict=True)]
+        self._padded = len(set(self._sizes)) > 1
 
     def evaluate(
-        self, reference: Reference, q: np.ndarray, v: np.ndarray, theta_hat: np.ndarray, integral: np.ndarray
+        self, reference: Reference, motion: np.ndarray, theta_hat: np.ndarray, integral: np.ndarray
     ) -> Signals:
         """The law at one instant.
 
         Args:
             reference: desired motion and weights.
-            q, v: joint positions and velocities, (n, nv).
+            motion: joint positions and velocities, (2, n, nv).
             theta_hat: estimates, (n, P).
             integral: integrals of the synchronization errors, (p, m).
         """
-        c, c_dot, c_ddot, c_inv = reference[3:]
-        Lambda, beta = self.Lambda, self.beta
-        task = self.cell.task.measure(q, v, *reference[:3])
-        e, x_dot, xd_dot, xd_ddot = task[1:5]
-        e_dot = xd_dot - x_dot
-
-        w = law.weighted_error(c, e)
-        w_dot = law.weighted_error_dot(c, c_dot, e, e_dot)
-        epsilon, epsilon_dot, E, sigma, sigma_dot = self._couple(w, w_dot, integral)
-
-        e_star = law.coupled_error(w, E, beta)
-        u = law.command(c, c_dot, xd_dot, e, sigma, e_star, beta, Lambda)
-        u_dot = law.command_dot(
-            c, c_dot, c_ddot, xd_dot, xd_ddot, e, e_dot, w_dot, sigma, sigma_dot, beta, Lambda
-        )
-        r = law.coupled_velocity_error(u, c, x_dot)
-        xref_dot = law.reference_velocity(c_inv, u)
-        xref_ddot = self._reference_acceleration(c_inv, c_dot, u_dot, xref_dot, x_dot)
-
-        v_ref, a_ref = self.cell.task.to_joints(task, xref_dot, xref_ddot)
+        space = self.cell.task
+        task = space.measure(motion, reference.desired)
+        command = self._command(task, reference, integral)
+        v_ref, a_ref = space.to_joints(task, *command.xref)
+        q, v = motion
         s_q = v_ref - v
         Y = self._regressor(q, v, v_ref, a_ref)
-        damping = self._damping(task, s_q, c_inv, r)
-        coupling_torque = self.cell.task.to_torque(task, law.synchronizing_force(c, sigma, self.K_eps))
-        tau = law.torque(Y, theta_hat, damping, coupling_torque)
+        damping = self._damping(reference, task, command, s_q)
+        tau = law.torque(Y, theta_hat, damping, space.to_torque(task, command.force))
         theta_hat_dot = law.adaptation(Y, s_q, self.Gamma)
-        return Signals(
-            reference, task, e, e_dot, epsilon, epsilon_dot, E, sigma, e_star, u, u_dot, r,
-            v_ref, a_ref, s_q, Y, tau, theta_hat_dot,
-        )  # fmt: skip
+        return Signals(reference, task, command, v_ref, a_ref, s_q, Y, tau, theta_hat_dot)
 
-    def _couple(self, w: np.ndarray, w_dot: np.ndarray, integral: np.ndarray) -> list[np.ndarray]:
-        """epsilon and epsilon' per pair; E, sigma and sigma' per robot."""
-        m = self.cell.m
-        compared = self.cell.coupling.compare(np.concatenate((w, w_dot), axis=1))
-        shares = self.cell.coupling.distribute(np.concatenate((integral, compared), axis=1))
-        return [
-            compared[:, :m],
-            compared[:, m:],
-            shares[:, :m],
-            shares[:, m : 2 * m],
-            shares[:, 2 * m :],
-        ]
-
-    def _regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
-        for i, (regressor, Y, nv) in enumerate(self._regressors):
-            Y[:] = regressor(q[i, :nv], v[i, :nv], v_ref[i, :nv], a_ref[i, :nv])
-        return self._Y.copy()
+    def _regressor(self, *motion: np.ndarray) -> np.ndarray:
+        """Y, (n, nv, P), of q, v, v_ref and a_ref, (n, nv)."""
+        n, P = self.Gamma.shape
+        Y = np.zeros((n, P, self.cell.nv)).mT  # column after column, as Pinocchio has them
+        rows = self.cell.rows
+        blocks = [Y_i[:nv, :P] for Y_i, (nv, P) in zip(Y, self._sizes, strict=True)] if self._padded else Y
+        for regressor, block, *of_robot in zip(self._regressors, blocks, *map(rows, motion), strict=True):
+            block[...] = regressor(*of_robot)
+        return Y
 
     def _joint_damping(
-        self, task: Measurement, s_q: np.ndarray, c_inv: np.ndarray, r: np.ndarray
+        self, reference: Reference, task: Measurement, command: Command, s_q: np.ndarray
     ) -> np.ndarray:
         return self.K_r * s_q
 
     def _task_damping(
-        self, task: Measurement, s_q: np.ndarray, c_inv: np.ndarray, r: np.ndarray
+        self, reference: Reference, task: Measurement, command: Command, s_q: np.ndarray
     ) -> np.ndarray:
-        return self.cell.task.to_torque(task, self.K_r * law.times(c_inv, r))
+        r = law.coupled_velocity_error(command.u[0], reference.c, task.x_dot)
+        return self.cell.task.to_torque(task, self.K_r * law.times(reference.c_inv, r))

@@ -4,29 +4,40 @@ Every function is plain array arithmetic on rows, one row per robot: e is (n, m)
 leading axis left out they describe a single robot, and they never ask what their numbers are, so the same
 lines can be traced with symbols. Gains are diagonal, given as vectors.
 
+While c is constant every line is linear with constant coefficients: of a quantity and its derivative,
+(2, n, m), it makes the result and its derivative. Moving weights need the lines that end in `_dot` as well.
+
 `E`, `sigma`, `sigma_dot` are what the coupling hands to a robot: S^T times the integrals of epsilon, epsilon
 itself, and its derivative. For a pair or ring these are the sums over the robot's synchronization errors.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 Array = np.ndarray
-times = np.matvec
+Matrices = Any
+"""(..., m, m), or with a known structure, see structure.py."""
 
 
-def transposed_times(A: Array, x: Array) -> Array:
+def times(A: Matrices, x: Array) -> Any:
+    """A x, row by row."""
+    return np.matvec(A, x) if isinstance(A, np.ndarray) else A.times(x)
+
+
+def transposed_times(A: Matrices, x: Array) -> Any:
     """A^T x, row by row."""
-    return np.matvec(np.swapaxes(A, -1, -2), x)
+    return np.matvec(A.mT, x) if isinstance(A, np.ndarray) else A.transposed_times(x)
 
 
-def weighted_error(c: Array, e: Array) -> Array:
+def weighted_error(c: Matrices, e: Array) -> Array:
     """w_i = c_i e_i, the error in the unit of the synchronization function."""
     return times(c, e)
 
 
-def weighted_error_dot(c: Array, c_dot: Array, e: Array, e_dot: Array) -> Array:
+def weighted_error_dot(c: Matrices, c_dot: Matrices, e: Array, e_dot: Array) -> Array:
     """w_i' = c_i e_i' + c_i' e_i."""
     return times(c, e_dot) + times(c_dot, e)
 
@@ -37,16 +48,23 @@ def coupled_error(w: Array, E: Array, beta: Array) -> Array:
 
 
 def command(
-    c: Array, c_dot: Array, xd_dot: Array, e: Array, sigma: Array, e_star: Array, beta: Array, Lambda: Array
+    c: Matrices,
+    c_dot: Matrices,
+    xd_dot: Array,
+    e: Array,
+    sigma: Array,
+    e_star: Array,
+    beta: Array,
+    Lambda: Array,
 ) -> Array:
     """u_i = c_i xd_i' + c_i' e_i + beta sum_k S[k,i] epsilon_k + Lambda e*_i, eqs. (11) and (30)."""
     return times(c, xd_dot) + times(c_dot, e) + beta * sigma + Lambda * e_star
 
 
 def command_dot(
-    c: Array,
-    c_dot: Array,
-    c_ddot: Array,
+    c: Matrices,
+    c_dot: Matrices,
+    c_ddot: Matrices,
     xd_dot: Array,
     xd_ddot: Array,
     e: Array,
@@ -67,31 +85,31 @@ def command_dot(
     )
 
 
-def coupled_velocity_error(u: Array, c: Array, x_dot: Array) -> Array:
+def coupled_velocity_error(u: Array, c: Matrices, x_dot: Array) -> Array:
     """r_i = u_i - c_i x_i' = (e*_i)' + Lambda e*_i, eqs. (12) and (31)."""
     return u - times(c, x_dot)
 
 
-def reference_velocity(c_inv: Array, u: Array) -> Array:
+def reference_velocity(c_inv: Matrices, u: Array) -> Array:
     """xref_i' = c_i^-1 u_i."""
     return times(c_inv, u)
 
 
 def reference_acceleration_exact(
-    c_inv: Array, c_dot: Array, u_dot: Array, xref_dot: Array, x_dot: Array
+    c_inv: Matrices, c_dot: Matrices, u_dot: Array, xref_dot: Array, x_dot: Array
 ) -> Array:
     """xref_i'' = c_i^-1 (u_i' - c_i' xref_i'), the derivative of xref_i'."""
     return times(c_inv, u_dot - times(c_dot, xref_dot))
 
 
 def reference_acceleration_paper(
-    c_inv: Array, c_dot: Array, u_dot: Array, xref_dot: Array, x_dot: Array
+    c_inv: Matrices, c_dot: Matrices, u_dot: Array, xref_dot: Array, x_dot: Array
 ) -> Array:
     """c_i^-1 (u_i' - c_i' x_i'), as (13) prints it; the proof then needs condition (18)."""
     return times(c_inv, u_dot - times(c_dot, x_dot))
 
 
-def synchronizing_force(c: Array, sigma: Array, K_eps: Array) -> Array:
+def synchronizing_force(c: Matrices, sigma: Array, K_eps: Array) -> Array:
     """c_i^T k_eps sum_k S[k,i] epsilon_k, the last term of (13) and (32), in task space."""
     return transposed_times(c, K_eps * sigma)
 

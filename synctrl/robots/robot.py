@@ -16,6 +16,9 @@ from .catalog import load_description
 from .model_checks import check_inertia, check_numbering
 from .urdf_document import Document, Pose
 
+_WORLD_AXES = pin.LOCAL_WORLD_ALIGNED
+_regressor = pin.computeJointTorqueRegressor
+
 
 class Robot:
     """A fixed-base robot with nv joints and one tip frame, placed in the world.
@@ -197,17 +200,15 @@ class Robot:
             q, v: joint positions and velocities, (nv,).
             v_ref, a_ref: reference velocity and acceleration, (nv,).
         """
-        q = self.configuration(q)
+        q = q if self._plain_q else self.configuration(q)
         mean = 0.5 * (v + v_ref)
-        forward = pin.computeJointTorqueRegressor(self.model, self._data, q, mean, a_ref)
-        forward -= pin.computeJointTorqueRegressor(
-            self._weightless, self._weightless_data, q, v - mean, self._zero
-        )
-        return forward.reshape(self.nv, -1)
+        Y = _regressor(self.model, self._data, q, mean, a_ref)
+        Y -= _regressor(self._weightless, self._weightless_data, q, v - mean, self._zero)
+        return Y if self.nv > 1 else Y.reshape(1, -1)
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """`forward_dynamics` of arrays that are known to fit; scratch memory, valid until the next call."""
-        return pin.aba(self.model, self._data, self.configuration(q), v, tau)
+        return pin.aba(self.model, self._data, q if self._plain_q else self.configuration(q), v, tau)
 
     # -- kinematics ---------------------------------------------------------------------------------------
 
@@ -236,12 +237,13 @@ class Robot:
         The pose is scratch memory, valid until the next call.
         """
         model, data, tip = self.model, self._data, self.tip_id
-        pin.computeJointJacobiansTimeVariation(model, data, self.configuration(q), v)
+        pin.computeJointJacobiansTimeVariation(model, data, q if self._plain_q else self.configuration(q), v)
         pose = pin.updateFramePlacement(model, data, tip)
-        J = pin.getFrameJacobian(model, data, tip, pin.LOCAL_WORLD_ALIGNED)
-        J_dot = pin.getFrameJacobianTimeVariation(model, data, tip, pin.LOCAL_WORLD_ALIGNED)
-        # Pinocchio hands out the matrices of a single joint as vectors
-        return pose, J.reshape(6, self.nv), J_dot.reshape(6, self.nv)
+        J = pin.getFrameJacobian(model, data, tip, _WORLD_AXES)
+        J_dot = pin.getFrameJacobianTimeVariation(model, data, tip, _WORLD_AXES)
+        if self.nv == 1:  # Pinocchio hands out the matrices of a single joint as vectors
+            return pose, J.reshape(6, 1), J_dot.reshape(6, 1)
+        return pose, J, J_dot
 
     # -- internals ----------------------------------------------------------------------------------------
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 
 from ..control.controller import Controller, Signals
 from ..tasks.cell import Reference
 from .plant import Plant
+from .state import Layout, State
 
 
 class ClosedLoop:
@@ -21,19 +20,20 @@ class ClosedLoop:
 
     def __init__(self, controller: Controller, plant: Plant):
         self.controller, self.plant = controller, plant
-        cell = self.cell = controller.cell
-        self._shapes = [(cell.n, cell.nv)] * 2 + [cell.theta.shape, (cell.coupling.pairs, cell.m)]
-        ends = np.cumsum([0] + [rows * columns for rows, columns in self._shapes])
-        self._slices = [slice(a, b) for a, b in pairwise(ends)]
-        self._hidden = slice(int(ends[-1]), None)
-        self.size = int(ends[-1]) + plant.hidden0.size
+        self.cell = controller.cell
+        self._layout = Layout(self.cell, plant.hidden0.size)
+        self.size = self._layout.size
 
     def initial_state(self) -> np.ndarray:
         """y at t = 0."""
         cell = self.cell
-        integral = np.zeros(self._shapes[3])
+        integral = np.zeros(cell.coupling.pairs * cell.m)
         parts = (cell.q0, cell.v0, cell.theta_hat0, integral, self.plant.hidden0)
         return np.concatenate([part.ravel() for part in parts])
+
+    def state(self, y: np.ndarray | None = None) -> State:
+        """The parts of y, or of a new y that holds nothing yet."""
+        return State(self._layout, np.empty(self.size) if y is None else y)
 
     def at(self, t: float) -> ClosedLoop:
         """The loop with the plant as it is at time t; at an edge from the right."""
@@ -42,11 +42,12 @@ class ClosedLoop:
 
     def split(self, y: np.ndarray) -> list[np.ndarray]:
         """Views of q, v, theta_hat and the integrals in y."""
-        return [y[part].reshape(shape) for part, shape in zip(self._slices, self._shapes, strict=True)]
+        state = self.state(y)
+        return [state.q, state.v, state.theta_hat, state.integral]
 
     def hidden(self, y: np.ndarray) -> np.ndarray:
         """View of the state of the plant's own in y."""
-        return y[self._hidden]
+        return self.state(y).hidden
 
     def evaluate(
         self, reference: Reference, y: np.ndarray, disturbance: np.ndarray
@@ -58,12 +59,19 @@ class ClosedLoop:
             y: state.
             disturbance: torque from outside, (n, nv), N·m.
         """
-        q, v, theta_hat, integral = self.split(y)
-        signals = self.controller.evaluate(reference, q, v, theta_hat, integral)
+        rate = self.state()
+        signals = self.derive(reference, self.state(y), disturbance, rate)
+        return rate.flat, signals
+
+    def derive(self, reference: Reference, state: State, disturbance: np.ndarray, rate: State) -> Signals:
+        """`evaluate` for states whose views are at hand: y' is written into `rate`."""
+        signals = self.controller.evaluate(reference, state.motion, state.theta_hat, state.integral)
         tau = self.plant.applied(signals.tau) + disturbance
-        v_dot, hidden_dot = self.plant.move(q, v, tau, self.hidden(y))
-        parts = (v, v_dot, signals.theta_hat_dot, signals.epsilon, hidden_dot)
-        return np.concatenate([part.ravel() for part in parts]), signals
+        rate.q[...] = state.v
+        rate.v[...], rate.hidden[...] = self.plant.move(state.q, state.v, tau, state.hidden)
+        rate.theta_hat[...] = signals.theta_hat_dot
+        rate.integral[...] = signals.epsilon
+        return signals
 
     def coast(self, y: np.ndarray, held: np.ndarray, tau: np.ndarray, disturbance: np.ndarray) -> np.ndarray:
         """y' while the controller is not asked: only the plant moves on.

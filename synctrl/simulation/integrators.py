@@ -38,21 +38,27 @@ class Sample(NamedTuple):
 
 def rk4(loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule) -> Iterator[Sample]:
     """The classical Runge-Kutta method of fourth order, one step per instant of the clock."""
-    y = loop.initial_state()
-    logged = np.isin(clock.times, clock.logged)
+    y, stage = loop.state(loop.initial_state()), loop.state()
+    k1, k2, k3, k4 = (loop.state() for _ in range(4))
+    logged = np.isin(clock.times, clock.logged).tolist()
+    torques, windows = list(schedule.torques), _windows(schedule, clock)
     disturbance = schedule.torque(0.0)
-    for k, (t, t_next, references) in enumerate(steps(loop, clock.times)):
-        start, middle, end = references
-        disturbance = schedule.torque(0.5 * (t + t_next))
-        h, stage = t_next - t, loop.at(0.5 * (t + t_next))
-        k1, signals = stage.evaluate(start, y, disturbance)
+    for k, (t, t_next, (start, middle, end)) in enumerate(steps(loop, clock.times)):
+        disturbance = torques[windows[k]]
+        h, now = t_next - t, loop.at(0.5 * (t + t_next))
+        signals = now.derive(start, y, disturbance, k1)
         if logged[k]:
-            yield Sample(t, y, disturbance, signals)
-        k2, _ = stage.evaluate(middle, y + 0.5 * h * k1, disturbance)
-        k3, _ = stage.evaluate(middle, y + 0.5 * h * k2, disturbance)
-        k4, _ = stage.evaluate(end, y + h * k3, disturbance)
-        y = y + (h / 6) * (k1 + 2 * (k2 + k3) + k4)
-    yield final(loop, clock, y, disturbance)
+            yield Sample(t, y.flat, disturbance, signals)
+        now.derive(middle, stage.ahead(y, 0.5 * h, k1), disturbance, k2)
+        now.derive(middle, stage.ahead(y, 0.5 * h, k2), disturbance, k3)
+        now.derive(end, stage.ahead(y, h, k3), disturbance, k4)
+        y = loop.state(y.flat + (h / 6) * (k1.flat + 2 * (k2.flat + k3.flat) + k4.flat))
+    yield final(loop, clock, y.flat, disturbance)
+
+
+def _windows(schedule: DisturbanceSchedule, clock: Clock) -> list[int]:
+    """Which torque of the schedule acts in each step of the clock."""
+    return schedule.windows(0.5 * (clock.times[:-1] + clock.times[1:])).tolist()
 
 
 def adaptive(

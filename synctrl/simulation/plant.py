@@ -82,6 +82,8 @@ class Plant:
 
     def at(self, t: float) -> Plant:
         """The plant as it is at time t: with the payloads carried then; at an edge from the right."""
+        if not self.schedule.edges:
+            return self
         window = int(self.schedule.windows(np.array(t)))
         if window not in self._stages:
             self._stages[window] = self._stage(window)
@@ -95,8 +97,9 @@ class Plant:
         """v', (n, nv), under joint torques tau, (n, nv), and friction."""
         tau = tau - self.friction(v)
         v_dot = np.zeros(tau.shape)
-        for i, nv, dynamics in self._arms:
-            v_dot[i, :nv] = dynamics(q[i, :nv], v[i, :nv], tau[i, :nv])
+        by_robot = zip(self._arms, *map(self.cell.rows, (q, v, tau, v_dot)), strict=True)
+        for (_, _, dynamics), q_i, v_i, tau_i, v_dot_i in by_robot:
+            v_dot_i[...] = dynamics(q_i, v_i, tau_i)
         return v_dot
 
     def move(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,8 +15,10 @@ from ..robots.parameters import FullParameters, Parameters
 from ..robots.robot import Robot
 from .coupling import Coupling
 from .member_checks import check_friction, check_parameters, check_space, check_trajectory
+from .rows import joint_rows
 from .spaces import JointSpace, Space
 from .trajectories import Trajectory
+from .weights import Weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,16 +46,25 @@ class Member:
     name: str | None = None
 
 
-class Reference(NamedTuple):
-    """Desired motion, (n, m), and weights, (n, m, m), at one instant."""
+@dataclass(slots=True)
+class Reference:
+    """What is desired at one instant, or with a leading axis of time at several.
 
-    xd: np.ndarray
-    xd_dot: np.ndarray
-    xd_ddot: np.ndarray
-    c: np.ndarray
-    c_dot: np.ndarray
-    c_ddot: np.ndarray
-    c_inv: np.ndarray
+    Attributes:
+        desired: xd, xd' and xd'', (3, n, m).
+        weights: c, c', c'' and c^-1, each (n, m, m).
+    """
+
+    desired: np.ndarray
+    weights: Weights
+
+    xd = property(lambda self: self.desired[..., 0, :, :])
+    xd_dot = property(lambda self: self.desired[..., 1, :, :])
+    xd_ddot = property(lambda self: self.desired[..., 2, :, :])
+    c = property(lambda self: self.weights.c)
+    c_dot = property(lambda self: self.weights.c_dot)
+    c_ddot = property(lambda self: self.weights.c_ddot)
+    c_inv = property(lambda self: self.weights.c_inv)
 
 
 class Cell:
@@ -67,6 +77,9 @@ class Cell:
         coupling: which of them are compared.
         space: where the task is given; joint space by default.
         name: for titles.
+
+    Attributes:
+        rows: goes through the rows of an array, (n, ..., nv), each cut to the joints that its robot has.
 
     Raises:
         InputError: sizes that do not fit together; the message names the member.
@@ -90,6 +103,7 @@ class Cell:
                 f"coupling: made for {coupling.robots} robots, but the cell has {len(self.members)}"
             )
         self.robots = tuple(member.robot for member in self.members)
+        self.rows = joint_rows(self.robots)
         self.names = tuple(m.name or f"robot {i}" for i, m in enumerate(self.members, start=1))
         check_space(self.space)
         self.labels = self.space.labels(self.robots)
@@ -129,14 +143,20 @@ class Cell:
     # -- desired motion -----------------------------------------------------------------------------------
 
     def reference_table(self, times: np.ndarray) -> Reference:
-        """What is desired at all of the times, (T,), as arrays with time as their first axis."""
-        motions = [member.trajectory(times) for member in self.members]
-        xd, xd_dot, xd_ddot = (np.stack(part, axis=1) for part in zip(*motions, strict=True))
-        return Reference(xd, xd_dot, xd_ddot, *self.coupling.weights(times, self.m))
+        """What is desired at all of the times, (T,), with time as the first axis."""
+        motions = np.stack([member.trajectory(times) for member in self.members])  # (n, 3, T, m)
+        desired = np.ascontiguousarray(motions.transpose(2, 1, 0, 3))
+        return Reference(desired, self.coupling.weights(times, self.m))
 
     def references(self, times: np.ndarray) -> list[Reference]:
         """What is desired at each of the times, (T,)."""
-        return [Reference(*row) for row in zip(*self.reference_table(times), strict=True)]
+        table = self.reference_table(times)
+        desired, weights = table.desired, table.weights
+        if self.coupling.is_constant:
+            constant = Weights(*(part[0] for part in weights))
+            return [Reference(row, constant) for row in desired]
+        rows = zip(desired, *weights, strict=True)
+        return [Reference(row, Weights(*parts)) for row, *parts in rows]
 
     # -- internals ----------------------------------------------------------------------------------------
 

@@ -13,6 +13,9 @@ from ..errors import CouplingError, CouplingWarning, InputError
 from . import graphs
 from .weights import ConstantWeights, WeightFunction, Weights, WeightSource, as_source, check_weights
 
+#: entries of S up to which a product with S written out is the quickest way
+SMALL = 256
+
 #: what the arguments `c` below may be
 WeightsLike = ArrayLike | WeightFunction | WeightSource
 
@@ -21,7 +24,7 @@ class Coupling:
     """Synchronization errors epsilon_k = sum_i S[k, i] c_i e_i, eqs. (7) and (28).
 
     Every row of S has a few entries, one per robot that is compared, usually two; S is kept as the list of
-    these, so that work grows with their number and no n by n matrix is ever made.
+    these, so that work grows with their number, and is written out for a few robots only.
 
     Args:
         robots: number of robots, n.
@@ -59,6 +62,7 @@ class Coupling:
         graphs.check_rows(name, self.robots, self.edges, self.signs)
         self._source = as_source(self.robots, c)
         self._gather_by_robot()
+        self._S = self.matrix if self.robots * self.pairs <= SMALL else None
 
     # -- ready couplings ----------------------------------------------------------------------------------
 
@@ -233,21 +237,21 @@ class Coupling:
         check_weights(self._source, np.asarray(times, dtype=float), m)
 
     def compare(self, w: np.ndarray) -> np.ndarray:
-        """S w, (p, ...), for one row of w, (n, ...), per robot."""
-        if self._in_pairs:
-            return self._sign_a * w.take(self._a, 0) + self._sign_b * w.take(self._b, 0)
-        return np.add.reduce(self.signs[:, :, None] * w.take(self.edges, 0), axis=1)
+        """S w, (..., p, k), for one row of w, (..., n, k), per robot."""
+        if self._S is not None:
+            return self._S @ w
+        return np.vecmat(self.signs, w.take(self.edges, -2))
 
     def distribute(self, z: np.ndarray) -> np.ndarray:
-        """S^T z, (n, ...), for one row of z, (p, ...), per pair."""
-        return np.add.reduceat(z.take(self._incident, 0) * self._incident_sign, self._first, axis=0)
+        """S^T z, (..., n, k), for one row of z, (..., p, k), per pair."""
+        if self._S is not None:
+            return self._S.T @ z
+        return np.add.reduceat(z.take(self._incident, -2) * self._incident_sign, self._first, axis=-2)
 
     # -- internals ----------------------------------------------------------------------------------------
 
     def _gather_by_robot(self) -> None:
         """Lists the rows of each robot one after another, so that a sum over them is one pass."""
-        self._a, self._b = self.edges[:, 0].copy(), self.edges[:, 1].copy()
-        self._sign_a, self._sign_b = self.signs[:, :1].copy(), self.signs[:, 1:2].copy()
         ends = self.edges.T.ravel()
         order = np.argsort(ends, kind="stable")
         self._incident = np.tile(np.arange(self.pairs), self.edges.shape[1])[order]

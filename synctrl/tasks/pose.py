@@ -78,32 +78,25 @@ class BoundPoseSpace(BoundTipSpace):
     x'' = (acceleration, w_d'), all in world axes, see poses.py.
     """
 
-    def measure(
-        self, q: np.ndarray, v: np.ndarray, xd: np.ndarray, xd_dot: np.ndarray, xd_ddot: np.ndarray
-    ) -> Measurement:
-        tips = self._tips
-        tips.update(q, v)
-        R = tips.rotation
+    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+        (q, v), (xd, xd_dot, xd_ddot) = motion, desired
+        pose, J_w, J_w_dot = self._tips.at(q, v)
+        position, R = pose[:, :3, 3], pose[:, :3, :3]
         e_o, phi = rotations.log(np.stack((rotations.exp(xd[:, 3:]) @ np.swapaxes(R, 1, 2), R)))
         left = rotations.left_jacobian_inverse(e_o)
         right = np.swapaxes(left, 1, 2)
-        J = np.concatenate((tips.J[:, :3], right @ tips.J[:, 3:]), axis=1)
+        J = np.concatenate((J_w[:, :3], right @ J_w[:, 3:]), axis=1)
         x_dot = np.matvec(J, v)
         wd, wd_dot = xd_dot[:, 3:], xd_ddot[:, 3:]
         turning = np.matvec(left, wd)
         left_dot = rotations.left_jacobian_inverse_dot(e_o, turning - x_dot[:, 3:])
         turning_dot = np.matvec(left_dot, wd) + np.matvec(left, wd_dot)
-        J_o_dot = np.swapaxes(left_dot, 1, 2) @ tips.J[:, 3:] + right @ tips.J_dot[:, 3:]
-        J_dot = np.concatenate((tips.J_dot[:, :3], J_o_dot), axis=1)
+        J_o_dot = np.swapaxes(left_dot, 1, 2) @ J_w[:, 3:] + right @ J_w_dot[:, 3:]
+        J_dot = np.concatenate((J_w_dot[:, :3], J_o_dot), axis=1)
         inversion = self._inverse.invert(J, J_dot, q, v)
-        return Measurement(
-            np.concatenate((tips.position, phi), axis=1),
-            np.concatenate((xd[:, :3] - tips.position, e_o), axis=1),
-            x_dot,
-            np.concatenate((xd_dot[:, :3], turning), axis=1),
-            np.concatenate((xd_ddot[:, :3], turning_dot), axis=1),
-            J,
-            inversion.J_inv,
-            J_dot,
-            inversion,
-        )
+        x = np.concatenate((position, phi), axis=1)
+        e = np.concatenate((xd[:, :3] - position, e_o), axis=1)
+        rates = desired[1:].copy()
+        rates[:, :, 3:] = turning, turning_dot
+        moved, error = np.stack((x, x_dot)), np.stack((e, rates[0] - x_dot))
+        return Measurement(moved, error, rates, J, inversion.J_inv, J_dot, inversion)

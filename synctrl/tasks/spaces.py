@@ -7,7 +7,8 @@ there to joint space. All arrays have one row per robot.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -20,32 +21,45 @@ from .tips import Tips
 AXES = "xyz"
 
 
-class Measurement(NamedTuple):
-    """Task coordinates of all robots and their desired motion, such that e' = xd_dot - x_dot.
+@dataclass(slots=True)
+class Measurement:
+    """Task coordinates of all robots and their desired motion, such that e' = xd' - x'.
 
-    x, e, x_dot, xd_dot, xd_ddot are (n, m); J, J_inv and J_dot are (n, m, nv), (n, nv, m) and (n, m, nv), or
-    None in joint space. J_inv is J^-1, or a right inverse of a redundant arm's J. `inversion` has how it was
-    found.
+    Attributes:
+        motion: x and x', (2, n, m).
+        error: e and e', (2, n, m).
+        rates: xd' and xd'', (2, n, m).
+        J, J_inv, J_dot: (n, m, nv), (n, nv, m) and (n, m, nv), or None in joint space. J_inv is J^-1, or a
+            right inverse of a redundant arm's J.
+        inversion: how J_inv was found.
     """
 
-    x: np.ndarray
-    e: np.ndarray
-    x_dot: np.ndarray
-    xd_dot: np.ndarray
-    xd_ddot: np.ndarray
+    motion: np.ndarray
+    error: np.ndarray
+    rates: np.ndarray
     J: np.ndarray | None = None
     J_inv: np.ndarray | None = None
     J_dot: np.ndarray | None = None
     inversion: Inversion | None = None
 
+    x = property(lambda self: self.motion[0])
+    x_dot = property(lambda self: self.motion[1])
+    e = property(lambda self: self.error[0])
+    e_dot = property(lambda self: self.error[1])
+    xd_dot = property(lambda self: self.rates[0])
+    xd_ddot = property(lambda self: self.rates[1])
+
 
 class BoundSpace(Protocol):
     """A space bound to the robots of a cell."""
 
-    def measure(
-        self, q: np.ndarray, v: np.ndarray, xd: np.ndarray, xd_dot: np.ndarray, xd_ddot: np.ndarray
-    ) -> Measurement:
-        """Where the robots are and where they should be."""
+    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+        """Where the robots are and where they should be.
+
+        Args:
+            motion: joint positions and velocities, (2, n, nv).
+            desired: xd, xd' and xd'', (3, n, m).
+        """
 
     def to_joints(self, task: Measurement, xref_dot: np.ndarray, xref_ddot: np.ndarray) -> tuple:
         """v_ref and a_ref, (n, nv), of a reference velocity and acceleration in task space, (n, m)."""
@@ -99,10 +113,8 @@ class JointSpace:
 class BoundJointSpace:
     """x = q; every map is the identity."""
 
-    def measure(
-        self, q: np.ndarray, v: np.ndarray, xd: np.ndarray, xd_dot: np.ndarray, xd_ddot: np.ndarray
-    ) -> Measurement:
-        return Measurement(q, xd - q, v, xd_dot, xd_ddot)
+    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+        return Measurement(motion, desired[:2] - motion, desired[1:])
 
     def to_joints(
         self, task: Measurement, xref_dot: np.ndarray, xref_ddot: np.ndarray
@@ -225,16 +237,19 @@ class BoundCartesianSpace(BoundTipSpace):
 
     def __init__(self, tips: Tips, inverse: InverseMap, rows: list[int]):
         super().__init__(tips, inverse)
-        self._rows = rows
+        first, last = rows[0], rows[-1]
+        self._rows = slice(first, last + 1) if rows == list(range(first, last + 1)) else rows
 
-    def measure(
-        self, q: np.ndarray, v: np.ndarray, xd: np.ndarray, xd_dot: np.ndarray, xd_ddot: np.ndarray
-    ) -> Measurement:
-        tips, rows = self._tips, self._rows
-        tips.update(q, v)
-        x, J, J_dot = (part.take(rows, 1) for part in (tips.position, tips.J, tips.J_dot))
+    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+        q, v = motion
+        pose, J, J_dot = self._tips.at(q, v)
+        J, J_dot = J[:, self._rows], J_dot[:, self._rows]
+        moved = np.empty((2, *J.shape[:2]))
+        moved[0] = pose[:, self._rows, 3]
+        np.matvec(J, v, moved[1])
         inversion = self._inverse.invert(J, J_dot, q, v)
-        return Measurement(x, xd - x, np.matvec(J, v), xd_dot, xd_ddot, J, inversion.J_inv, J_dot, inversion)
+        error, rates = desired[:2] - moved, desired[1:]
+        return Measurement(moved, error, rates, J, inversion.J_inv, J_dot, inversion)
 
 
 def _damping(singularity: str | Damping) -> Damping | None:

@@ -161,11 +161,11 @@ class _Steps:
 
 def _pack(constant: bool, tables: list[Reference]) -> tuple[np.ndarray, np.ndarray]:
     """Tables of three stages as the driver's `Reference` wants them."""
-    desired = np.stack([np.concatenate(table[:3], axis=2) for table in tables])
+    desired = np.stack([table.desired.swapaxes(1, 2) for table in tables])  # (3, T, n, 3, m)
     if constant:
-        weights = np.stack([part[0] for part in tables[0][3:]], axis=1)
+        weights = np.stack([part[0] for part in tables[0].weights], axis=1)
     else:
-        weights = np.stack([np.stack(table[3:], axis=2) for table in tables])
+        weights = np.stack([np.stack(table.weights, axis=2) for table in tables])
     return np.ascontiguousarray(desired), np.ascontiguousarray(weights)
 
 

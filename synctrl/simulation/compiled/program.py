@@ -249,8 +249,8 @@ class Program:
         disturbance: np.ndarray,
     ) -> np.ndarray:
         y_dot = np.zeros(self.loop.size)
-        desired = np.ascontiguousarray(np.concatenate(reference[:3], axis=1))
-        weights = np.ascontiguousarray(np.stack(reference[3:], axis=1))
+        desired = np.ascontiguousarray(reference.desired.swapaxes(0, 1))
+        weights = np.ascontiguousarray(np.stack(reference.weights, axis=1))
         table = ReferenceStruct(desired.ctypes.data, weights.ctypes.data, 1, 1)
         pointers = (np.ascontiguousarray(part).ctypes for part in (y, disturbance))
         y_data, disturbance_data = (pointer.data_as(ctypes.c_void_p) for pointer in pointers)

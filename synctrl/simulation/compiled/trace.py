@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...control import law
-from ...control.controller import REFERENCE_ACCELERATIONS
+from ...control.commands import REFERENCE_ACCELERATIONS
 from ...robots.symbolic import Symbols
 from .kind import Kind
 

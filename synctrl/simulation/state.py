@@ -1,0 +1,52 @@
+"""The state of a closed loop, y = (q, v, theta_hat, integrals of epsilon, state of the plant's own)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..tasks.cell import Cell
+
+
+class State:
+    """Parts of a flat vector y as views of it.
+
+    Attributes:
+        flat: y.
+        motion: q and v together, (2, n, nv).
+        q, v: joint positions and velocities, (n, nv).
+        theta_hat: estimates, (n, P).
+        integral: integrals of the synchronization errors, (p, m).
+        hidden: state of the plant's own.
+    """
+
+    __slots__ = ("flat", "hidden", "integral", "motion", "q", "theta_hat", "v")
+
+    def __init__(self, layout: Layout, flat: np.ndarray):
+        a, b, c = layout.ends
+        self.flat = flat
+        self.motion = flat[:a].reshape(layout.motion)
+        self.q, self.v = self.motion
+        self.theta_hat = flat[a:b].reshape(layout.theta)
+        self.integral = flat[b:c].reshape(layout.integral)
+        self.hidden = flat[c:]
+
+    def ahead(self, y: State, h: float, rate: State) -> State:
+        """This state, made to y + h rate."""
+        np.multiply(rate.flat, h, self.flat)
+        np.add(self.flat, y.flat, self.flat)
+        return self
+
+
+class Layout:
+    """Where the parts are in y.
+
+    Args:
+        cell: the cell.
+        hidden: size of the plant's own state.
+    """
+
+    def __init__(self, cell: Cell, hidden: int):
+        self.motion, self.theta = (2, cell.n, cell.nv), cell.theta.shape
+        self.integral = cell.coupling.pairs, cell.m
+        self.ends = tuple(np.cumsum([np.prod(s) for s in (self.motion, self.theta, self.integral)]).tolist())
+        self.size = self.ends[-1] + hidden
