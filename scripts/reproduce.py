@@ -17,6 +17,7 @@ from synctrl.analysis.claims_planar import own_findings, planar_four_claims
 from synctrl.analysis.metrics import as_data, metrics, settling_bands, write_metrics
 from synctrl.errors import SynctrlError
 from synctrl.experiments.reproduction import JOBS, run_all
+from synctrl.experiments.theory import examine
 from synctrl.show.animation import payload_pair_scene, planar_scene
 from synctrl.show.paper_sections import (
     a460_section,
@@ -27,6 +28,7 @@ from synctrl.show.paper_sections import (
 )
 from synctrl.show.report import Section, write_page
 from synctrl.show.style import display
+from synctrl.show.theory_sections import baseline_section, certificate_section
 from synctrl.simulation.result import Result
 
 ANIMATED = (
@@ -57,18 +59,26 @@ def reproduce(out: Path, workers: int) -> Path:
     """Run everything and write it into a folder; returns the path of the page."""
     runs = run_all(out / "runs", workers)
     a460, planar = select(runs, "a460_pair_"), select(runs, "planar_four_")
-    print("\nwriting figures, animations and the page ...", flush=True)
+    print("\nchecking the proof along every run, and comparing controllers ...", flush=True)
+    certificates, comparisons = examine(out / "runs", workers)
+    print("writing figures, animations and the page ...", flush=True)
     claims = [*a460_claims(a460), *planar_four_claims(planar), *own_findings(planar)]
     data = {
         name: as_data(run, metrics(run, settling_bands(*peers(runs, name)))) for name, run in runs.items()
     }
-    write_metrics(out / "metrics.json", data, [claim.as_data() for claim in claims])
+    theory = {
+        "certificates": {name: certificate.as_dict() for name, certificate in certificates.items()},
+        "comparisons": [comparison.as_dict() for comparison in comparisons],
+    }
+    write_metrics(out / "metrics.json", data, [claim.as_data() for claim in claims], **theory)
     layout = JOBS["planar_four_synchronized"].make()
     sections = [
         introduction(),
         a460_section(a460, out / "figures"),
         planar_section(planar, layout, out / "figures"),
         honesty_section(planar),
+        baseline_section(comparisons),
+        certificate_section(certificates, out / "figures"),
         animations(runs, out),
     ]
     page = write_page(out / "index.html", "Adaptive synchronized control, reproduced", sections)
