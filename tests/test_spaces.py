@@ -23,6 +23,11 @@ def bound(axes: str, seed: int):
     return robots, CartesianSpace(axes).bind(robots), q, v, desired
 
 
+def measure(space, q: np.ndarray, v: np.ndarray, desired: np.ndarray):
+    """What a bound space measures of robots in motion; desired: position, velocity and acceleration."""
+    return space.measure(np.stack((q, v)), np.stack(desired))
+
+
 def rows(axes: str) -> list[int]:
     return ["xyz".index(axis) for axis in axes]
 
@@ -32,7 +37,7 @@ def rows(axes: str) -> list[int]:
 @settings(max_examples=10)
 def test_cartesian_space_measures_the_tips_along_its_axes(axes, seed):
     robots, space, q, v, desired = bound(axes, seed)
-    task = space.measure(q, v, *desired)
+    task = measure(space, q, v, desired)
     for i, robot in enumerate(robots):
         np.testing.assert_allclose(task.x[i], robot.tip_position(q[i])[rows(axes)], atol=1e-13)
         np.testing.assert_allclose(task.e[i], desired[0, i] - task.x[i], atol=1e-13)
@@ -49,7 +54,7 @@ def test_cartesian_space_measures_the_tips_along_its_axes(axes, seed):
 @settings(max_examples=10)
 def test_the_joint_reference_moves_the_tip_as_the_task_reference_asks(axes, seed):
     _robots, space, q, v, desired = bound(axes, seed)
-    task = space.measure(q, v, *desired)
+    task = measure(space, q, v, desired)
     if np.linalg.cond(task.J).max() > 1e4:
         return  # no joint motion does what is asked there
     v_ref, a_ref = space.to_joints(task, desired[1], desired[2])
@@ -63,7 +68,7 @@ def test_the_joint_reference_moves_the_tip_as_the_task_reference_asks(axes, seed
 @settings(max_examples=10)
 def test_a_force_on_the_tip_and_its_joint_torque_have_the_same_power(axes, seed):
     _, space, q, v, desired = bound(axes, seed)
-    task, force = space.measure(q, v, *desired), desired[2]
+    task, force = measure(space, q, v, desired), desired[2]
     np.testing.assert_allclose(
         (space.to_torque(task, force) * v).sum(), (force * task.x_dot).sum(), atol=1e-11
     )
@@ -75,7 +80,7 @@ def test_joint_space_is_the_identity(seed):
     robots = [random_robot(seed, 3), random_robot(seed // 2, 3)]
     q, v, xd, xd_dot, xd_ddot = np.random.default_rng(seed).normal(size=(5, 2, 3))
     space = JointSpace().bind(robots)
-    task = space.measure(q, v, xd, xd_dot, xd_ddot)
+    task = measure(space, q, v, (xd, xd_dot, xd_ddot))
     np.testing.assert_array_equal(task.x, q)
     np.testing.assert_array_equal(task.e, xd - q)
     np.testing.assert_array_equal(task.x_dot, v)
@@ -88,7 +93,7 @@ def test_a_singular_robot_does_not_spoil_the_others():
     robots = [rod_arm((1.0, 1.0), (0.3, 0.3)) for _ in range(3)]
     space = CartesianSpace("xy").bind(robots)
     q = np.array([[0.0, 1.0], [0.0, 0.0], [0.5, -1.0]])
-    task = space.measure(q, np.ones((3, 2)), *np.zeros((3, 3, 2)))
+    task = measure(space, q, np.ones((3, 2)), np.zeros((3, 3, 2)))
     for i in (0, 2):
         np.testing.assert_allclose(task.J[i] @ task.J_inv[i], np.eye(2), atol=1e-12)
     assert not np.isfinite(task.J_inv[1]).all() or np.abs(task.J_inv[1]).max() > 1e12
@@ -96,9 +101,9 @@ def test_a_singular_robot_does_not_spoil_the_others():
 
 def test_measurements_survive_the_next_one():
     _robots, space, q, v, desired = bound("xyz", 1)
-    task = space.measure(q, v, *desired)
+    task = measure(space, q, v, desired)
     kept = [part.copy() for part in (task.x, task.e, task.x_dot, task.J, task.J_dot, task.J_inv)]
-    space.measure(q + 1, v - 1, *desired)
+    measure(space, q + 1, v - 1, desired)
     for now, then in zip((task.x, task.e, task.x_dot, task.J, task.J_dot, task.J_inv), kept, strict=True):
         np.testing.assert_array_equal(now, then)
 
