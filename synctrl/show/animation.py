@@ -6,15 +6,20 @@ import numpy as np
 
 from ..checks import positive_number
 from ..errors import InputError
+from ..robots.robot import Robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .scene import Scene
-from .style import robot_color
+from .style import DESIRED, robot_color
 
-GOOD, BAD = np.array([0.10, 0.62, 0.35]), np.array([0.80, 0.10, 0.10])
-LINE = 0.004  # m
+#: colours of a mark without and with the largest synchronization error, told apart by lightness too
+CALM, ALARM = np.array([0.76, 0.79, 0.83]), np.array([0.70, 0.0, 0.11])
+TORQUE = "#e0a100"
+LINE = 0.008  # m
 THIN, THICK = 0.006, 0.022  # m, radius of a bar without and with the largest synchronization error
+BALL, PUSH = 0.016, 0.075  # m, radius of a tip and of the mark of a disturbance
 PAYLOAD = (0.5, 0.08, 0.05)  # m
+PLANAR_TIMES, PAIR_TIMES = 10.0, 20.0  # how much larger tracking errors are drawn
 FPS = 30.0
 
 
@@ -23,7 +28,8 @@ def planar_scene(
 ) -> Scene:
     """Planar arms with their desired paths, and a bar between the tips of every pair that is compared.
 
-    A bar grows and turns from green to red with the synchronization error of its pair.
+    A bar grows and turns red with the synchronization error of its pair. A thin bar in the colour of its
+    robot leads from where a tip should be to where it would be if its error were `PLANAR_TIMES` as large.
 
     Args:
         result: a run in Cartesian space along x and y.
@@ -35,24 +41,22 @@ def planar_scene(
     Raises:
         InputError: a run in another space, or one without its experiment.
     """
-    if result.x.shape[2] != 2:
-        raise InputError(f"result: expected tips along x and y, found {result.x.shape[2]} coordinates")
+    if result.info["axes"] != ["x", "y"]:
+        raise InputError(f"result: expected tips along x and y, found {', '.join(result.info['axes'])}")
     share, limit = _share(result, limit)
     caption = (
-        "Lines: desired paths. Bars between neighbouring tips grow and turn red with their synchronization "
-        f"error; fully red from {limit:.2g} {result.unit('sync_error')}."
+        f"Bars between neighbours: synchronization error, thick and red from {_shown(result, limit)}. "
+        f"Thin bars at the tips: tracking error, {PLANAR_TIMES:g} times as large. Dark lines: desired paths."
     )
     frames = _frames(result, fps)
-    scene, height = _robots(result, experiment, frames, fps, caption)
-    tips = _with_height(result.x[frames], height)
-    for i, name in enumerate(result.names):
-        path = _with_height(result.x_desired[frames, i], height)
-        scene.add_line(f"desired path of {name}", path, robot_color(i), LINE)
-        scene.add_sphere(f"tip of {name}", 0.02, tips[:, i], robot_color(i))
-        scene.add_legend(name, robot_color(i))
+    scene, robots = _robots(result, experiment, frames, fps, caption, colored=True)
+    height = float(robots[0].tip_position(result.q[0, 0, : robots[0].nv])[2])
+    tips, desired = (_with_height(x[frames], height) for x in (result.x, result.x_desired))
     for k, (a, b) in enumerate(result.info["pairs"]):
-        color, radius = _bar(share[frames, k])
+        color, radius = _mark(share[frames, k])
         scene.add_segment(f"error {k + 1}", tips[:, a], tips[:, b], radius, color)
+    _add_tracking(scene, result, desired, tips, PLANAR_TIMES)
+    _add_disturbances(scene, result, robots, frames)
     return scene
 
 
@@ -62,60 +66,89 @@ def payload_pair_scene(
     """Two arms that carry a level payload between their wrists.
 
     The payload is drawn, not simulated: a box midway between the wrists and along the line through them. It
-    turns from green to red with the synchronization error.
+    turns red with the synchronization error. A thin bar in the colour of its robot leads from where a wrist
+    should be to where it would be if its error were `PAIR_TIMES` as large.
 
     Args:
-        result: a run of two robots.
+        result: a run of two robots in joint space.
         experiment: what made it; needed for a result loaded from a file.
         limit: synchronization error that is fully red; by default the largest of the run.
         fps: frames per second.
 
     Raises:
-        InputError: a run of another number of robots, or one without its experiment.
+        InputError: a run of other robots or in another space, or one without its experiment.
     """
-    if result.x.shape[1] != 2:
-        raise InputError(f"result: expected two robots, found {result.x.shape[1]}")
+    if result.x.shape[1] != 2 or result.info["task_unit"] != "rad":
+        raise InputError(
+            "result: expected two robots in joint space, found "
+            f"{result.x.shape[1]} with coordinates in {result.info['task_unit']}"
+        )
     share, limit = _share(result, limit)
-    shown, scale = (np.rad2deg(limit), "deg") if result.unit("sync_error") == "rad" else (limit, "")
     caption = (
-        "The payload is drawn, not simulated. It turns red with the synchronization error; fully red from "
-        f"{shown:.2g} {scale}."
+        f"The payload is drawn, not simulated; fully red from {_shown(result, limit)} of synchronization "
+        f"error. Thin bars at the wrists: tracking error, {PAIR_TIMES:g} times as large. "
+        "Dark lines: desired paths."
     )
     frames = _frames(result, fps)
-    scene, _ = _robots(result, experiment, frames, fps, caption)
-    robots = _experiment(result, experiment).cell.robots
-    wrists = [
-        np.array([robot.tip_position(q) for q in result.q[frames, i, : robot.nv]])
-        for i, robot in enumerate(robots)
-    ]
-    for i, name in enumerate(result.names):
-        scene.add_line(f"path of {name}", wrists[i], robot_color(i), LINE)
-        scene.add_legend(name, robot_color(i))
-    middle, along = 0.5 * (wrists[0] + wrists[1]), wrists[1] - wrists[0]
-    color, _ = _bar(share[frames].max(axis=1))
+    scene, robots = _robots(result, experiment, frames, fps, caption, colored=False)
+    wrists, desired = (_tips(robots, q[frames]) for q in (result.q, result.x_desired))
+    color, _ = _mark(share[frames].max(axis=1))
+    middle, along = wrists.mean(axis=1), wrists[:, 1] - wrists[:, 0]
     scene.add_box("payload", PAYLOAD, middle, color, quaternion=_turned(along))
+    _add_tracking(scene, result, desired, wrists, PAIR_TIMES)
+    _add_disturbances(scene, result, robots, frames)
     return scene
 
 
-def _experiment(result: Result, experiment: Experiment | None) -> Experiment:
-    found = experiment or result.experiment
-    if found is None:
-        raise InputError("experiment: expected the one that made this result, which was loaded from a file")
-    return found
-
-
 def _robots(
-    result: Result, experiment: Experiment | None, frames: np.ndarray, fps: float, caption: str
-) -> tuple[Scene, float]:
-    """A scene with the robots, and the height of the first one's tip."""
-    scene = Scene(fps=fps, title=str(result.info["title"]), caption=caption)
-    robots = _experiment(result, experiment).cell.robots
-    for i, robot in enumerate(robots):
+    result: Result,
+    experiment: Experiment | None,
+    frames: np.ndarray,
+    fps: float,
+    caption: str,
+    *,
+    colored: bool,
+) -> tuple[Scene, tuple[Robot, ...]]:
+    """A scene with the robots, in their own colours or in those of the figures."""
+    experiment = experiment or result.experiment
+    if experiment is None:
+        raise InputError("experiment: expected the one that made this result, which was loaded from a file")
+    title = str(result.info["title"])
+    scene = Scene(fps=fps, title=title[:1].upper() + title[1:], caption=caption)
+    for i, robot in enumerate(experiment.cell.robots):
         if robot.visual is None:
             raise InputError(f"robot '{robot.name}' has no shapes to show")
         q = np.array([robot.configuration(row) for row in result.q[frames, i, : robot.nv]])
-        scene.add_robot(result.names[i], robot.model, robot.visual, q)
-    return scene, float(robots[0].tip_position(result.q[0, 0, : robots[0].nv])[2])
+        color = robot_color(i) if colored else None
+        scene.add_robot(result.names[i], robot.model, robot.visual, q, color)
+        scene.add_legend(result.names[i], robot_color(i))
+    return scene, experiment.cell.robots
+
+
+def _add_tracking(scene: Scene, result: Result, desired: np.ndarray, tips: np.ndarray, times: float) -> None:
+    """Desired paths, and tracking errors drawn larger than they are; positions are (T, n, 3)."""
+    for i, name in enumerate(result.names):
+        scene.add_line(f"desired path of {name}", desired[:, i], DESIRED, LINE)
+        far = desired[:, i] + times * (tips[:, i] - desired[:, i])
+        scene.add_segment(f"error of {name}", desired[:, i], far, THIN, robot_color(i))
+        scene.add_sphere(f"end of error of {name}", BALL, far, robot_color(i))
+
+
+def _add_disturbances(scene: Scene, result: Result, robots: tuple[Robot, ...], frames: np.ndarray) -> None:
+    """A ball around the base of a robot while a torque acts on it from outside."""
+    for i, name in enumerate(result.names):
+        acts = np.abs(result.disturbance[:, i]).max(axis=1) > 0
+        if acts.any():
+            base = robots[i].with_tip(robots[i].joint_names[0]).tip_position(np.zeros(robots[i].nv))
+            scene.add_sphere(f"torque on {name}", PUSH * acts[frames], base, TORQUE)
+            scene.add_legend(f"torque on {name}", TORQUE)
+
+
+def _tips(robots: tuple[Robot, ...], q: np.ndarray) -> np.ndarray:
+    """Positions of the tips, (T, n, 3), m, of joint positions, (T, n, nv)."""
+    return np.array(
+        [[robot.tip_position(row[: robot.nv]) for robot, row in zip(robots, qs, strict=True)] for qs in q]
+    )
 
 
 def _frames(result: Result, fps: float) -> np.ndarray:
@@ -131,9 +164,15 @@ def _share(result: Result, limit: float | None) -> tuple[np.ndarray, float]:
     return np.clip(size / limit, 0, 1), limit
 
 
-def _bar(share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _shown(result: Result, size: float) -> str:
+    """A synchronization error for the caption: degrees for rad, else its own unit."""
+    unit = result.unit("sync_error")
+    return f"{np.rad2deg(size):.2g} deg" if unit == "rad" else f"{size:.2g} {unit}"
+
+
+def _mark(share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Colour, (T, 3), and radius, (T,), of a mark for an error from 0 to 1."""
-    return GOOD + share[:, None] * (BAD - GOOD), THIN + share * (THICK - THIN)
+    return CALM + share[:, None] * (ALARM - CALM), THIN + share * (THICK - THIN)
 
 
 def _with_height(xy: np.ndarray, z: float) -> np.ndarray:
