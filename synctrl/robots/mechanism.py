@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,7 @@ class Mechanism:
         return [joints, self.tip_parent, self.tip_translation.tolist(), self.tip_rotation.tolist()]
 
 
+@lru_cache(maxsize=256)  # a robot does not change
 def mechanism(robot: Robot) -> tuple[Mechanism, pin.SE3]:
     """A robot's mechanism, and the placement of its first joint in the world.
 

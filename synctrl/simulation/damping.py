@@ -58,5 +58,7 @@ class DampingLog:
 
 def spans(active: np.ndarray) -> list[tuple[int, int]]:
     """First and last index of every run of True in a row, (T,)."""
+    if not active.any():
+        return []
     edges = np.flatnonzero(np.diff(np.concatenate(([0], active.astype(int), [0]))))
     return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
