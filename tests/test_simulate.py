@@ -38,7 +38,7 @@ def assert_same(one, two, names=LAYOUT):
 @pytest.mark.parametrize("make", [planar_four, a460_pair])
 @pytest.mark.parametrize("integrator", ["rk4", "LSODA"])
 def test_the_same_input_gives_the_same_bits(make, integrator):
-    runs = [make().simulate(duration=0.05, integrator=integrator) for _ in range(2)]
+    runs = [make().simulate(duration=0.02, integrator=integrator) for _ in range(2)]
     assert runs[0] == runs[1]
 
 
