@@ -39,7 +39,8 @@ def test_a_notebook_has_no_stored_output(path):
 def test_a_notebook_runs_and_shows_figures_and_an_animation(path, tmp_path):
     notebook = jupytext.read(path)
     shorten(notebook)
-    nbclient.NotebookClient(notebook, timeout=300, kernel_name="python3", resources=folder(tmp_path)).execute()
+    client = nbclient.NotebookClient(notebook, timeout=300, kernel_name="python3", resources=folder(tmp_path))
+    client.execute()
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     data = [output.data for output in outputs if "data" in output]
     assert sum("image/png" in item for item in data) >= 4

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 WIDTH = 6.4  # inches
 DPI = 150
 
-_STYLE: dict[str, Any] = {
+_STYLE: Any = {
     "font.family": "DejaVu Sans",
     "font.size": 9,
     "axes.titlesize": 10,
@@ -56,8 +56,8 @@ def style() -> Iterator[None]:
     """This package's look, for the figures made inside; what was set before comes back after."""
     from matplotlib import rc_context, rcParamsDefault
 
-    plain: Any = {k: v for k, v in rcParamsDefault.items() if k != "backend"}
-    with rc_context(plain), rc_context(_STYLE):
+    default: Any = {k: v for k, v in rcParamsDefault.items() if k != "backend"}
+    with rc_context(default), rc_context(_STYLE):
         yield
 
 
