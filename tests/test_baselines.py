@@ -54,6 +54,18 @@ def test_the_factor_is_found_above_and_below_one(share: float) -> None:
     assert match.peak_torque == pytest.approx(share * independent, rel=1e-3)
 
 
+class Hill(Bench):
+    """Peak torque that is largest at the gains given, and falls when they grow or shrink."""
+
+    def peak_torque(self, gains) -> float:
+        return 2.0 - np.log(float(gains.Lambda) / float(GAINS.Lambda)) ** 2
+
+
+def test_of_several_factors_the_one_above_one_is_taken() -> None:
+    match = match_peak_torque(Hill(small(), {}), 1.0)  # also reached at a factor of 1 / e
+    assert match.factor == pytest.approx(np.e, rel=1e-3)
+
+
 def test_gains_under_which_a_run_has_to_stop_count_as_too_much_torque() -> None:
     bench, base = Bench(small(), {"duration": 0.4, "dt": 0.04}), small().gains.independent()
     with pytest.raises(SimulationError):  # the search tries a factor of 4
