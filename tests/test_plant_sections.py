@@ -1,0 +1,98 @@
+"""The page's sections on other plants, on what is learned, and on the independent judge."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from synctrl.analysis.identification import identify
+from synctrl.analysis.judge import AGREEMENT, compare_runs
+from synctrl.errors import InputError
+from synctrl.experiments import a460_full_pair, a460_pair
+from synctrl.experiments.judged import joint_pair
+from synctrl.experiments.reproduction import JOBS, judge_jobs, judged
+from synctrl.show.judge_plots import differences
+from synctrl.show.judge_section import judge_section
+from synctrl.show.plant_sections import friction_section, full_a460_section, identification_section
+from synctrl.show.report import write_page
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """Short runs of what the sections show."""
+    make = {
+        "synchronized": a460_pair,
+        "independent": partial(a460_pair, synchronized=False),
+        "full": a460_full_pair,
+        "full_alone": partial(a460_full_pair, synchronized=False),
+        "friction_unknown": a460_pair,
+        "friction_adapted": partial(a460_pair, adapt_friction=True),
+    }
+    return {name: experiment().simulate(0.05) for name, experiment in make.items()}
+
+
+def test_the_page_shows_three_and_six_joints_side_by_side(runs, tmp_path) -> None:
+    page = write_page(tmp_path / "index.html", "page", [full_a460_section(runs, tmp_path)]).read_text("utf-8")
+    for figure in range(2, 8):
+        for joints in ("three", "six"):
+            assert f"Figure {figure}, " in page
+            assert (tmp_path / f"figure_{figure:02d}_{joints}_joints.svg").stat().st_size > 1000
+    assert "joint5" in page
+
+
+def test_the_page_compares_friction_unknown_and_adapted_at_equal_times(runs, tmp_path) -> None:
+    page = write_page(tmp_path / "index.html", "page", [friction_section(runs, tmp_path)]).read_text("utf-8")
+    assert "friction adapted" in page
+    assert JOBS["a460_pair_friction_unknown"].duration == JOBS["a460_pair_friction_adapted"].duration
+
+
+def test_the_page_says_what_was_learned(runs, tmp_path) -> None:
+    found = {"the <run>": identify(runs["synchronized"])}
+    page = write_page(tmp_path / "index.html", "page", [identification_section(found)]).read_text("utf-8")
+    assert "the &lt;run&gt;: robot 2" in page
+    assert page.count("<td>15</td>") == 2
+
+
+def test_runs_that_differ_are_told_from_those_that_agree(runs) -> None:
+    run = runs["synchronized"]
+    same = compare_runs(run, run)
+    assert same.agrees
+    assert same.tracking.max() == same.sync.max() == 0
+    shifted = replace(run, sync_error=run.sync_error + 2 * AGREEMENT * np.abs(run.sync_error).max())
+    other = compare_runs(run, shifted)
+    assert not other.agrees
+    np.testing.assert_allclose(other.sync, 2 * AGREEMENT)
+    with pytest.raises(InputError, match="same instants"):
+        compare_runs(run, a460_pair().simulate(0.04))
+
+
+def test_the_judges_section_has_a_line_and_a_row_per_cell(runs, tmp_path) -> None:
+    comparison = compare_runs(runs["synchronized"], runs["independent"])
+    lines = differences([comparison, comparison]).axes[0].get_lines()
+    assert len(lines) == 3
+    section = judge_section([comparison], tmp_path)
+    page = write_page(tmp_path / "index.html", "page", [section]).read_text("utf-8")
+    assert "<td>NO</td>" in page
+    assert "not installed" not in page
+
+
+def test_without_mujoco_the_page_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
+    monkeypatch.setattr("synctrl.experiments.reproduction.find_spec", lambda name: None)
+    assert judge_jobs() == {}
+    page = write_page(tmp_path / "index.html", "page", [judge_section(judged({}), tmp_path)])
+    assert "MuJoCo is not installed" in page.read_text("utf-8")
+
+
+def test_runs_of_the_judge_are_found_in_pairs() -> None:
+    pytest.importorskip("mujoco", reason="MuJoCo is an extra: pip install 'synctrl[mujoco]'")
+    jobs = judge_jobs()
+    assert {jobs[name].plant for name in jobs} == {"pinocchio", "mujoco"}
+    experiment = joint_pair("planar2r")
+    pair = {
+        "judge_x": experiment.simulate(0.02),
+        "judge_x_mujoco": experiment.simulate(0.02, plant="mujoco"),
+    }
+    assert [comparison.agrees for comparison in judged({**pair, "other": pair["judge_x"]})] == [True]
