@@ -217,3 +217,11 @@ def test_scratch_arrays_have_the_sizes_that_the_code_asks_for():
         addresses = [ctypes.addressof(size) + 8 * k for k in range(4)]
         work(*(ctypes.c_void_p(address) for address in addresses))
     assert program.scratch == tuple(max(column) for column in zip(*sizes, strict=True))
+
+
+@pytest.mark.parametrize("engine", ["pinocchio", "compiled"])
+def test_what_a_stopped_run_hands_over_is_finite(engine):
+    with pytest.raises(NonFiniteError) as caught:
+        a460_pair(gains=Gains(8, 8, 1e6, 10, 0.3)).simulate(0.5, 5e-3, engine=engine)
+    for name in LAYOUT:
+        assert np.isfinite(getattr(caught.value.result, name)).all(), name

@@ -13,6 +13,8 @@ from .integrators import Sample
 #: parts of the state, in order
 PARTS = ("position", "velocity", "parameter estimate", "integral of the synchronization error")
 
+HINT = "the gains may be too high for the step, or the closed loop unstable"
+
 
 class Guard:
     """Checks every logged instant for non-finite states, singular Jacobians and orientation errors near pi.
@@ -44,6 +46,9 @@ class Guard:
             self._check_orientations(sample.t, task.e[:, 3:])
         if task.J is not None and task.J_inv is not None and np.isfinite(self._limit):
             self._check_jacobians(sample.t, task.J, task.J_inv)
+        rows = _non_finite_rows(sample.signals.tau)
+        if rows.size:
+            raise not_finite(self._loop.cell, sample.t, int(rows[0]), "torque")
 
     def _check_jacobians(self, t: float, J: np.ndarray, J_inv: np.ndarray) -> None:
         condition = np.sqrt((J * J).sum((1, 2)) * (J_inv * J_inv).sum((1, 2)))
@@ -78,14 +83,17 @@ class Guard:
             )
         name, rows = broken[0]
         i = int(rows[0]) if name != PARTS[3] else int(self._loop.cell.coupling.edges[rows[0], 0])
-        hint = "the gains may be too high for the step, or the closed loop unstable"
+        hint = HINT
         if self._condition[i] > 100:
             hint = f"its Jacobian was nearly singular before, with condition number {self._condition[i]:.3g}"
-        return NonFiniteError(
-            f"the {name} of {self._loop.cell.names[i]} is no longer finite at t = {sample.t:g} s; {hint}",
-            time=sample.t,
-            robot=i,
-        )
+        return not_finite(self._loop.cell, sample.t, i, name, hint)
+
+
+def not_finite(cell: Cell, t: float, robot: int, what: str, hint: str = HINT) -> NonFiniteError:
+    """The error of a robot whose numbers ran away."""
+    return NonFiniteError(
+        f"the {what} of {cell.names[robot]} is no longer finite at t = {t:g} s; {hint}", time=t, robot=robot
+    )
 
 
 def singular(cell: Cell, t: float, robot: int, cause: str) -> SingularJacobianError:

@@ -266,6 +266,8 @@ static int check(const Cell *c, const double *y, Work *k, Report *report) {
             k->sign[i] = sign;
         }
     }
+    for (int j = 0; j < c->n * nv; j++)
+        if (!isfinite(k->tau[j])) { report->status = NOT_FINITE; report->robot = size + j; return 1; }
     return 0;
 }
 

@@ -14,7 +14,7 @@ from ...errors import NonFiniteError, OrientationError, SimulationError
 from ...tasks.cell import Reference
 from ..clock import Clock
 from ..disturbances import DisturbanceSchedule
-from ..guard import PARTS, singular
+from ..guard import PARTS, not_finite, singular
 from ..recorder import Recorder
 from .program import Program
 from .structs import LogStruct, ReferenceStruct, ReportStruct
@@ -187,8 +187,10 @@ def _failure(program: Program, t: float, report: ReportStruct) -> SimulationErro
 
 
 def _not_finite(program: Program, t: float, entry: int) -> NonFiniteError:
-    """The error for an entry of the flat state."""
+    """The error for an entry of the flat state, or of the torques that come after it."""
     loop, cell = program.loop, program.loop.cell
+    if entry >= loop.size:
+        return not_finite(cell, t, (entry - loop.size) // cell.nv, "torque")
     marker = np.zeros(loop.size)
     marker[entry] = 1
     name, row = next(
@@ -197,9 +199,4 @@ def _not_finite(program: Program, t: float, entry: int) -> NonFiniteError:
         if part.any()
     )
     i = row if name != PARTS[3] else int(cell.coupling.edges[row, 0])
-    return NonFiniteError(
-        f"the {name} of {cell.names[i]} is no longer finite at t = {t:g} s; the gains may be too high for "
-        "the step, or the closed loop unstable",
-        time=t,
-        robot=i,
-    )
+    return not_finite(cell, t, i, name)

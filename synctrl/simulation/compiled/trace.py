@@ -95,7 +95,7 @@ class Trace:
         ca, rows = self.ca, len(A)
         symbols = ca.SX.sym("A", rows, rows)
         small = rows <= 3
-        inverse = ca.inv_minor(symbols) if small else ca.solve(symbols, ca.SX.eye(rows), "symbolicqr")
+        inverse = ca.inv_minor(symbols) if small else ca.solve(symbols, ca.SX.eye(rows))
         function = ca.Function("inverse", [symbols], [inverse])
         return self._matrix(function(self._back(A)))
 
