@@ -14,11 +14,13 @@ import numpy as np
 
 from synctrl.analysis.claims_a460 import a460_claims
 from synctrl.analysis.claims_planar import own_findings, planar_four_claims
+from synctrl.analysis.identification import Identification, identify
 from synctrl.analysis.metrics import as_data, metrics, settling_bands, write_metrics
 from synctrl.errors import SynctrlError
-from synctrl.experiments.reproduction import JOBS, run_all
+from synctrl.experiments.reproduction import JOBS, judge_jobs, judged, run_all
 from synctrl.experiments.theory import examine
 from synctrl.show.animation import payload_pair_scene, planar_scene
+from synctrl.show.judge_section import judge_section
 from synctrl.show.paper_sections import (
     a460_section,
     animation_section,
@@ -26,6 +28,7 @@ from synctrl.show.paper_sections import (
     introduction,
     planar_section,
 )
+from synctrl.show.plant_sections import friction_section, full_a460_section, identification_section
 from synctrl.show.report import Section, write_page
 from synctrl.show.style import display
 from synctrl.show.theory_sections import baseline_section, certificate_section
@@ -57,7 +60,8 @@ def main() -> int:
 
 def reproduce(out: Path, workers: int) -> Path:
     """Run everything and write it into a folder; returns the path of the page."""
-    runs = run_all(out / "runs", workers)
+    every = run_all(out / "runs", workers, {**JOBS, **judge_jobs()})
+    runs = {name: every[name] for name in JOBS}
     a460, planar = select(runs, "a460_pair_"), select(runs, "planar_four_")
     print("\nchecking the proof along every run, and comparing controllers ...", flush=True)
     certificates, comparisons = examine(out / "runs", workers)
@@ -76,9 +80,13 @@ def reproduce(out: Path, workers: int) -> Path:
         introduction(),
         a460_section(a460, out / "figures"),
         planar_section(planar, layout, out / "figures"),
+        full_a460_section(a460, out / "figures"),
+        friction_section(a460, out / "figures"),
+        identification_section(identified(runs)),
         honesty_section(planar),
         baseline_section(comparisons),
         certificate_section(certificates, out / "figures"),
+        judge_section(judged(every), out / "figures"),
         animations(runs, out),
     ]
     page = write_page(out / "index.html", "Adaptive synchronized control, reproduced", sections)
@@ -91,6 +99,12 @@ def reproduce(out: Path, workers: int) -> Path:
 def select(runs: Mapping[str, Result], prefix: str) -> dict[str, Result]:
     """The runs of one cell, without its name."""
     return {name.removeprefix(prefix): run for name, run in runs.items() if name.startswith(prefix)}
+
+
+def identified(runs: Mapping[str, Result]) -> dict[str, tuple[Identification, ...]]:
+    """What the synchronized runs say about parameters, by the title of the run."""
+    names = [name for name in runs if name.endswith("_synchronized")]
+    return {str(runs[name].info["title"]): identify(runs[name], JOBS[name].make()) for name in names}
 
 
 def peers(runs: Mapping[str, Result], name: str) -> list[Result]:
