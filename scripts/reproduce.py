@@ -23,13 +23,12 @@ from synctrl.show.animation import payload_pair_scene, planar_scene
 from synctrl.show.judge_section import judge_section
 from synctrl.show.paper_sections import (
     a460_section,
-    animation_section,
     honesty_section,
     introduction,
     planar_section,
 )
 from synctrl.show.plant_sections import friction_section, full_a460_section, identification_section
-from synctrl.show.report import Section, write_page
+from synctrl.show.report import Links, write_page
 from synctrl.show.style import display
 from synctrl.show.theory_sections import baseline_section, certificate_section
 from synctrl.simulation.result import Result
@@ -42,6 +41,7 @@ ANIMATED = (
     "planar_four_synchronized_disturbed",
     "planar_four_independent_disturbed",
 )
+SCENES = {"a460_pair": payload_pair_scene, "planar_four": planar_scene}
 
 
 def main() -> int:
@@ -75,19 +75,18 @@ def reproduce(out: Path, workers: int) -> Path:
         "comparisons": [comparison.as_dict() for comparison in comparisons],
     }
     write_metrics(out / "metrics.json", data, [claim.as_data() for claim in claims], **theory)
-    layout = JOBS["planar_four_synchronized"].make()
+    layout, figures = JOBS["planar_four_synchronized"].make(), out / "figures"
     sections = [
-        introduction(),
-        a460_section(a460, out / "figures"),
-        planar_section(planar, layout, out / "figures"),
-        full_a460_section(a460, out / "figures"),
-        friction_section(a460, out / "figures"),
+        introduction(claims),
+        a460_section(a460, figures, animations(runs, out, "a460_pair")),
+        planar_section(planar, layout, figures, animations(runs, out, "planar_four")),
+        full_a460_section(a460, figures),
+        friction_section(a460, figures),
         identification_section(identified(runs)),
         honesty_section(planar),
         baseline_section(comparisons),
-        certificate_section(certificates, out / "figures"),
-        judge_section(judged(every), out / "figures"),
-        animations(runs, out),
+        certificate_section(certificates, figures),
+        judge_section(judged(every), figures),
     ]
     page = write_page(out / "index.html", "Adaptive synchronized control, reproduced", sections)
     print_table(runs)
@@ -113,15 +112,17 @@ def peers(runs: Mapping[str, Result], name: str) -> list[Result]:
     return [runs[twin] for twin in sorted(twins)]
 
 
-def animations(runs: Mapping[str, Result], out: Path) -> Section:
-    """Write the animations; those that are compared share the error at which a mark is fully red."""
-    files = {}
+def animations(runs: Mapping[str, Result], out: Path, cell: str) -> Links:
+    """Write those of a cell; runs that are compared share the error at which a mark is fully red."""
+    links = []
     for name in ANIMATED:
-        scene = payload_pair_scene if name.startswith("a460") else planar_scene
+        if not name.startswith(cell):
+            continue
         limit = max(float(np.linalg.norm(run.sync_error, axis=2).max()) for run in peers(runs, name))
-        path = scene(runs[name], JOBS[name].make(), limit).write(out / "animations" / f"{name}.html")
-        files[path.relative_to(out).as_posix()] = str(runs[name].info["title"])
-    return animation_section(files)
+        scene = SCENES[cell](runs[name], JOBS[name].make(), limit)
+        path = scene.write(out / "animations" / f"{name}.html")
+        links.append((path.relative_to(out).as_posix(), f"Animation: {runs[name].info['title']}"))
+    return Links(tuple(links))
 
 
 def print_table(runs: Mapping[str, Result]) -> None:

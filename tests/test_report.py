@@ -17,7 +17,20 @@ from synctrl.errors import InputError, ResultError, SimulationError
 from synctrl.experiments import planar_four
 from synctrl.experiments.planar_four import GAINS
 from synctrl.experiments.reproduction import Job, run_all
-from synctrl.show.report import Links, Picture, Row, Section, Table, Text, Verdicts, number, write_page
+from synctrl.show.report import (
+    Formulas,
+    Links,
+    Picture,
+    Row,
+    Section,
+    Table,
+    Text,
+    Verdicts,
+    number,
+    words,
+    write_page,
+)
+from synctrl.show.style import display
 from synctrl.simulation.result import Result
 
 ROOT = Path(__file__).parents[1]
@@ -33,6 +46,7 @@ def test_words_from_data_never_become_markup(tmp_path):
     svg = tmp_path / "f.svg"
     svg.write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")
     blocks = [Text((NASTY,)), Table((NASTY,), ((NASTY,),), NASTY), Verdicts((claim,)), Picture(svg, NASTY)]
+    blocks += [Formulas((("x", NASTY, NASTY),)), Table(("", ""), (), groups=((NASTY, 1),))]
     text = page_of(tmp_path, *blocks, Row((Text((NASTY,)),)), Links(((NASTY, NASTY),)))
     assert "<script" not in text
     assert "<img src=x" not in text
@@ -47,6 +61,35 @@ def test_a_claim_that_does_not_hold_says_so(tmp_path):
 def test_a_row_that_does_not_fit_its_table_is_refused(tmp_path):
     with pytest.raises(InputError, match="rows of 2 cells"):
         page_of(tmp_path, Table(("a", "b"), (("1",),)))
+
+
+def test_groups_that_do_not_cover_the_columns_are_refused(tmp_path):
+    text = page_of(tmp_path, Table(("", "b", "c"), (("1", "2", "3"),), groups=(("both", 2),)))
+    assert "<th colspan='2'>both</th>" in text
+    with pytest.raises(InputError, match="groups over 2 columns, found 3"):
+        page_of(tmp_path, Table(("", "b", "c"), (), groups=(("too wide", 3),)))
+
+
+@pytest.mark.parametrize(
+    ("text", "markup"),
+    [
+        ("ε = e_1 - e_2", "ε = e<sub>1</sub> - e<sub>2</sub>"),
+        ("K_ε, e*_i, θ̂_i", "K<sub>ε</sub>, e*<sub>i</sub>, θ̂<sub>i</sub>"),
+        ("planar_four and joint_1", "planar_four and joint_1"),
+        ("a_<b>", "a_&lt;b&gt;"),
+    ],
+)
+def test_a_letter_with_an_underscore_gets_an_index(text, markup):
+    assert words(text) == markup
+
+
+def test_formulas_are_pictures_with_their_text(tmp_path):
+    row = (r"\epsilon_k = \sum_i S_{ki} c_i e_i", "synchronization error", "(7)")
+    text = page_of(tmp_path, Formulas((row,)))
+    assert f'alt="{row[0]}" src="data:image/svg+xml;base64,' in text
+    assert text == page_of(tmp_path, Formulas((row,))), "the same formula, the same bytes"
+    with pytest.raises(InputError, match="expected TeX"):
+        page_of(tmp_path, Formulas(((r"\nonsense{", "", ""),)))
 
 
 def test_a_missing_figure_and_an_unwritable_page_are_clear_errors(tmp_path):
@@ -109,7 +152,52 @@ def test_every_claim_of_the_page_is_in_the_metrics(reproduced):
     verdicts = re.findall(r'<li class="(holds|fails)">', text)
     assert verdicts.count("holds") == sum(claim["holds"] for claim in data["claims"])
     assert verdicts.count("fails") == sum(not claim["holds"] for claim in data["claims"])
+    for claim in data["claims"]:
+        assert words(claim["text"]) in text
+        for figure in claim["figures"]:
+            unit, factor = display(figure["unit"])
+            shown = f"{number(factor * figure['value'])} {unit}".strip()
+            assert f"<li>{words(figure['name'])} <b>{shown}</b></li>" in text
     assert set(data["runs"]) == {path.stem for path in (reproduced / "runs").glob("*.npz")}
+
+
+def shown_metric(data, run, kind, row, axis, name):
+    """A metric of the file as the page has to show it."""
+    found = data["runs"][run][kind]
+    value = found["values"][row][axis][name]
+    return "–" if value is None else number(display(found["units"][name]).factor * value)
+
+
+def test_every_metric_of_the_page_is_in_the_metrics(reproduced):
+    text = (reproduced / "index.html").read_text("utf-8")
+    data = json.loads((reproduced / "metrics.json").read_text("utf-8"))
+    compared = ("a460_pair_{}", "planar_four_{}", "planar_four_{}_disturbed")
+    rows = 0
+    for pattern in compared:
+        pair = [pattern.format(kind) for kind in ("synchronized", "independent")]
+        for kind, prefix in (("tracking_error", ""), ("sync_error", "ε_")):
+            for row, axes in data["runs"][pair[0]][kind]["values"].items():
+                for axis in axes:
+                    (start,) = re.findall(
+                        f"<th scope='row'>{re.escape(words(f'{prefix}{row}, {axis}'))}</th>(.*?)</tr>",
+                        section_of(text, data["runs"][pair[0]]["title"]),
+                    )
+                    cells = re.findall("<td>(.*?)</td>", start)
+                    del cells[5], cells[2]  # the ratios
+                    expected = [
+                        shown_metric(data, run, kind, row, axis, name)
+                        for name in ("peak", "rms", "ise", "settling_time", "final")
+                        for run in pair
+                    ]
+                    assert cells == expected
+                    rows += 1
+    assert rows == 2 * 3 + 3 + 2 * (4 + 4) * 2
+
+
+def section_of(text, title):
+    """The tables of the page that compare a run: from the first caption with its title on to the torques."""
+    start = text.index(f"Tracking error e: {title} (sync.)")
+    return text[start : text.index("Peak torque", start)]
 
 
 def test_every_run_can_be_loaded_and_says_what_it_is(reproduced):

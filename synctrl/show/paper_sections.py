@@ -2,58 +2,85 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from ..analysis.claims import Claim
+from ..analysis.claims import kind as kind_of
 from ..analysis.claims_a460 import a460_claims
 from ..analysis.claims_planar import own_findings, planar_four_claims
-from ..analysis.metrics import metrics, row_names, settling_bands
+from ..analysis.metrics import Metrics, metrics, row_names, settling_bands, squared
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .layout import cell_layout
 from .plots import common_limits, joint_trajectories, save, sync_errors, tracking_errors
-from .report import Links, Picture, Row, Section, Table, Text, Verdicts, number
+from .report import Formulas, Links, Picture, Row, Section, Table, Text, Verdicts, number
 from .style import display
 
-LAW = """\
-e_i   = xd_i - x_i                                              position error            (1)
-ε_k   = Σ_i S_ki c_i e_i                                        synchronization error     (7), (28)
-e*_i  = c_i e_i + β Σ_k S_ki ∫ε_k                               coupled error             (10), (29)
-u_i   = c_i xd_i' + c_i' e_i + β Σ_k S_ki ε_k + Λ e*_i          command                   (11), (30)
-r_i   = u_i - c_i x_i'                                                                    (12), (31)
-τ_i   = Y_i θ̂_i + K_r s_i + Jᵀ c_iᵀ K_ε Σ_k S_ki ε_k            torque, s_i = J⁻¹ c_i⁻¹ r_i  (13), (32)
-θ̂_i'  = Γ Y_iᵀ s_i                                              adaptation                (14)"""
+LAW = (
+    (r"e_i = x_i^d - x_i", "tracking error", "(1)"),
+    (r"\epsilon_k = \sum_i S_{ki}\, c_i e_i", "synchronization error of pair k", "(7), (28)"),
+    (r"e^*_i = c_i e_i + \beta \sum_k S_{ki} \int\epsilon_k\, dt", "coupled error", "(10), (29)"),
+    (
+        r"u_i = c_i \dot x_i^d + \dot c_i e_i + \beta \sum_k S_{ki}\, \epsilon_k + \Lambda e^*_i",
+        "command",
+        "(11), (30)",
+    ),
+    (
+        r"r_i = u_i - c_i \dot x_i = \dot e^*_i + \Lambda e^*_i, \quad s_i = J_i^{-1} c_i^{-1} r_i",
+        "coupled velocity error, and the same in joint space",
+        "(12), (31)",
+    ),
+    (
+        r"\tau_i = Y_i \hat\theta_i + K_r s_i + J_i^T c_i^T K_\epsilon \sum_k S_{ki}\, \epsilon_k",
+        "torque",
+        "(13), (32)",
+    ),
+    (r"\dot{\hat\theta}_i = \Gamma\, Y_i^T s_i", "adaptation", "(14)"),
+)
 
 
-def introduction() -> Section:
-    """What this page is, and the law."""
+def introduction(claims: Sequence[Claim]) -> Section:
+    """What this page is, the law, and how many of the claims hold."""
+    failed = [claim.text for claim in claims if not claim.holds]
+    held = f"{len(claims) - len(failed)} of {len(claims)} claims that are checked below hold."
     return Section(
         "What is shown here",
         (
             Text(
                 (
                     "Sun and Mills, “Adaptive Synchronized Control for Coordination of Multirobot Assembly "
-                    "Tasks” (2002), computed again: every robot tracks its own path with an adaptive law and "
-                    "couples its error with its neighbours', so that tracking and synchronization errors "
-                    "both go to zero. Independent control, the paper's comparison, is the same controller "
+                    "Tasks” (2002), computed again. Every robot tracks its own path with an adaptive law and "
+                    "couples its error with its neighbours’, so that tracking and synchronization errors "
+                    "both go to zero. Independent control, the paper’s comparison, is the same controller "
                     "with β = K_ε = 0.",
                 )
             ),
-            Text((LAW,), "formula"),
+            Formulas(LAW),
             Text(
                 (
-                    "Every number on this page was computed when the page was made. A claim of the paper "
-                    "that does not hold here says so.",
+                    "S says which robots are compared (a pair, or a ring of neighbours), c_i are their "
+                    "weights, Y_i is the regressor of robot i and θ̂_i its estimate of the parameters.",
+                    "Every number on this page was computed when the page was made; all of them, in SI "
+                    "units, are in metrics.json, and the runs themselves in the folder runs. A claim of the "
+                    "paper that does not hold here says so.",
+                    " ".join([held, *(f"Does not hold: “{text}”" for text in failed)]),
                 )
             ),
         ),
     )
 
 
-def a460_section(runs: Mapping[str, Result], folder: Path) -> Section:
-    """Section V-A with figures 2 to 7, from runs `synchronized`, `independent` and `frictionless`."""
+def a460_section(runs: Mapping[str, Result], folder: Path, animations: Links) -> Section:
+    """Section V-A with figures 2 to 7.
+
+    Args:
+        runs: `synchronized`, `independent` and `frictionless`.
+        folder: where figures go.
+        animations: links to those of this cell.
+    """
     ours, theirs = runs["synchronized"], runs["independent"]
     limits = common_limits("sync_error", ours, theirs)
     figures = {
@@ -70,34 +97,40 @@ def a460_section(runs: Mapping[str, Result], folder: Path) -> Section:
         (
             Text(
                 (
-                    "Joint angles and gains are the paper's; ε = e_1 - e_2. The time of the motion, 2 s, and "
-                    "the initial estimate, 0.7 of the true parameters, are our choices.",
+                    "Two arms move a payload along a cubic path; ε = e_1 - e_2 compares their joint errors. "
+                    "Joint angles and gains are the paper’s. The time of the motion, 2 s, the initial "
+                    "estimate, 0.7 of the true parameters, and the place of the second base are our choices.",
                 )
             ),
             Text(
                 (
-                    "Synthetic data: masses, inertias and friction of the A460 were never published. Those "
-                    "used here are invented to be plausible, so the size of the errors is not the paper's.",
+                    "Synthetic data: no published masses, inertias or friction of the A460 were found. Those "
+                    "used here are invented to be plausible, so the size of the errors is not the paper’s; "
+                    "only their comparison means something. Friction is in the plant and unknown to the "
+                    "controller.",
                 ),
                 "note",
             ),
+            animations,
             Row((pictures[2], pictures[5])),
             Row((pictures[3], pictures[6])),
             Row((pictures[4], pictures[7])),
-            metrics_table(ours, theirs),
-            torque_table(ours, theirs),
+            *metrics_tables(ours, theirs),
             Verdicts(tuple(a460_claims(runs))),
         ),
     )
 
 
-def planar_section(runs: Mapping[str, Result], experiment: Experiment, folder: Path) -> Section:
+def planar_section(
+    runs: Mapping[str, Result], experiment: Experiment, folder: Path, animations: Links
+) -> Section:
     """Section V-B with figures 8 to 16.
 
     Args:
         runs: `synchronized`, `independent`, the two `..._disturbed`, and those of `own_findings`.
         experiment: the synchronized cell, for its layout.
         folder: where figures go.
+        animations: links to those of this cell.
     """
     pairs = [(runs["synchronized"], runs["independent"])]
     pairs.append((runs["synchronized_disturbed"], runs["independent_disturbed"]))
@@ -113,21 +146,27 @@ def planar_section(runs: Mapping[str, Result], experiment: Experiment, folder: P
         (
             Text(
                 (
-                    "Tables II and III and the gains are the paper's. Table II does not give φ; it is "
-                    "0.1 rad here, which makes the cell nearly square. On which robots move on the larger "
-                    "circle the text and Table II disagree; the text is followed.",
+                    "Four arms move along circles about the origin and keep their distances; a ring of four "
+                    "pairs compares neighbours. Tables II and III and the gains are the paper’s. Table II "
+                    "does not give φ; it is 0.1 rad here, which makes the cell nearly square. On which "
+                    "robots move on the larger circle the text and Table II disagree; the text is followed. "
+                    "The weights c are lengths, so ε is in m².",
                 )
             ),
+            animations,
             pictures[8],
             Row((pictures[9], pictures[11])),
             Row((pictures[10], pictures[12])),
-            metrics_table(*pairs[0]),
-            torque_table(*pairs[0]),
-            Text(("Disturbed: +1 N·m on both joints of robot 1 for 0.5 s ≤ t < 0.75 s.",)),
+            *metrics_tables(*pairs[0]),
+            Text(
+                (
+                    "Disturbed: +1 N·m on both joints of robot 1 for 0.5 s ≤ t < 0.75 s. That it acts on "
+                    "both joints is our choice.",
+                )
+            ),
             Row((pictures[13], pictures[15])),
             Row((pictures[14], pictures[16])),
-            metrics_table(*pairs[1]),
-            torque_table(*pairs[1]),
+            *metrics_tables(*pairs[1]),
             Verdicts(tuple(planar_four_claims(runs))),
         ),
     )
@@ -135,62 +174,78 @@ def planar_section(runs: Mapping[str, Result], experiment: Experiment, folder: P
 
 def honesty_section(runs: Mapping[str, Result]) -> Section:
     """What the paper's comparison leaves unsaid."""
-    return Section("Said honestly", (Verdicts(tuple(own_findings(runs))),))
+    return Section(
+        "Said honestly",
+        (
+            Text(
+                (
+                    "Without synchronization the paper sets β = K_ε = 0 and leaves all other gains as they "
+                    "are. That takes gain away, so part of what synchronization seems to achieve is achieved "
+                    "by more gain. Of the gains that synchronization adds, β does the work.",
+                )
+            ),
+            Verdicts(tuple(own_findings(runs))),
+        ),
+    )
 
 
-def animation_section(files: Mapping[str, str]) -> Section:
-    """Links to the animations, from file name to title."""
-    words = "MeshCat scenes, one file each; they play without a network and without a server."
-    return Section("Animations", (Text((words,)), Links(tuple(files.items()))))
-
-
-def metrics_table(ours: Result, theirs: Result) -> Table:
-    """Metrics of every robot, pair and axis, synchronized against independent."""
+def metrics_tables(ours: Result, theirs: Result) -> list[Table]:
+    """Metrics of every robot, pair and axis, synchronized against independent, and peak torques."""
     bands = settling_bands(ours, theirs)
     computed = metrics(ours, bands), metrics(theirs, bands)
-    rows: list[tuple[str, ...]] = []
-    for kind, symbol in (("tracking_error", "e"), ("sync_error", "ε")):
-        a, b = (getattr(m, kind) for m in computed)
-        unit, factor = display(ours.unit(kind))
-        for k, name in enumerate(row_names(ours, kind)):
-            for axis, label in enumerate(ours.info["axes"]):
-                at = (k, axis)
-                rows.append(
-                    (
-                        f"{symbol} {name}, {label}, {unit}",
-                        *_both(factor * a.peak[at], factor * b.peak[at]),
-                        *_both(factor * a.rms[at], factor * b.rms[at]),
-                        *_both(factor**2 * a.ise[at], factor**2 * b.ise[at], ratio=False),
-                        *_both(a.settling_time[at], b.settling_time[at], ratio=False),
-                        *_both(factor * a.final[at], factor * b.final[at], ratio=False),
-                    )
-                )
-    compared = ("sync.", "indep.", "ratio")
-    head = ("", *(f"{name} {part}" for name in ("peak", "RMS") for part in compared))
-    head = (*head, *(f"{name} {part}" for name in ("ISE", "settling, s,", "final") for part in compared[:2]))
+    titles = {"tracking_error": "Tracking error e", "sync_error": "Synchronization error ε"}
+    tables = [_error_table(kind, title, (ours, theirs), computed) for kind, title in titles.items()]
+    return [*tables, _torque_table(ours, computed)]
+
+
+def _error_table(
+    kind: str, title: str, runs: tuple[Result, Result], computed: tuple[Metrics, Metrics]
+) -> Table:
+    ours, theirs = (getattr(m, kind) for m in computed)
+    unit, factor = display(runs[0].unit(kind))
+    square = display(f"{squared(runs[0].unit(kind))}·s")
+    rows = []
+    for k, name in enumerate(row_names(runs[0], kind)):
+        for axis, label in enumerate(runs[0].info["axes"]):
+            at = (k, axis)
+            cells = [
+                *_both(factor * ours.peak[at], factor * theirs.peak[at], ratio=True),
+                *_both(factor * ours.rms[at], factor * theirs.rms[at], ratio=True),
+                *_both(square.factor * ours.ise[at], square.factor * theirs.ise[at]),
+                *_both(ours.settling_time[at], theirs.settling_time[at]),
+                *_both(factor * ours.final[at], factor * theirs.final[at]),
+            ]
+            rows.append((f"{name}, {label}" if kind == "tracking_error" else f"ε_{name}, {label}", *cells))
+    groups = ((f"peak, {unit}", 3), (f"RMS, {unit}", 3), (f"ISE, {square.unit}", 2), ("settling, s", 2))
     caption = (
-        f"{ours.info['title']} (sync.) against {theirs.info['title']} (indep.). ISE in the square of "
-        "the row's unit times s. "
-        f"Settling: from when the error stays within 5 % of the largest error of both runs; – if it does not "
-        f"within {ours.t[-1]:g} s. Ratio: independent / synchronized."
+        f"{title}: {runs[0].info['title']} (sync.), against {kind_of(runs[1])} (indep.). Ratio: independent "
+        f"/ synchronized. Settled: from when the error stays within {number(factor * ours.band)} {unit}, 5 % "
+        f"of the largest error of both runs; – if it does not within {runs[0].t[-1]:g} s."
     )
-    return Table(head, tuple(rows), caption)
+    two = ("sync.", "indep.")
+    head = ("", *(*two, "ratio") * 2, *two * 3)
+    return Table(head, tuple(rows), caption, (*groups, (f"final, {unit}", 2)))
 
 
-def torque_table(ours: Result, theirs: Result) -> Table:
-    """Peak torque of every robot and joint."""
-    a, b = np.abs(ours.tau).max(axis=0), np.abs(theirs.tau).max(axis=0)
-    rows = [
-        (f"{robot['name']}, {joint}", *_both(a[i, j], b[i, j]))
-        for i, robot in enumerate(ours.info["robots"])
-        for j, joint in enumerate(robot["joints"])
-    ]
-    return Table(("peak torque, N·m", "synchronized", "independent", "ratio"), tuple(rows))
+def _torque_table(ours: Result, computed: tuple[Metrics, Metrics]) -> Table:
+    """Peak torque of every joint, a row per robot."""
+    joints = max((robot["joints"] for robot in ours.info["robots"]), key=len)
+    a, b = (m.peak_torque for m in computed)
+    rows = []
+    for i, robot in enumerate(ours.info["robots"]):
+        cells: list[str] = []
+        for j in range(len(joints)):
+            there = j < len(robot["joints"])
+            cells += _both(a[i, j], b[i, j], ratio=True) if there else ("", "", "")
+        rows.append((robot["name"], *cells))
+    head = ("", *("sync.", "indep.", "ratio") * len(joints))
+    groups = tuple((f"joint {k}", 3) for k in range(1, len(joints) + 1))
+    return Table(head, tuple(rows), "Peak torque of the controller, N·m.", groups)
 
 
-def _both(a: float, b: float, ratio: bool = True) -> tuple[str, ...]:
-    shown = tuple(number(value) if np.isfinite(value) else "–" for value in (a, b))
-    return (*shown, number(b / a) if a else "–") if ratio else shown
+def _both(ours: float, theirs: float, ratio: bool = False) -> tuple[str, ...]:
+    shown = tuple(number(value) if np.isfinite(value) else "–" for value in (ours, theirs))
+    return (*shown, number(theirs / ours) if ours else "–") if ratio else shown
 
 
 def _picture(folder: Path, k: int, figure: object, caption: str) -> Picture:

@@ -154,7 +154,7 @@ SMALL = 0.4
 #: heights of a panel and of a magnified one, and what labels need, inches
 PANEL, MAGNIFIED, LABELS = 2.2, 1.6, 0.75
 #: widths of the first and of the last line of a figure, points
-WIDE, NARROW = 2.8, 1.1
+WIDE, NARROW = 3.0, 1.3
 
 
 def _errors(result: Result, kind: str, what: str, limits: tuple[float, float] | None) -> Figure:
