@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance
 from ..errors import InputError
+from ..robots.base_parameters import parameters_of
 from ..robots.friction import Friction
-from ..robots.parameters import FullParameters, Parameters
+from ..robots.parameters import Parameters
 from ..robots.robot import Robot
 from .coupling import Coupling
 from .member_checks import check_friction, check_parameters, check_space, check_trajectory
@@ -30,7 +31,8 @@ class Member:
         trajectory: its desired motion in the cell's space.
         q0: joint positions at t = 0, (nv,), rad. In joint space, by default, on the path.
         v0: joint velocities at t = 0, (nv,), rad/s; by default at rest.
-        parameters: what is adapted; by default all inertial parameters.
+        parameters: what is adapted, or its name: "full", all inertial parameters, by default; "base", the
+            fewest that give the same torques.
         theta_hat0: estimate at t = 0, (P,); by default zeros, which is to know nothing.
         friction: friction of the true plant, which the controller does not know; by default none.
         name: for legends and messages.
@@ -40,7 +42,7 @@ class Member:
     trajectory: Trajectory
     q0: ArrayLike | None = None
     v0: ArrayLike | None = None
-    parameters: Parameters | None = None
+    parameters: Parameters | str | None = None
     theta_hat0: ArrayLike | None = None
     friction: Friction = field(default_factory=Friction)
     name: str | None = None
@@ -161,9 +163,7 @@ class Cell:
     # -- internals ----------------------------------------------------------------------------------------
 
     def _set_parameters(self) -> None:
-        self.parameters = tuple(
-            FullParameters(m.robot) if m.parameters is None else m.parameters for m in self.members
-        )
+        self.parameters = tuple(_parameters(member) for member in self.members)
         self.theta = _pad([p.theta for p in self.parameters])
 
     def _set_initial_state(self) -> None:
@@ -188,7 +188,7 @@ class Cell:
         for name, member in zip(self.names, self.members, strict=True):
             check_trajectory(name, member.trajectory, self.labels)
             check_friction(name, member.friction, member.robot)
-            if member.parameters is not None:
+            if member.parameters is not None and not isinstance(member.parameters, str):
                 check_parameters(name, member.parameters, member.robot)
 
     def __reduce__(self) -> tuple:
@@ -197,6 +197,12 @@ class Cell:
 
     def __repr__(self) -> str:
         return f"Cell('{self.name}', {self.n} robots, {self.space!r}, {self.coupling!r})"
+
+
+def _parameters(member: Member) -> Parameters:
+    """What a member adapts."""
+    given = "full" if member.parameters is None else member.parameters
+    return parameters_of(given, member.robot) if isinstance(given, str) else given
 
 
 def _pad(rows: Sequence[np.ndarray]) -> np.ndarray:
