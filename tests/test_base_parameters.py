@@ -217,3 +217,12 @@ def test_friction_is_among_what_can_be_identified() -> None:
     assert found.rank == 15 + 3 + 3 + 1
     assert names[0].endswith("joint3.Iyy + joint1.armature")
     assert "joint3.armature" in names or names[14].endswith("joint3.armature")
+
+
+def test_a_member_may_name_what_it_adapts() -> None:
+    experiment = a460_pair()
+    members = [replace(m, parameters="base", theta_hat0=None) for m in experiment.cell.members]
+    cell = Cell(members, experiment.cell.coupling)
+    np.testing.assert_array_equal(cell.theta[0], BaseParameters(members[0].robot).theta)
+    with pytest.raises(InputError, match="'full', 'base'"):
+        Cell([replace(m, parameters="bases") for m in members], experiment.cell.coupling)
