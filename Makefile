@@ -38,7 +38,7 @@ clean:
 	rm -rf out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -path ./$(VENV) -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +
 
-$(VENV)/.installed-core: WHAT := .
+$(VENV)/.installed-core: WHAT := .[mujoco]
 $(VENV)/.installed-test: WHAT := .[test,notebooks,compiled,mujoco,sweep,tune]
 $(VENV)/.installed-dev:  WHAT := .[dev]
 
