@@ -147,13 +147,12 @@ class Cell:
     def reference_table(self, times: np.ndarray) -> Reference:
         """What is desired at all of the times, (T,), with time as the first axis."""
         motions = np.stack([member.trajectory(times) for member in self.members])  # (n, 3, T, m)
-        desired = np.ascontiguousarray(motions.transpose(2, 1, 0, 3))
-        return Reference(desired, self.coupling.weights(times, self.m))
+        return Reference(motions.transpose(2, 1, 0, 3), self.coupling.weights(times, self.m))
 
     def references(self, times: np.ndarray) -> list[Reference]:
         """What is desired at each of the times, (T,)."""
         table = self.reference_table(times)
-        desired, weights = table.desired, table.weights
+        desired, weights = np.ascontiguousarray(table.desired), table.weights
         if self.coupling.is_constant:
             constant = Weights(*(part[0] for part in weights))
             return [Reference(row, constant) for row in desired]

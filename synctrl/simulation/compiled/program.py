@@ -37,17 +37,18 @@ def classify(controller: Controller) -> tuple[list[Kind], list[int], list[Any]]:
     cell = controller.cell
     found = [mechanism(robot) for robot in cell.robots]
     bases = [base for _, base in found]
-    shared: dict[str, list[np.ndarray]] = {}
-    for fixed, base in found:
-        shared.setdefault(repr(fixed.key()), []).append(base.rotation)
+    names = [repr(fixed.key()) for fixed, _ in found]
+    rotations: dict[str, set[bytes]] = {}
+    for name, base in zip(names, bases, strict=True):
+        rotations.setdefault(name, set()).add((base.rotation + 0.0).tobytes())  # -0 counts as 0
     kinds: dict[str, Kind] = {}
     index = []
-    for i, (fixed, base) in enumerate(found):
-        rotations = shared[repr(fixed.key())]
-        same = all(np.array_equal(rotation, base.rotation) for rotation in rotations)
+    for i, (name, (fixed, base)) in enumerate(zip(names, found, strict=True)):
+        same = len(rotations[name]) == 1
         kind = _kind(controller, i, fixed, base.rotation if same else None)
-        kinds.setdefault(repr(kind.key()), kind)
-        index.append(list(kinds).index(repr(kind.key())))
+        key = repr(kind.key())
+        kinds.setdefault(key, kind)
+        index.append(list(kinds).index(key))
     return list(kinds.values()), index, bases
 
 
