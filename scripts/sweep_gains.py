@@ -121,7 +121,8 @@ def draw_errors(figure: Any, axes: Any, free: Any, held: dict[float, Any]) -> No
         where = np.log(np.stack([x[again.index], y[again.index]], axis=1))
         draw_border(axes, where, again, period, (np.exp, np.exp))
     axes.plot(*paper_errors(), **STAR)
-    axes.set(xscale="log", yscale="log", xlabel="tracking error, rms, mm", ylim=(0.8 * y.min(), 5 * y.max()))
+    axes.set(xscale="log", yscale="log", xlabel="tracking error, rms, mm")
+    axes.set(xlim=(0.9 * x.min(), 1.1 * x.max()), ylim=(0.8 * y.min(), 5 * y.max()))
     axes.set_ylabel("synchronization error, rms, 10⁻³ m²")
     axes.legend(loc="upper left", ncols=2)
     for axis in (axes.xaxis, axes.yaxis, bar.ax.yaxis):
@@ -143,10 +144,13 @@ def draw_gains(axes: Any, held: dict[float, Any]) -> None:
         rows = table[table["status"] == status]
         label = {"completed": "stable", "stopped": "diverges"}[status] + f" at {1e3 * period:g} ms"
         axes.plot(rows["beta"], rows["model_error"], "o", ms=2.5, mew=0, color=color, label=label)
-    axes.set(xscale="log", xlabel="β, 1/s", ylabel="relative error of the first estimate", ylim=(-0.95, 0.85))
+    axes.set(xscale="log", xlabel="β, 1/s", ylabel="relative error of the first estimate")
+    axes.set(xlim=(4.5, 170), ylim=(-1.0, 0.95))
     for period, table in held.items():
         where = np.stack([np.log(table["beta"]), table["model_error"]], axis=1)
         draw_border(axes, where, table, period, (np.exp, np.asarray))
+    cell, gains = planar_four().cell, planar_four().gains
+    axes.plot(gains.beta, np.mean(cell.theta_hat0 / cell.theta) - 1, **STAR)
     axes.legend(loc="upper left", ncols=3, columnspacing=1.2)
     plain_ticks(axes.xaxis)
 
@@ -202,7 +206,7 @@ def stopped_share(where: np.ndarray, stopped: np.ndarray) -> tuple[np.ndarray, n
     near_y = np.exp(-0.5 * ((y[:, None] - where[:, 1]) / width[1]) ** 2)
     count = near_y @ near_x.T
     share = (near_y * stopped) @ near_x.T / np.maximum(count, 1e-300)
-    return x, y, np.where(count > 1, share, np.nan)
+    return x, y, np.where(count > 0.05 * count.max(), share, np.nan)
 
 
 if __name__ == "__main__":
