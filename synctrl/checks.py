@@ -15,7 +15,7 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | No
         InputError: not numbers, another shape, or not finite.
     """
     try:
-        if np.asarray(value).dtype.kind in "USc":  # neither "1" nor 1j is a number here
+        if value is None or np.asarray(value).dtype.kind in "USc":  # neither "1" nor 1j is a number here
             raise TypeError
         array = np.array(value, dtype=float)
     except (TypeError, ValueError) as error:

@@ -31,16 +31,21 @@ class FrameNotFound(RobotError):
     """A frame that a robot does not have.
 
     Attributes:
+        robot: its name.
         frame: the name asked for.
         available: the names there are.
     """
 
     def __init__(self, robot: str, frame: str, available: Iterable[str]):
-        self.frame, self.available = frame, tuple(available)
+        self.robot, self.frame, self.available = robot, frame, tuple(available)
         super().__init__(
             f"robot '{robot}' has no frame '{frame}'{near(frame, self.available)}; "
             f"its frames are: {', '.join(self.available)}"
         )
+
+    def __reduce__(self) -> tuple:
+        """Other processes make it from its parts, not from its message."""
+        return type(self), (self.robot, self.frame, self.available)
 
 
 class CouplingError(SynctrlError):

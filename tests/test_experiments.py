@@ -222,6 +222,7 @@ def test_friction_leaves_small_offsets_on_both_a460(a460_run):
         (lambda: planar_four(radii="own"), r"radii: expected one of 'text', 'table'"),
         (lambda: planar_four(disturbance="force"), "disturbance"),
         (lambda: planar_four(disturbance=3.0), "disturbance"),
+        (lambda: planar_four(disturbance=np.zeros(3)), "disturbance"),
         (lambda: planar_four(disturbance=Disturbance(4, 1.0, 0.0, 1.0)), "index from 0 to 3"),
         (lambda: planar_four(disturbance=["torque"]), "Disturbance objects"),
         (lambda: planar_four(gains=7.0), "gains"),

@@ -15,15 +15,18 @@ from synctrl import (
     CartesianSpace,
     Cell,
     Circle,
+    Controller,
     Coupling,
     Cubic,
     Disturbance,
     Experiment,
     Friction,
+    FullParameters,
     Gains,
     Hold,
     JointSpace,
     Member,
+    Payload,
     Robot,
     SynctrlError,
     load_robot,
@@ -198,7 +201,11 @@ def test_a_wrong_initial_state_is_named_with_its_robot(name, value):
             lambda: pair(Member(ARM, GOOD), Member(ARM, GOOD, friction=Friction(0, [[1, 2]]))),
             "robot 2, friction",
         ),
-        (lambda: pair(Member(ARM, GOOD), Member(ARM, GOOD, parameters="full")), "robot 2, parameters"),
+        (lambda: pair(Member(ARM, GOOD), Member(ARM, GOOD, parameters="most")), "robot 2, parameters"),
+        (lambda: pair(Member(ARM, GOOD, name=5), Member(ARM, GOOD)), "name: expected a text"),
+        (lambda: pair(Member(ARM, GOOD), Member(ARM, GOOD), name=7), "name: expected a text"),
+        (lambda: pair(Member(ARM, GOOD, name="a"), Member(ARM, GOOD, name="a")), "found 'a' twice"),
+        (lambda: pair(Member(ARM, GOOD, name="robot 2"), Member(ARM, GOOD)), "found 'robot 2' twice"),
         (
             lambda: Cell([Member(ARM, GOOD)] * 2, Coupling.pair(), CartesianSpace("xy")),
             "robot 1, q0: expected joint positions to start from",
@@ -306,6 +313,9 @@ def test_a_run_that_cannot_be_is_refused(options, says):
             r"torque: .*shape \(2,\), found \(3,\)",
         ),
         ({"disturbances": [Disturbance(0, [[1.0, 1.0]], 0.0, 1.0)]}, "torque"),
+        ({"payloads": Payload(0, 1.0)}, "payloads: expected a sequence"),
+        ({"payloads": 5}, "payloads: expected a sequence"),
+        ({"title": 3}, "title: expected a text"),
         ({"reference_acceleration": "fast"}, "reference_acceleration: expected one of 'exact', 'paper'"),
         ({"k_r_space": "world"}, "k_r_space: expected one of 'joint', 'task'"),
     ],
@@ -443,6 +453,13 @@ def test_parameters_of_the_wrong_size_are_refused():
 
 def test_a_robot_is_made_of_a_model():
     refused(lambda: Robot("planar2r", "tip"), "model", InputError)
+    refused(lambda: load_robot("planar2r", tip=3), "frame: expected a name", InputError)
+    refused(lambda: FullParameters("planar2r"), "robot: expected a Robot", InputError)
+
+
+def test_a_controller_is_made_of_a_cell_and_gains():
+    refused(lambda: Controller(ARM, SMALL_GAINS), "cell: expected a Cell", InputError)
+    refused(lambda: Controller(small_cell(), 3.0), "gains: expected Gains", InputError)
 
 
 # -- together ---------------------------------------------------------------------------------------------

@@ -172,6 +172,8 @@ def test_a_result_says_what_was_carried(tmp_path) -> None:
         (lambda: Payload(0, 1.0, inertia=(1.0, 1.0, 3.0)), "principal moments"),
         (lambda: Payload(0, 1.0, inertia=np.triu(np.ones((3, 3)))), "symmetric"),
         (lambda: Payload(0, 1.0, com=(0, 0)), "com"),
+        (lambda: Payload(0, 1.0, inertia="round"), "payload, inertia: expected numbers"),
+        (lambda: Payload(0, 1.0, frame=3), "payload, frame: expected the name"),
         (lambda: pair(load_robot("a460"), Payload(2, 1.0)), "index from 0 to 1"),
         (lambda: pair(load_robot("a460"), Payload(0, 1.0, frame="base")), "moves"),
         (lambda: pair(load_robot("a460"), "box"), "Payload objects"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -360,3 +362,27 @@ def test_numbers_that_are_not_finite_are_refused_where_a_robot_is_made():
     for bad in ((np.nan, 0, 0), (0, 0), "here", (0, np.inf, 0)):
         with pytest.raises(InputError, match="xyz"):
             robot.placed(bad)
+
+
+@pytest.mark.parametrize("name", ["planar2r", "panda"])
+@pytest.mark.parametrize("bad", [[1.0], "ab", np.full(9, np.nan), None, np.zeros((9, 1))])
+def test_states_that_do_not_fit_are_refused_with_their_name(name, bad):
+    robot = load_robot(name)
+    bad = bad[: robot.nv] if isinstance(bad, np.ndarray) else bad
+    good = np.zeros(robot.nv)
+    for method in (robot.mass_matrix, robot.gravity, robot.tip_pose, robot.jacobian, robot.configuration):
+        with pytest.raises(InputError, match="q: expected"):
+            method(bad)
+    for method in (robot.coriolis_matrix, robot.jacobian_dot):
+        with pytest.raises(InputError, match="v: expected"):
+            method(good, bad)
+    with pytest.raises(InputError, match="a: expected"):
+        robot.inverse_dynamics(good, good, bad)
+    with pytest.raises(InputError, match="tau: expected"):
+        robot.forward_dynamics(good, good, bad)
+
+
+def test_a_frame_that_is_missing_is_the_same_error_in_another_process():
+    error = pickle.loads(pickle.dumps(FrameNotFound("arm", "tipp", ["tip", "base"])))
+    assert (error.robot, error.frame, error.available) == ("arm", "tipp", ("tip", "base"))
+    assert "did you mean 'tip'" in str(error)

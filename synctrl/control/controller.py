@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import choice
+from ..checks import choice, instance
 from ..tasks.cell import Cell, Reference
 from ..tasks.spaces import Measurement
 from . import law
@@ -61,6 +61,8 @@ class Controller:
     def __init__(
         self, cell: Cell, gains: Gains, *, reference_acceleration: str = "exact", k_r_space: str = "joint"
     ):
+        instance("cell", cell, Cell, "a Cell")
+        instance("gains", gains, Gains, "Gains")
         n, m, nv = cell.n, cell.m, cell.nv
         self.cell = cell
         self.gains = gains

@@ -101,7 +101,7 @@ def _member(arm: Robot, i: int, phi: float, radius: float) -> Member:
 def _disturbances(disturbance: str | Disturbance | Sequence[Disturbance] | None) -> Sequence[Disturbance]:
     if disturbance is None:
         return ()
-    if disturbance == "torque":
+    if isinstance(disturbance, str) and disturbance == "torque":
         return (TORQUE_DISTURBANCE,)
     if isinstance(disturbance, Disturbance):
         return (disturbance,)

@@ -8,6 +8,20 @@ import pinocchio as pin
 from ..errors import RobotError
 
 
+def check_joints(robot: str, model: pin.Model) -> None:
+    """Refuse joints with several velocities, such as that of a floating base.
+
+    Raises:
+        RobotError: naming the joint.
+    """
+    for joint, name in zip(model.joints[1:], model.names[1:], strict=False):
+        if joint.nv != 1:
+            raise RobotError(
+                f"robot '{robot}': joint '{name}' has {joint.nv} degrees of freedom; "
+                "expected joints with one (fixed-base arms of revolute and prismatic joints)"
+            )
+
+
 def check_numbering(robot: str, model: pin.Model) -> None:
     """Refuse joints not numbered branch after branch: Pinocchio's C(q, v) would be silently wrong."""
     for joint in range(1, model.njoints):

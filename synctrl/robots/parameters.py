@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array
+from ..checks import finite_array, instance
 from ..errors import InputError
 from .robot import Robot
 
@@ -36,6 +36,7 @@ class FullParameters:
     """All inertial parameters of all moving bodies, ten each, in Pinocchio's order."""
 
     def __init__(self, robot: Robot):
+        instance("robot", robot, Robot, "a Robot, for example from load_robot")
         self.names = robot.inertial_parameter_names
         self.theta = robot.inertial_parameters
         self.regressor = robot.regressor
@@ -58,6 +59,7 @@ class LinearParameters:
     """
 
     def __init__(self, robot: Robot, matrix: ArrayLike, theta: ArrayLike, names: Sequence[str]):
+        instance("robot", robot, Robot, "a Robot, for example from load_robot")
         self.theta = finite_array("theta", theta, (None,))
         self.matrix = finite_array("matrix", matrix, (10 * robot.body_count, self.theta.size))
         self.names = tuple(names)

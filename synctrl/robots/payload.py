@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import NoneType
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from ..checks import finite_array, positive_number
+from ..checks import finite_array, instance, positive_number
 from ..errors import FrameNotFound, InputError
 from .documents import weld
 from .robot import Robot
@@ -36,6 +37,7 @@ class Load:
     frame: str | None = None
 
     def __post_init__(self) -> None:
+        instance("payload, frame", self.frame, (str, NoneType), "the name of a frame")
         object.__setattr__(self, "mass", positive_number("payload, mass", self.mass))
         object.__setattr__(self, "com", finite_array("payload, com", self.com, (3,)))
         object.__setattr__(self, "inertia", self._checked_inertia())
@@ -44,7 +46,7 @@ class Load:
         if self.inertia is None:
             radius = np.cbrt(3 * self.mass / (4 * np.pi * 1000.0))
             return 0.4 * self.mass * radius**2 * np.eye(3)
-        given = np.array(self.inertia, dtype=float)
+        given = finite_array("payload, inertia", self.inertia)
         inertia = finite_array("payload, inertia", np.diag(given) if given.shape == (3,) else given, (3, 3))
         if not np.allclose(inertia, inertia.T, rtol=1e-12, atol=0):
             raise InputError(f"payload, inertia: expected a symmetric matrix, found {inertia.tolist()}")

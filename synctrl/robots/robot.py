@@ -11,9 +11,9 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance
-from ..errors import FrameNotFound, InputError, RobotError
+from ..errors import FrameNotFound, InputError
 from .catalog import load_description
-from .model_checks import check_inertia, check_numbering
+from .model_checks import check_inertia, check_joints, check_numbering
 from .urdf_document import Document, Pose
 
 _WORLD_AXES = pin.LOCAL_WORLD_ALIGNED
@@ -56,12 +56,7 @@ class Robot:
         self.name = name or model.name
         self.visual = visual
         self.document = document
-        for joint, joint_name in zip(model.joints[1:], model.names[1:], strict=False):
-            if joint.nv != 1:
-                raise RobotError(
-                    f"robot '{self.name}': joint '{joint_name}' has {joint.nv} degrees of freedom; "
-                    "expected joints with one (fixed-base arms of revolute and prismatic joints)"
-                )
+        check_joints(self.name, model)
         check_numbering(self.name, model)
         self.tip, self.tip_id = tip, self._frame_id(tip)
         self.nv: int = model.nv
@@ -144,7 +139,7 @@ class Robot:
         Per moving body m, m c_x, m c_y, m c_z, I_xx, I_xy, I_yy, I_xz, I_yz, I_zz, inertia about the joint
         origin, in kg, kg·m and kg·m^2.
         """
-        return np.concatenate([self.model.inertias[j].toDynamicParameters() for j in self._moving()])
+        return np.concatenate([body.toDynamicParameters() for body in list(self.model.inertias)[1:]])
 
     @property
     def inertial_parameter_names(self) -> tuple[str, ...]:
@@ -163,9 +158,12 @@ class Robot:
         return self.model.gravity.linear.copy()
 
     def configuration(self, q: ArrayLike) -> np.ndarray:
-        """Pinocchio's configuration vector, (nq,), of joint positions q, (nv,)."""
-        q = np.asarray(q, dtype=float)
-        return q if self._plain_q else pin.integrate(self.model, self._neutral, q)
+        """Pinocchio's configuration vector, (nq,), of joint positions q, (nv,).
+
+        Raises:
+            InputError: another size, or numbers that are not finite; so do all methods that call it.
+        """
+        return self._stored(*self._vectors(q=q))
 
     # -- dynamics -----------------------------------------------------------------------------------------
 
@@ -175,7 +173,8 @@ class Robot:
 
     def coriolis_matrix(self, q: ArrayLike, v: ArrayLike) -> np.ndarray:
         """C(q, v) from Christoffel symbols, (nv, nv): M' - 2C is skew-symmetric."""
-        return pin.computeCoriolisMatrix(self.model, self._data, self.configuration(q), _vector(v)).copy()
+        state = self.configuration(q), *self._vectors(v=v)
+        return pin.computeCoriolisMatrix(self.model, self._data, *state).copy()
 
     def gravity(self, q: ArrayLike) -> np.ndarray:
         """g(q), (nv,), N·m."""
@@ -183,11 +182,11 @@ class Robot:
 
     def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> np.ndarray:
         """Torque M a + C v + g, (nv,), N·m."""
-        return pin.rnea(self.model, self._data, self.configuration(q), _vector(v), _vector(a)).copy()
+        return pin.rnea(self.model, self._data, self.configuration(q), *self._vectors(v=v, a=a)).copy()
 
     def forward_dynamics(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike) -> np.ndarray:
         """Acceleration under joint torques tau, (nv,), rad/s^2."""
-        return pin.aba(self.model, self._data, self.configuration(q), _vector(v), _vector(tau)).copy()
+        return pin.aba(self.model, self._data, self.configuration(q), *self._vectors(v=v, tau=tau)).copy()
 
     def regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
         """Slotine-Li regressor Y, (nv, 10 bodies).
@@ -200,7 +199,7 @@ class Robot:
             q, v: joint positions and velocities, (nv,).
             v_ref, a_ref: reference velocity and acceleration, (nv,).
         """
-        q = q if self._plain_q else self.configuration(q)
+        q = self._stored(q)
         mean = 0.5 * (v + v_ref)
         Y = _regressor(self.model, self._data, q, mean, a_ref)
         Y -= _regressor(self._weightless, self._weightless_data, q, v - mean, self._zero)
@@ -208,7 +207,7 @@ class Robot:
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """`forward_dynamics` of arrays that are known to fit; scratch memory, valid until the next call."""
-        return pin.aba(self.model, self._data, q if self._plain_q else self.configuration(q), v, tau)
+        return pin.aba(self.model, self._data, self._stored(q), v, tau)
 
     # -- kinematics ---------------------------------------------------------------------------------------
 
@@ -229,7 +228,7 @@ class Robot:
 
     def jacobian_dot(self, q: ArrayLike, v: ArrayLike) -> np.ndarray:
         """Time derivative of `jacobian` along v, (6, nv)."""
-        return self.tip_kinematics(np.asarray(q, dtype=float), _vector(v))[2].copy()
+        return self.tip_kinematics(*self._vectors(q=q, v=v))[2].copy()
 
     def tip_kinematics(self, q: np.ndarray, v: np.ndarray) -> tuple[pin.SE3, np.ndarray, np.ndarray]:
         """Pose of the tip, its Jacobian and the Jacobian's derivative, from one pass over the mechanism.
@@ -237,7 +236,7 @@ class Robot:
         The pose is scratch memory, valid until the next call.
         """
         model, data, tip = self.model, self._data, self.tip_id
-        pin.computeJointJacobiansTimeVariation(model, data, q if self._plain_q else self.configuration(q), v)
+        pin.computeJointJacobiansTimeVariation(model, data, self._stored(q), v)
         pose = pin.updateFramePlacement(model, data, tip)
         J = pin.getFrameJacobian(model, data, tip, _WORLD_AXES)
         J_dot = pin.getFrameJacobianTimeVariation(model, data, tip, _WORLD_AXES)
@@ -247,10 +246,16 @@ class Robot:
 
     # -- internals ----------------------------------------------------------------------------------------
 
-    def _moving(self) -> range:
-        return range(1, self.model.njoints)
+    def _vectors(self, **values: ArrayLike) -> list[np.ndarray]:
+        """What the caller gave, each (nv,), under its name."""
+        return [finite_array(name, value, (self.nv,)) for name, value in values.items()]
+
+    def _stored(self, q: np.ndarray) -> np.ndarray:
+        """Joint positions that are known to fit, as Pinocchio stores them."""
+        return q if self._plain_q else pin.integrate(self.model, self._neutral, q)
 
     def _frame_id(self, frame: str) -> int:
+        instance("frame", frame, str, "a name")
         if not self.model.existFrame(frame):
             raise FrameNotFound(self.name, frame, [f.name for f in self.model.frames])
         return int(self.model.getFrameId(frame))
@@ -277,18 +282,9 @@ def load_robot(name_or_path: str | Path, tip: str | None = None) -> Robot:
     """
     if not isinstance(name_or_path, (str, Path)):
         raise InputError(f"robot: expected a name or a path, found {type(name_or_path).__name__}")
-    description = load_description(name_or_path)
-    return Robot(
-        description.model,
-        tip or description.tip,
-        visual=description.visual,
-        name=description.name,
-        document=description.document,
-    )
-
-
-def _vector(value: ArrayLike) -> np.ndarray:
-    return np.asarray(value, dtype=float)
+    found = load_description(name_or_path)
+    tip = found.tip if tip is None else tip
+    return Robot(found.model, tip, visual=found.visual, name=found.name, document=found.document)
 
 
 def _moved(visual: pin.GeometryModel | None, base: pin.SE3) -> pin.GeometryModel | None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import instance
 from ..robots.robot import Robot
 from ..tasks.cell import Cell
 from .limits import torque_limits
@@ -69,6 +70,7 @@ class Plant:
         saturate: bool = False,
         robots: Sequence[Robot] | None = None,
     ):
+        instance("payloads", payloads, Sequence, "a sequence of Payload objects")
         self.cell, self.physics = cell, physics
         self.payloads, self.saturate = tuple(payloads), saturate
         self.schedule = PayloadSchedule(cell.robots if robots is None else robots, self.payloads)

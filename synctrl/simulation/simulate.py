@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from types import NoneType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -64,6 +65,7 @@ class Experiment:
     def __post_init__(self) -> None:
         instance("cell", self.cell, Cell, "a Cell")
         instance("gains", self.gains, Gains, "Gains")
+        instance("title", self.title, (str, NoneType), "a text")
         positive_number("duration", self.duration)
         self.closed_loop()
         DisturbanceSchedule(self.cell, self.disturbances)

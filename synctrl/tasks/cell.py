@@ -15,7 +15,7 @@ from ..robots.friction import Friction
 from ..robots.parameters import Parameters
 from ..robots.robot import Robot
 from .coupling import Coupling
-from .member_checks import check_friction, check_parameters, check_space, check_trajectory
+from .member_checks import check_friction, check_names, check_parameters, check_space, check_trajectory
 from .rows import joint_rows
 from .spaces import JointSpace, Space
 from .trajectories import Trajectory
@@ -107,6 +107,7 @@ class Cell:
         self.robots = tuple(member.robot for member in self.members)
         self.rows = joint_rows(self.robots)
         self.names = tuple(m.name or f"robot {i}" for i, m in enumerate(self.members, start=1))
+        check_names(name, self.names)
         check_space(self.space)
         self.labels = self.space.labels(self.robots)
         self.task = self.space.bind(self.robots)
@@ -162,7 +163,8 @@ class Cell:
     # -- internals ----------------------------------------------------------------------------------------
 
     def _set_parameters(self) -> None:
-        self.parameters = tuple(_parameters(member) for member in self.members)
+        named = zip(self.names, self.members, strict=True)
+        self.parameters = tuple(_parameters(name, member) for name, member in named)
         self.theta = _pad([p.theta for p in self.parameters])
 
     def _set_initial_state(self) -> None:
@@ -198,10 +200,15 @@ class Cell:
         return f"Cell('{self.name}', {self.n} robots, {self.space!r}, {self.coupling!r})"
 
 
-def _parameters(member: Member) -> Parameters:
+def _parameters(name: str, member: Member) -> Parameters:
     """What a member adapts."""
     given = "full" if member.parameters is None else member.parameters
-    return parameters_of(given, member.robot) if isinstance(given, str) else given
+    if not isinstance(given, str):
+        return given
+    try:
+        return parameters_of(given, member.robot)
+    except InputError as error:
+        raise InputError(f"{name}, {error}") from None
 
 
 def _pad(rows: Sequence[np.ndarray]) -> np.ndarray:

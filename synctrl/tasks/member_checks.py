@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,23 @@ from ..checks import finite_array, instance
 from ..errors import InputError
 from ..robots.friction import Friction
 from ..robots.robot import Robot
+
+
+def check_names(cell: str, names: Sequence[str]) -> None:
+    """Refuse names that cannot tell robots apart.
+
+    Args:
+        cell: name of the cell.
+        names: of its robots.
+
+    Raises:
+        InputError: a name that is no text, or two robots of one name.
+    """
+    for name in (cell, *names):
+        instance("name", name, str, "a text")
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        raise InputError(f"name: expected another one for each robot, found {twice[0]!r} twice")
 
 
 def check_space(space: Any) -> None:
@@ -80,6 +99,5 @@ def check_parameters(name: str, parameters: Any, robot: Robot) -> None:
         raise InputError(f"{name}, parameters: they belong to another robot: {error}") from error
     if found != expected:
         raise InputError(
-            f"{name}, parameters: expected a regressor of shape {expected} for '{robot.name}', "
-            f"found {found}"
+            f"{name}, parameters: expected a regressor of shape {expected} for '{robot.name}', found {found}"
         )
