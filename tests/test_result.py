@@ -80,6 +80,8 @@ def test_it_says_how_it_came_about(result):
     assert (info["integrator"], info["dt"], info["duration"]) == ("rk4", 5e-3, 0.1)
     assert info["disturbances"] == [{"robot": 0, "torque": 0.3, "start": 0.02, "stop": 0.05}]
     assert {"synctrl", "pin", "numpy", "scipy"} <= set(info["versions"])
+    assert info["units"] == {name: result.unit(name) for name in LAYOUT}
+    assert info["units"]["v"] == "rad/s"
     assert [len(robot["theta"]) == len(robot["parameters"]) for robot in info["robots"]] == [True, True]
 
 

@@ -13,7 +13,7 @@ from .closed_loop import ClosedLoop
 from .damping import DampingLog
 from .integrators import Sample
 from .limits import limit_report, torque_limits
-from .result import LAYOUT, Result
+from .result import LAYOUT, Result, unit_of
 
 
 class Recorder:
@@ -97,6 +97,7 @@ def describe(loop: ClosedLoop) -> dict[str, Any]:
         "axes": list(cell.labels),
         "task_unit": cell.space.unit,
         "weighted_unit": cell.weighted_unit,
+        "units": {name: unit_of(name, cell.space.unit, cell.weighted_unit) for name in LAYOUT},
         "coupling": cell.coupling.name,
         "pairs": cell.coupling.edges.tolist(),
         "signs": cell.coupling.signs.tolist(),

@@ -37,6 +37,11 @@ LAYOUT: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
 )
 
 
+def unit_of(array: str, task: str, weighted: str) -> str:
+    """Unit of an array of `LAYOUT`, given those of the task and of c e."""
+    return LAYOUT[array][1].replace("task", task).replace("weighted", weighted)
+
+
 @dataclass(frozen=True, eq=False)
 class Result:
     """A run at T logged instants: n robots, p synchronization errors, m task coordinates, nv joints.
@@ -93,8 +98,7 @@ class Result:
 
     def unit(self, array: str) -> str:
         """Unit of one of the arrays."""
-        kind = LAYOUT[array][1]
-        return kind.replace("task", self.info["task_unit"]).replace("weighted", self.info["weighted_unit"])
+        return unit_of(array, self.info["task_unit"], self.info["weighted_unit"])
 
     def decimated(self, every: int) -> Self:
         """The first of every so many logged instants, and the last; `info["decimated"]` says how many.
