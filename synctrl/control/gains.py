@@ -46,7 +46,11 @@ class Gains:
             object.__setattr__(self, name, array)
 
     def independent(self) -> Self:
-        """The same controller without synchronization, beta = K_eps = 0: Slotine and Li's law."""
+        """The same controller without synchronization, beta = K_eps = 0.
+
+        For diagonal weights that do not change it is Slotine and Li's law, in which c has no part; in others
+        Lambda acts as c^-1 (Lambda c + c').
+        """
         return replace(self, beta=np.zeros_like(self.beta), K_eps=np.zeros_like(self.K_eps))
 
     def replace(self, **changes: ArrayLike) -> Self:

@@ -36,8 +36,8 @@ class Coupling:
         unit: unit of the weights, "" if they have none.
 
     Raises:
-        CouplingError: a robot compared with itself or outside the cell, an entry that is zero, a graph
-            that is not connected, or a weight without an inverse.
+        CouplingError: a robot compared with itself or outside the cell, an entry that is zero, or a graph
+            that is not connected. A weight without an inverse is refused before a run starts.
 
     Warns:
         CouplingWarning: two rows that compare the same pair, or a graph on which all synchronization errors
