@@ -395,7 +395,7 @@ def test_200_arms_on_a_signed_ring_move_as_the_same_law_with_dense_matrices_says
 
 
 class DenseLaw:
-    """The law of PAPER.md section 1 with S, c and c' as full matrices over all robots."""
+    """The law as docs/theory.md states it, with S, c and c' as full matrices over all robots."""
 
     def __init__(self, arm, weights, n, gains):
         self.arm, self.weights, self.n, self.gains = arm, weights, n, gains
