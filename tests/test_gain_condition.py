@@ -169,3 +169,6 @@ def test_a_box_of_the_wrong_size_or_upside_down_is_refused() -> None:
         gain_condition_in_box(run, [1.0, 1.0], [0.0, 2.0])
     with pytest.raises(InputError, match="duration"):
         gain_condition_in_box(run, *BOX, duration=-1.0)
+    for samples in (0, -1, 2.5, "many"):
+        with pytest.raises(InputError, match="samples"):
+            gain_condition_in_box(run, *BOX, samples=samples)

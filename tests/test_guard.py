@@ -22,7 +22,13 @@ from synctrl import (
     load_robot,
     simulate,
 )
-from synctrl.errors import NonFiniteError, SimulationError, SingularJacobianError, UnreachableError
+from synctrl.errors import (
+    InputError,
+    NonFiniteError,
+    SimulationError,
+    SingularJacobianError,
+    UnreachableError,
+)
 from synctrl.experiments import planar_four
 from synctrl.simulation.integrators import ADAPTIVE
 from synctrl.tasks.reachability import inverse_kinematics
@@ -215,6 +221,21 @@ def test_inverse_kinematics_finds_what_forward_kinematics_gives():
         found = inverse_kinematics(a460, target, np.full(3, 0.1))
         assert found is not None
         np.testing.assert_allclose(a460.tip_position(found), target, rtol=0, atol=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("a460", [0.3, 0.3, 0.3], [0, 0]), "robot: expected a Robot"),
+        ((ARM, [0.3], [0, 0], CartesianSpace("xy")), r"target: expected shape \(2,\)"),
+        ((ARM, [0.3, np.nan], [0, 0], CartesianSpace("xy")), "target: expected finite"),
+        ((ARM, [0.3, 0.3], [0], CartesianSpace("xy")), r"q: expected shape \(2,\)"),
+        ((ARM, [0.3, 0.3], [0, 0], "xy"), "space: expected a CartesianSpace"),
+    ],
+)
+def test_inverse_kinematics_refuses_what_it_cannot_solve(arguments, says):
+    with pytest.raises(InputError, match=says):
+        inverse_kinematics(*arguments)
 
 
 def test_arms_that_start_far_from_a_reachable_path_may_run():

@@ -159,6 +159,9 @@ def test_a_motion_cannot_be_changed_from_outside():
         (lambda: Circle([0.0, 0.0], radius=1.0, speed=np.inf), "speed"),
         (lambda: Circle([0.0, 0.0], radius=1.0, speed=1.0, phase=np.nan), "phase"),
         (lambda: Circle([0.0, 0.0], 1.0, 1.0, first=[1.0, 0.0, 0.0]), "first"),
+        (lambda: FunctionTrajectory(np.atleast_1d, 1.0, np.atleast_1d), "velocity: expected a function"),
+        (lambda: FunctionTrajectory(*[np.atleast_1d] * 3, breaks=3), "breaks: expected shape"),
+        (lambda: FunctionTrajectory(*[np.atleast_1d] * 3, breaks=("soon",)), "breaks: expected numbers"),
     ],
 )
 def test_numbers_that_make_no_motion_are_refused(make, says):

@@ -144,6 +144,8 @@ def gain_condition_in_box(
         InputError: a box of the wrong size or with lower above upper, or a number that is not positive.
     """
     instance("experiment", experiment, Experiment, "an Experiment")
+    instance("samples", samples, (int, np.integer), "a whole number")
+    positive_number("samples", samples)
     cell = experiment.cell
     low, high = (_corner(name, corner, cell) for name, corner in (("lower", lower), ("upper", upper)))
     if (low > high).any():
@@ -153,7 +155,7 @@ def gain_condition_in_box(
     for i, robot in enumerate(cell.robots):
         k = robot.nv
         evaluate = _Evaluation(experiment, i)
-        point = evaluate.worst(np.append(low[i, :k], 0.0), np.append(high[i, :k], span), int(samples))
+        point = evaluate.worst(np.append(low[i, :k], 0.0), np.append(high[i, :k], span), samples)
         values = [float(value) for value in evaluate(point)]
         found.append(_condition(experiment, i, (float(point[-1]), point[:-1]), values))
     return min(found, key=lambda condition: condition.margin)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..checks import finite_array, instance
 from ..errors import UnreachableError
 from ..robots.robot import Robot
 from .cell import Cell
@@ -50,13 +51,19 @@ def inverse_kinematics(
         target: task coordinates in the world, (m,): a position, m, or a position and a rotation vector.
         q: joint positions to start from, (nv,).
         space: what the coordinates mean; by default the position along x, y, z.
+
+    Raises:
+        InputError: no robot, no such space, or numbers of another size or not finite.
     """
     space = CartesianSpace() if space is None else space
+    instance("robot", robot, Robot, "a Robot, for example from load_robot")
+    instance("space", space, TipSpace, "a CartesianSpace or a PoseSpace")
+    target, q = finite_array("target", target, (space.m,)), finite_array("q", q, (robot.nv,))
     rng = np.random.default_rng(0)
     for _ in range(1 + RESTARTS):
         found = _descend(space, robot, target, q)
         if found is not None:
-            return found
+            return found.copy()
         q = rng.uniform(-np.pi, np.pi, robot.nv)
     return None
 

@@ -13,6 +13,7 @@ from ..errors import CouplingError, InputError, SynchronizationError
 from .chebyshev import ACCURACY, NotSmoothError, certify
 from .coupling import Coupling
 from .expansion import Expansion, expand, least_linear
+from .member_checks import check_trajectory
 from .trajectories import Trajectory
 from .weights import ConstantWeights, FunctionWeights, SmoothWeights, WeightSource, as_matrices
 
@@ -78,7 +79,7 @@ class SynchronizationFunction:
         if (A_dot is None) != (A_ddot is None):
             raise InputError("A_dot, A_ddot: expected both or none, found one")
         A_of_t, b_of_t = _as_function(A), _as_function(b)
-        robots = len(finite_array("A", A_of_t(0.0)))
+        robots = np.atleast_1d(finite_array("A", A_of_t(0.0))).shape[0]
 
         def matrices(t: float) -> np.ndarray:
             return as_matrices(finite_array("A", A_of_t(t)), dimension)
@@ -191,6 +192,8 @@ class SynchronizationFunction:
 
     def _couple(self, source: WeightSource, graph: GraphLike | None) -> Coupling:
         if graph is not None:
+            if not callable(graph):
+                raise InputError(f"graph: expected, for example, Coupling.ring, found {graph!r}")
             coupling = graph(self.robots, c=source, unit=self.unit)
         elif self.robots == 2:
             coupling = Coupling.pair(source, self.unit)
@@ -203,16 +206,13 @@ class SynchronizationFunction:
 
     def _desired(self, trajectories: Sequence[Trajectory], times: np.ndarray) -> np.ndarray:
         """Desired positions, (T, n, m)."""
+        instance("trajectories", trajectories, Sequence, "one for each robot")
         if len(trajectories) != self.robots:
-            raise InputError(
-                f"trajectories: expected one for each of {self.robots} robots, found {len(trajectories)}"
-            )
+            found = len(trajectories)
+            raise InputError(f"trajectories: expected one for each of {self.robots} robots, found {found}")
+        coordinates = tuple(f"coordinate {k}" for k in range(1, self.dimension + 1))
         for i, trajectory in enumerate(trajectories, start=1):
-            if trajectory.dimension != self.dimension:
-                raise InputError(
-                    f"trajectory of robot {i}: expected {self.dimension} coordinates, "
-                    f"found {trajectory.dimension}"
-                )
+            check_trajectory(f"robot {i}", trajectory, coordinates)
         return np.stack([trajectory(times).x for trajectory in trajectories], axis=1)
 
     def _check_form(self, xd: np.ndarray, times: np.ndarray) -> None:
@@ -263,8 +263,7 @@ class SynchronizationFunction:
         """Equation (3): f = 0 on the desired motion."""
         f = np.array([self(x, t) for x, t in zip(xd, times, strict=True)])
         w = source.at(times, self.dimension)
-        parts = np.abs(np.matvec(w.c, xd))
-        size = parts.sum(axis=1).max() + np.abs(f).max()
+        size = np.abs(np.matvec(w.c, xd)).sum(axis=1).max() + np.abs(f).max()
         if np.abs(f).max() > SATISFIED * size:
             k = int(np.argmax(np.abs(f).max(axis=1)))
             shifts = np.matvec(w.c_inv[k], f[k])

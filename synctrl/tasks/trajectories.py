@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, finite_number, positive_number
+from ..checks import finite_array, finite_number, instance, positive_number
 from ..errors import InputError, TrajectoryError
 
 
@@ -165,6 +165,7 @@ class FunctionTrajectory:
         breaks: instants at which a derivative jumps, s.
 
     Raises:
+        InputError: no functions, or breaks that are no numbers.
         TrajectoryError: the three do not return finite vectors of one size, at t = 0 or in a later call.
     """
 
@@ -176,7 +177,9 @@ class FunctionTrajectory:
         breaks: tuple[float, ...] = (),
     ):
         self._functions = {"position": position, "velocity": velocity, "acceleration": acceleration}
-        self.breaks = tuple(finite_number("breaks", b) for b in breaks)
+        for name, function in self._functions.items():
+            instance(name, function, Callable, "a function of time")  # type: ignore[arg-type]
+        self.breaks = tuple(finite_array("breaks", breaks, (None,)).tolist())
         self.dimension = np.size(position(0.0))
         self(0.0)
 
