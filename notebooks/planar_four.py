@@ -14,8 +14,9 @@
 # # Four planar arms
 #
 # Section V-B of Sun and Mills (2002). Four two-link arms in the plane move their tips along short arcs
-# while they keep their distances. Nobody knows their masses and lengths well: the controller starts with
-# 0.8 kg and 0.2 m where 1 kg and 0.3 m are true. What happens when robot 1 is pushed?
+# while they keep their distances. Nobody knows their inertia well: the first estimate is that of links of
+# 0.8 kg and 0.2 m where 1 kg and 0.3 m are true; only positions are computed with the true lengths.
+# What happens when robot 1 is pushed?
 
 # %%
 # %matplotlib inline
