@@ -25,7 +25,7 @@ CERTIFIED = (
     "a460_pair_synchronized",
     "a460_pair_independent",
 )
-#: cell and the time over which its controllers are compared, s: all peaks lie within
+#: cell and the time over which its controllers are compared, s: the peaks of all torques lie within
 COMPARED: Mapping[str, tuple[Callable[[], Experiment], float]] = {
     "A460 pair": (a460_pair, 0.8),
     "four planar arms": (planar_four, 0.25),
