@@ -53,6 +53,13 @@ def non_negative_number(name: str, value: object) -> float:
     return number
 
 
+def boolean(name: str, value: object) -> bool:
+    """`value` if it is True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{name}: expected True or False, found {value!r}")
+    return bool(value)
+
+
 def instance(name: str, value: object, kind: type | tuple[type, ...], expected: str) -> None:
     """Refuse a value of another type.
 

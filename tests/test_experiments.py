@@ -238,3 +238,16 @@ def test_friction_leaves_small_offsets_on_both_a460(a460_run):
 def test_wrong_arguments_are_refused_at_once(make, says):
     with pytest.raises(InputError, match=says):
         make()
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: planar_four(synchronized="no"),
+        lambda: a460_pair(friction=1),
+        lambda: a460_pair(adapt_friction="yes"),
+    ],
+)
+def test_a_switch_is_true_or_false(make):
+    with pytest.raises(InputError, match="expected True or False"):
+        make()

@@ -17,6 +17,8 @@ EPS = float(np.finfo(float).eps)
 class Convergence:
     """Largest entries of the errors, over robots and axes.
 
+    S+ comes from S written out, so the identity costs the cube of the number of robots, once per run.
+
     `final` and `peak` have them at the end and over the whole run, by name: "tracking error" e, "sync error"
     epsilon, "coupled error" e* and "coupled velocity error" r.
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..checks import instance
+from ..checks import boolean, instance
 from ..control.gains import Gains
 from ..robots.friction import Friction
 from ..robots.friction_parameters import FrictionParameters
@@ -53,6 +53,9 @@ def a460_pair(
         reference_acceleration, k_r_space: see `Controller`.
         adapt_friction: whether the controller's model has friction too, see `FrictionParameters`.
     """
+    words = {"synchronized": synchronized, "friction": friction, "adapt_friction": adapt_friction}
+    for name, value in words.items():
+        boolean(name, value)
     robot = load_robot("a460")
     members = [_member(robot, i, FRICTION if friction else Friction()) for i in range(2)]
     if adapt_friction:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..checks import choice, finite_number, instance
+from ..checks import boolean, choice, finite_number, instance
 from ..control.gains import Gains
 from ..errors import InputError
 from ..robots.parameters import planar_two_link_parameters, theta_50
@@ -61,6 +61,7 @@ def planar_four(
         InputError: an unknown word, or a number that is not finite.
         UnreachableError: on simulation, when phi puts the paths out of reach.
     """
+    boolean("synchronized", synchronized)
     phi = finite_number("phi", phi)
     radii = choice("radii", radii, tuple(RADII))
     arm = load_robot("planar2r")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..checks import choice, instance, positive_number
+from ..checks import boolean, choice, instance, positive_number
 from ..control.controller import Controller
 from ..control.gains import Gains
 from ..errors import InputError, SimulationError
@@ -67,6 +67,7 @@ class Experiment:
         instance("gains", self.gains, Gains, "Gains")
         instance("title", self.title, (str, NoneType), "a text")
         positive_number("duration", self.duration)
+        boolean("saturate", self.saturate)
         self.closed_loop()
         DisturbanceSchedule(self.cell, self.disturbances)
 
