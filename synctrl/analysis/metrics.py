@@ -30,8 +30,8 @@ DEFINITIONS: Mapping[str, str] = MappingProxyType(
         "ise": "integral of the square over the run, trapezoidal rule",
         "settling_time": "first logged instant from which the absolute value stays within the settling band "
         "until the end of the run; null if it is outside at the end",
-        "settling_band": f"{SETTLING_FRACTION:.0%} of the largest absolute value over all robots (or pairs) and "
-        "axes; runs that are compared share the band of the largest among them",
+        "settling_band": f"{SETTLING_FRACTION:.0%} of the largest absolute value over all robots (or pairs) "
+        "and axes; runs that are compared share the band of the largest among them",
         "final": "value at the last instant, with its sign",
         "peak_torque": "largest absolute torque of the controller",
     }
@@ -118,7 +118,9 @@ def settling_bands(*results: Result, fraction: float = SETTLING_FRACTION) -> dic
     for result in results:
         instance("run", result, Result, "a Result")
         if not len(result.t):
-            raise InputError(f"run '{result.info['title']}': expected at least one logged instant, found none")
+            raise InputError(
+                f"run '{result.info['title']}': expected at least one logged instant, found none"
+            )
     return {kind: fraction * max(float(np.abs(getattr(r, kind)).max()) for r in results) for kind in ERRORS}
 
 
