@@ -15,15 +15,19 @@ from .a460_pair import a460_pair
 from .planar_four import planar_four
 from .reproduction import JOBS
 
-#: the runs of figures 2 to 16, and the one without friction
+#: all runs but a longer one, and those with six joints, whose wrists a result does not log
 CERTIFIED = (
     "a460_pair_frictionless",
+    "a460_pair_friction_adapted",
     "planar_four_synchronized",
     "planar_four_independent",
     "planar_four_synchronized_disturbed",
     "planar_four_independent_disturbed",
     "a460_pair_synchronized",
     "a460_pair_independent",
+    "planar_four_without_k_eps",
+    "planar_four_without_adaptation",
+    "planar_four_stiff",
 )
 #: cell and the time over which its controllers are compared, s: the peaks of all torques lie within
 COMPARED: Mapping[str, tuple[Callable[[], Experiment], float]] = {
