@@ -1,6 +1,6 @@
 """Every experiment of the paper: runs, figures, metrics, claims, animations, and the page that shows them.
 
-python scripts/reproduce.py [--out out] [--workers 2]
+python scripts/reproduce.py [--out out] [--workers 2] [--quick]
 """
 
 from __future__ import annotations
@@ -8,16 +8,19 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 
+from synctrl.analysis.claims import Claim
 from synctrl.analysis.claims_a460 import a460_claims
 from synctrl.analysis.claims_planar import own_findings, planar_four_claims
 from synctrl.analysis.identification import Identification, identify
 from synctrl.analysis.metrics import as_data, metrics, settling_bands, write_metrics
 from synctrl.errors import SynctrlError
-from synctrl.experiments.reproduction import JOBS, judge_jobs, judged, run_all
+from synctrl.experiments.batch import Job, run_all
+from synctrl.experiments.reproduction import JOBS, judge_jobs, judged
 from synctrl.experiments.theory import examine
 from synctrl.show.animation import payload_pair_scene, planar_scene
 from synctrl.show.judge_section import judge_section
@@ -26,9 +29,10 @@ from synctrl.show.paper_sections import (
     honesty_section,
     introduction,
     planar_section,
+    trial_section,
 )
 from synctrl.show.plant_sections import friction_section, full_a460_section, identification_section
-from synctrl.show.report import Links, write_page
+from synctrl.show.report import Links, Section, write_page
 from synctrl.show.style import display
 from synctrl.show.theory_sections import baseline_section, certificate_section
 from synctrl.simulation.result import Result
@@ -41,58 +45,85 @@ ANIMATED = (
     "planar_four_synchronized_disturbed",
     "planar_four_independent_disturbed",
 )
+TRIAL = 1.0  # s
 SCENES = {"a460_pair": payload_pair_scene, "planar_four": planar_scene}
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for everything that is written")
-    parser.add_argument("--workers", type=int, default=2, help="number of processes")
+    parser.add_argument("--workers", type=count, default=2, help="number of processes")
+    parser.add_argument("--quick", action="store_true", help="no more than a second of every run, as a trial")
     options = parser.parse_args()
+    jobs = {**JOBS, **judge_jobs()}
+    if options.quick:
+        jobs = {name: job.shortened(TRIAL) for name, job in jobs.items()}
     try:
-        page = reproduce(options.out, options.workers)
+        page = reproduce(options.out, options.workers, jobs)
     except SynctrlError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        print(f"\ninterrupted; runs that were complete are in {options.out / 'runs'}", file=sys.stderr)
+        return 130
     print(f"\nOpen {page}")
     return 0
 
 
-def reproduce(out: Path, workers: int) -> Path:
+def count(text: str) -> int:
+    """A number of processes."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"expected a number of at least 1, found {text!r}")
+    return int(text)
+
+
+def reproduce(out: Path, workers: int, jobs: Mapping[str, Job]) -> Path:
     """Run everything and write it into a folder; returns the path of the page."""
-    every = run_all(out / "runs", workers, {**JOBS, **judge_jobs()})
+    every = run_all(out / "runs", workers, jobs)
     runs = {name: every[name] for name in JOBS}
-    a460, planar = select(runs, "a460_pair_"), select(runs, "planar_four_")
-    print("\nchecking the proof along every run, and comparing controllers ...", flush=True)
-    certificates, comparisons = examine(out / "runs", workers)
-    print("writing figures, animations and the page ...", flush=True)
-    claims = [*a460_claims(a460), *planar_four_claims(planar), *own_findings(planar)]
-    data = {
-        name: as_data(run, metrics(run, settling_bands(*peers(runs, name)))) for name, run in runs.items()
-    }
-    theory = {
-        "certificates": {name: certificate.as_dict() for name, certificate in certificates.items()},
-        "comparisons": [comparison.as_dict() for comparison in comparisons],
-    }
-    write_metrics(out / "metrics.json", data, [claim.as_data() for claim in claims], **theory)
-    layout, figures = JOBS["planar_four_synchronized"].make(), out / "figures"
-    sections = [
-        introduction(claims),
-        a460_section(a460, figures, animations(runs, out, "a460_pair")),
-        planar_section(planar, layout, figures, animations(runs, out, "planar_four")),
-        full_a460_section(a460, figures),
-        friction_section(a460, figures),
-        identification_section(identified(runs)),
-        honesty_section(planar),
+    print("\nchecking the proof along every run, comparing controllers, drawing ...", flush=True)
+    with ThreadPoolExecutor(1) as background:
+        examined = background.submit(examine, out / "runs", workers)
+        claims, sections = tell(runs, out)
+        certificates, comparisons = examined.result()
+    learned = identified(runs)
+    sections += [
+        identification_section(learned),
         baseline_section(comparisons),
-        certificate_section(certificates, figures),
-        judge_section(judged(every), figures),
+        certificate_section(certificates, out / "figures"),
+        judge_section(judged(every), out / "figures"),
     ]
+    write_metrics(
+        out / "metrics.json",
+        {n: as_data(run, metrics(run, settling_bands(*peers(every, n)))) for n, run in every.items()},
+        [claim.as_data() for claim in claims],
+        certificates={name: certificate.as_dict() for name, certificate in certificates.items()},
+        comparisons=[comparison.as_dict() for comparison in comparisons],
+        identification={title: [robot.as_dict() for robot in robots] for title, robots in learned.items()},
+    )
+    longest = max(run.t[-1] for run in runs.values())
+    if longest <= TRIAL:
+        sections.insert(0, trial_section(longest))
     page = write_page(out / "index.html", "Adaptive synchronized control, reproduced", sections)
     print_table(runs)
     held = sum(claim.holds for claim in claims)
     print(f"\n{held} of {len(claims)} claims hold; the page says which do not, and why.")
     return page
+
+
+def tell(runs: Mapping[str, Result], out: Path) -> tuple[list[Claim], list[Section]]:
+    """The claims, and the sections that need nothing but the runs."""
+    a460, planar = select(runs, "a460_pair_"), select(runs, "planar_four_")
+    claims = [*a460_claims(a460), *planar_four_claims(planar), *own_findings(planar)]
+    layout, figures = JOBS["planar_four_synchronized"].make(), out / "figures"
+    return claims, [
+        introduction(claims),
+        a460_section(a460, figures, animations(runs, out, "a460_pair")),
+        planar_section(planar, layout, figures, animations(runs, out, "planar_four")),
+        honesty_section(planar),
+        full_a460_section(a460, figures),
+        friction_section(a460, figures),
+    ]
 
 
 def select(runs: Mapping[str, Result], prefix: str) -> dict[str, Result]:
@@ -101,9 +132,11 @@ def select(runs: Mapping[str, Result], prefix: str) -> dict[str, Result]:
 
 
 def identified(runs: Mapping[str, Result]) -> dict[str, tuple[Identification, ...]]:
-    """What the synchronized runs say about parameters, by the title of the run."""
+    """What the synchronized runs say about parameters, by the title of the run; every 5 ms are enough."""
     names = [name for name in runs if name.endswith("_synchronized")]
-    return {str(runs[name].info["title"]): identify(runs[name], JOBS[name].make()) for name in names}
+    return {
+        str(runs[name].info["title"]): identify(runs[name].decimated(5), JOBS[name].make()) for name in names
+    }
 
 
 def peers(runs: Mapping[str, Result], name: str) -> list[Result]:

@@ -15,8 +15,8 @@ from browser import open_page, require_browser
 from synctrl.analysis.claims import Claim, Quantity
 from synctrl.errors import InputError, ResultError, SimulationError
 from synctrl.experiments import planar_four
+from synctrl.experiments.batch import Job, run_all
 from synctrl.experiments.planar_four import GAINS
-from synctrl.experiments.reproduction import Job, run_all
 from synctrl.show.report import (
     Formulas,
     Links,
@@ -120,10 +120,9 @@ def test_a_run_that_stops_does_not_take_the_others_along(tmp_path):
 
 @pytest.fixture(scope="module")
 def reproduced(tmp_path_factory):
-    """Everything `make reproduce` writes."""
+    """Everything that the script writes, of runs cut off after a second."""
     out = tmp_path_factory.mktemp("reproduced") / "out"
-    command = [sys.executable, str(ROOT / "scripts" / "reproduce.py"), "--out", str(out)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = run_script("--out", str(out), "--quick")
     assert done.returncode == 0, done.stderr[-2000:]
     assert done.stdout.rstrip().endswith(str(out / "index.html"))
     return out
@@ -198,6 +197,30 @@ def section_of(text, title):
     """The tables of the page that compare a run: from the first caption with its title on to the torques."""
     start = text.index(f"Tracking error e: {title} (sync.)")
     return text[start : text.index("Peak torque", start)]
+
+
+def test_a_page_of_shortened_runs_says_so(reproduced):
+    assert "This page is a trial" in (reproduced / "index.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize("workers", ["0", "-1", "two", "1.5"])
+def test_a_number_of_processes_that_is_none_is_refused(workers):
+    done = run_script("--workers", workers)
+    assert done.returncode == 2
+    assert "expected a number of at least 1" in done.stderr
+
+
+def test_a_folder_that_cannot_be_written_is_an_error_before_anything_runs(tmp_path):
+    (tmp_path / "file").write_text("")
+    done = run_script("--out", str(tmp_path / "file" / "out"))
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: cannot write into the folder")
+    assert "Traceback" not in done.stderr
+
+
+def run_script(*arguments):
+    command = [sys.executable, str(ROOT / "scripts" / "reproduce.py"), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 def test_every_run_can_be_loaded_and_says_what_it_is(reproduced):

@@ -73,6 +73,15 @@ def introduction(claims: Sequence[Claim]) -> Section:
     )
 
 
+def trial_section(duration: float) -> Section:
+    """A warning at the top of a page whose runs were cut off."""
+    words = (
+        f"This page is a trial: no run is longer than {duration:g} s, so nothing had the time to converge. "
+        "Figures and verdicts are not those of the whole runs."
+    )
+    return Section("A trial", (Text((words,), "note"),))
+
+
 def a460_section(runs: Mapping[str, Result], folder: Path, animations: Links) -> Section:
     """Section V-A with figures 2 to 7.
 

@@ -79,12 +79,18 @@ def save(figure: Figure, stem: str | Path) -> tuple[Path, Path]:
     Raises:
         ResultError: a file cannot be written.
     """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
     png, svg = Path(f"{stem}.png"), Path(f"{stem}.svg")
     try:
         png.parent.mkdir(parents=True, exist_ok=True)
         with style():
-            figure.savefig(png, metadata={"Software": None})
-            figure.savefig(svg, metadata={"Date": None, "Creator": None})
+            figure.draw_without_rendering()
+            figure.set_layout_engine("none")  # it is arranged now, for both files
+            # savefig would draw once more for each file, only to arrange again
+            FigureCanvasSVG(figure).print_svg(svg, metadata={"Date": None, "Creator": None})
+            FigureCanvasAgg(figure).print_png(png, metadata={"Software": None})
     except OSError as error:
         raise ResultError(f"cannot write the figure '{stem}': {error.strerror or error}") from error
     return png, svg
