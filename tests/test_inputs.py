@@ -46,7 +46,7 @@ NO_NUMBERS = [
     [1, "2"],
     [1, [2]],
     {},
-    object(),
+    ...,
     1j,
     np.array([1 + 0j]),
     [True, None],
