@@ -91,10 +91,10 @@ def enough(run: Run, effort: Effort) -> int:
     return int(np.clip(steps * goal / max(spent, 1e-9), 10, MOST_STEPS))
 
 
-def per_step(runs: dict[str, Run], effort: Effort) -> dict[str, float]:
+def per_step(runs: dict[Any, Run], effort: Effort) -> dict[Any, float]:
     """Seconds of each per step, without what a run costs before its first step."""
     steps = {name: enough(run, effort) for name, run in runs.items()}
-    found: dict[str, list[float]] = {name: [] for name in runs}
+    found: dict[Any, list[float]] = {name: [] for name in runs}
     for _ in range(effort.rounds):
         for name, run in runs.items():
             few = steps[name] // 5
@@ -147,12 +147,11 @@ def cells(effort: Effort) -> Table:
 
 
 def growth(title: str, unit: str, sizes: tuple, cell: Callable[[Any], Experiment], effort: Effort) -> Table:
-    """What a robot-step costs as a cell grows."""
-    rows = []
-    for size in sizes:
-        experiment = cell(size)
-        for way, spent in per_step(engines(experiment), effort).items():
-            rows.append([size, way, 1e6 * spent / experiment.cell.n])
+    """What a robot-step costs as a cell grows; all sizes take turns."""
+    experiments = {size: cell(size) for size in sizes}
+    ways = {(size, way): run for size in sizes for way, run in engines(experiments[size]).items()}
+    times = per_step(ways, effort)
+    rows = [[*key, 1e6 * spent / experiments[key[0]].cell.n] for key, spent in times.items()]
     return Table(
         title, "Without what a run costs before its first step.", (unit, "way", "µs/robot-step"), rows
     )
@@ -160,12 +159,13 @@ def growth(title: str, unit: str, sizes: tuple, cell: Callable[[Any], Experiment
 
 def horizons(effort: Effort) -> Table:
     """What a whole call costs as runs get longer."""
-    rows, runs = [], engines(planar_four())
-    for horizon in effort.horizons:
+    runs = engines(planar_four())
+    cases = [(horizon, way) for horizon in effort.horizons for way in runs]
+    rounds = [[seconds(runs[way], round(h / DT)) for h, way in cases] for _ in range(min(effort.rounds, 3))]
+    rows = []
+    for (horizon, way), spent in zip(cases, np.median(rounds, axis=0).tolist(), strict=True):
         steps = round(horizon / DT)
-        for way, run in runs.items():
-            spent = np.median([seconds(run, steps) for _ in range(min(effort.rounds, 3))])
-            rows.append([horizon, way, spent, 1e6 * spent / (4 * steps), peak(run, steps)])
+        rows.append([horizon, way, spent, 1e6 * spent / (4 * steps), peak(runs[way], steps)])
     columns = ("horizon s", "way", "whole run s", "µs/robot-step", "memory MB")
     return Table("Horizon", "Four planar arms, logged at every step.", columns, rows)
 
