@@ -211,3 +211,26 @@ def test_meshes_named_by_plain_paths_keep_a_document_in_its_folder(folder, tmp_p
     assert write_urdf(description.document, tmp_path / "again.urdf").is_file()
     with pytest.raises(RobotError, match=r"mesh 'meshes/fore\.stl': expected to write into its folder"):
         write_urdf(description.document, folder / "elsewhere.urdf")
+
+
+def test_a_turn_near_a_right_angle_keeps_the_digits_that_the_writer_of_yourdfpy_loses(tmp_path):
+    """Why documents are not written by yourdfpy: its way from a rotation to angles is no way back."""
+    rpy = (0.3, np.pi / 2 - 1e-14, 0.2)
+    R = pin.rpy.rpyToMatrix(*rpy)
+    turned = np.eye(4)
+    turned[:3, :3] = R
+    joint = yourdfpy.urdf.Joint(name="j", type="fixed", parent="a", child="b", origin=turned)
+    links = [yourdfpy.urdf.Link(name=name) for name in "ab"]
+    theirs = yourdfpy.URDF(
+        robot=yourdfpy.urdf.Robot(name="r", links=links, joints=[joint]),
+        build_scene_graph=False,
+        load_meshes=False,
+    )
+    file = tmp_path / "theirs.urdf"
+    file.write_bytes(theirs.write_xml_string())
+    lost = np.abs(pin.buildModelFromUrdf(str(file)).frames[-1].placement.rotation - R).max()
+    assert lost > 1e-5
+
+    model = read_back(weld("planar2r", "tip", 1.0, rpy=rpy), tmp_path)
+    tip, payload = (model.frames[model.getFrameId(name)].placement for name in ("tip", "payload"))
+    np.testing.assert_allclose(tip.rotation.T @ payload.rotation, R, atol=1e-14)
