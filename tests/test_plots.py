@@ -136,7 +136,7 @@ def test_the_settings_of_the_user_leave_the_figures_alone(planar, tmp_path):
         assert save(tracking_errors(planar), tmp_path / "styled")[1].read_bytes() == plain
 
 
-@pytest.mark.parametrize("name", ["$x", "$\\alpha$", "<b>&", "a_b^c"])
+@pytest.mark.parametrize("name", ["$x", "$\\nonsense{$", "<b>&", "a_b^c"])
 def test_names_are_text_and_never_formulas_or_markup(planar, tmp_path, name):
     info = dict(planar.info)
     info["robots"] = [{**robot, "name": name} for robot in info["robots"]]

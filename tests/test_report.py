@@ -6,17 +6,13 @@ import json
 import re
 import subprocess
 import sys
-from functools import partial
 from pathlib import Path
 
 import pytest
 from browser import open_page, require_browser
 
 from synctrl.analysis.claims import Claim, Quantity
-from synctrl.errors import InputError, ResultError, SimulationError
-from synctrl.experiments import planar_four
-from synctrl.experiments.batch import Job, run_all
-from synctrl.experiments.planar_four import GAINS
+from synctrl.errors import InputError, ResultError
 from synctrl.show.report import (
     Formulas,
     Links,
@@ -105,17 +101,6 @@ def test_a_missing_figure_and_an_unwritable_page_are_clear_errors(tmp_path):
 )
 def test_numbers_are_short(value, text):
     assert number(value) == text
-
-
-def test_a_run_that_stops_does_not_take_the_others_along(tmp_path):
-    jobs = {
-        "unstable": Job(partial(planar_four, gains=GAINS.replace(Gamma=1e9)), 0.05),
-        "fine": Job(planar_four, 0.05),
-    }
-    with pytest.raises(SimulationError, match="robot"):
-        run_all(tmp_path, workers=1, jobs=jobs)
-    assert Result.load(tmp_path / "fine.npz").status == "completed"
-    assert Result.load(tmp_path / "unstable.npz").status.startswith("stopped")
 
 
 @pytest.fixture(scope="module")
