@@ -63,9 +63,9 @@ def introduction(claims: Sequence[Claim]) -> Section:
                 (
                     "S says which robots are compared (a pair, or a ring of neighbours), c_i are their "
                     "weights, Y_i is the regressor of robot i and θ̂_i its estimate of the parameters.",
-                    "Every number on this page was computed when the page was made; all of them, in SI "
-                    "units, are in metrics.json, and the runs themselves in the folder runs. A claim of the "
-                    "paper that does not hold here says so.",
+                    "Every number on this page was computed when the page was made. The metrics and claims "
+                    "are in metrics.json as well, in SI units, and the runs themselves in the folder runs. A "
+                    "claim of the paper that does not hold here says so.",
                     " ".join([held, *(f"Does not hold: “{text}”" for text in failed)]),
                 )
             ),
