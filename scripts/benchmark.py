@@ -84,6 +84,7 @@ def seconds(run: Run, steps: int) -> float:
 
 def enough(run: Run, effort: Effort) -> int:
     """How many steps take about as long as one measurement should."""
+    run(5)  # code is generated and compiled in a first run
     before, steps = seconds(run, 5), 10
     goal = max(effort.seconds, before)  # steps have to outweigh what comes before them
     while (spent := seconds(run, steps) - before) < 0.2 * goal and steps < MOST_STEPS:
