@@ -229,7 +229,7 @@ def _friction(
     What Y theta has beyond M a_ref + C v_ref + g is friction that the controller knows. With the viscous part
     taken at v_ref, F_v s_q of the plant's friction remains as damping.
     """
-    unknown = np.zeros_like(v) + loop.plant.friction(v)
+    unknown = loop.plant.friction(v)
     damping = np.zeros_like(v)
     if not (loop.plant.viscous.any() or loop.plant.coulomb.any()):
         return unknown, damping

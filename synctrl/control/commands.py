@@ -66,12 +66,16 @@ class ConstantWeights:
         self._K_eps, self._coupling = np.broadcast_to(K_eps, rows[1:]).copy(), cell.coupling
 
     def __call__(self, task: Measurement, reference: Reference, integral: np.ndarray) -> Command:
+        return self.of(task.error, task.rates, integral)
+
+    def of(self, error: np.ndarray, rates: np.ndarray, integral: np.ndarray) -> Command:
+        """The law for e and e', xd' and xd'', (2, n, m), and the integrals of epsilon, (p, m)."""
         c, Lambda, beta = self._c, self._Lambda, self._beta
-        w = law.weighted_error(c, task.error)
+        w = law.weighted_error(c, error)
         compared, shares = couple(self._coupling, w, integral)
         sigma = shares[1:]
         e_star = law.coupled_error(w, shares[:2], beta)
-        u = law.command(c, ABSENT, task.rates, task.error, sigma, e_star, beta, Lambda)
+        u = law.command(c, ABSENT, rates, error, sigma, e_star, beta, Lambda)
         xref = law.reference_velocity(self._c_inv, u)
         force = law.synchronizing_force(self._c_single, sigma[0], self._K_eps)
         return Command(compared, shares, e_star[0], u, xref, force)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ..checks import choice, instance
+from ..robots.regressors import Regressors
 from ..tasks.cell import Cell, Reference
 from ..tasks.spaces import Measurement
 from . import law
 from .commands import REFERENCE_ACCELERATIONS, Command, ConstantWeights, Law, MovingWeights
+from .folded import folded
 from .gains import Gains, spread
 
 
@@ -77,13 +81,14 @@ class Controller:
         self.Gamma = spread("Gamma", gains.Gamma, cell.theta.shape)
         self._damping = self._joint_damping if k_r_space == "joint" else self._task_damping
         if cell.coupling.is_constant:
-            self._command: Law = ConstantWeights(cell, self.Lambda, self.beta, self.K_eps)
+            self._command: Law = folded(cell, ConstantWeights(cell, self.Lambda, self.beta, self.K_eps))
         else:
             self._command = MovingWeights(cell, self.Lambda, self.beta, self.K_eps, reference_acceleration)
-        self._regressors = [parameters.regressor for parameters in cell.parameters]
-        counts = [len(parameters.theta) for parameters in cell.parameters]
-        self._sizes = [(robot.nv, P) for robot, P in zip(cell.robots, counts, strict=True)]
-        self._padded = len(set(self._sizes)) > 1
+
+    @cached_property
+    def _regressor(self) -> Callable[..., np.ndarray]:
+        """q, v, v_ref and a_ref, (n, nv), -> Y, (n, nv, P)."""
+        return Regressors(self.cell.parameters, [robot.nv for robot in self.cell.robots]).at
 
     def evaluate(
         self, reference: Reference, motion: np.ndarray, theta_hat: np.ndarray, integral: np.ndarray
@@ -107,16 +112,6 @@ class Controller:
         tau = law.torque(Y, theta_hat, damping, space.to_torque(task, command.force))
         theta_hat_dot = law.adaptation(Y, s_q, self.Gamma)
         return Signals(reference, task, command, v_ref, a_ref, s_q, Y, tau, theta_hat_dot)
-
-    def _regressor(self, *motion: np.ndarray) -> np.ndarray:
-        """Y, (n, nv, P), of q, v, v_ref and a_ref, (n, nv)."""
-        n, P = self.Gamma.shape
-        Y = np.zeros((n, P, self.cell.nv)).mT  # column after column, as Pinocchio has them
-        rows = self.cell.rows
-        blocks = [Y_i[:nv, :P] for Y_i, (nv, P) in zip(Y, self._sizes, strict=True)] if self._padded else Y
-        for regressor, block, *of_robot in zip(self._regressors, blocks, *map(rows, motion), strict=True):
-            block[...] = regressor(*of_robot)
-        return Y
 
     def _joint_damping(
         self, reference: Reference, task: Measurement, command: Command, s_q: np.ndarray

@@ -37,9 +37,13 @@ class FullParameters:
 
     def __init__(self, robot: Robot):
         instance("robot", robot, Robot, "a Robot, for example from load_robot")
+        self.robot = robot
         self.names = robot.inertial_parameter_names
         self.theta = robot.inertial_parameters
-        self.regressor = robot.regressor
+
+    def regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
+        """Y, (nv, 10 bodies)."""
+        return self.robot.regressor(q, v, v_ref, a_ref)
 
 
 class LinearParameters:
@@ -60,17 +64,17 @@ class LinearParameters:
 
     def __init__(self, robot: Robot, matrix: ArrayLike, theta: ArrayLike, names: Sequence[str]):
         instance("robot", robot, Robot, "a Robot, for example from load_robot")
+        self.robot = robot
         self.theta = finite_array("theta", theta, (None,))
         self.matrix = finite_array("matrix", matrix, (10 * robot.body_count, self.theta.size))
         self.names = tuple(names)
         if len(self.names) != self.theta.size:
             raise InputError(f"names: expected {self.theta.size} names, found {len(self.names)}")
-        self._full = robot.regressor
         _check_torque(robot, self)
 
     def regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
         """Y B, (nv, P)."""
-        return self._full(q, v, v_ref, a_ref) @ self.matrix
+        return self.robot.regressor(q, v, v_ref, a_ref) @ self.matrix
 
 
 def planar_two_link_parameters(

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from math import inf, isfinite
+
 import numpy as np
 
 from ..errors import NonFiniteError, OrientationError, SingularJacobianError
 from ..tasks.cell import Cell
 from ..tasks.pose import MAX_ANGLE, PoseSpace
+from ..tasks.redundancy import determinant
 from .closed_loop import ClosedLoop
 from .integrators import Sample
 
@@ -26,10 +29,11 @@ class Guard:
     def __init__(self, loop: ClosedLoop):
         self._loop = loop
         self._limit = getattr(loop.cell.space, "max_condition", np.inf)
-        self._square = [i for i, robot in enumerate(loop.cell.robots) if robot.nv == loop.cell.m]
+        square = np.array([robot.nv == loop.cell.m for robot in loop.cell.robots])
+        self._regular, self._at = slice(None) if square.all() else square, np.arange(loop.cell.n)
         self._pose = isinstance(loop.cell.space, PoseSpace)
         self._sign: np.ndarray | None = None
-        self._condition = np.ones(loop.cell.n)
+        self._square_condition = np.ones(loop.cell.n)
 
     def check(self, sample: Sample) -> None:
         """Stop the run if its numbers at this instant mean nothing.
@@ -39,26 +43,26 @@ class Guard:
             SingularJacobianError: a robot cannot follow its reference because its Jacobian is singular.
             OrientationError: an orientation error is so large that its direction is about to be undefined.
         """
-        if not np.isfinite(sample.y).all():
+        if not isfinite(sample.y.sum()) and not np.isfinite(sample.y).all():
             raise self._non_finite(sample)
         task = sample.signals.task
         if self._pose:
             self._check_orientations(sample.t, task.e[:, 3:])
-        if task.J is not None and task.J_inv is not None and np.isfinite(self._limit):
+        if task.J is not None and task.J_inv is not None and self._limit < inf:
             self._check_jacobians(sample.t, task.J, task.J_inv)
-        rows = _non_finite_rows(sample.signals.tau)
-        if rows.size:
+        tau = sample.signals.tau
+        if not isfinite(tau.sum()) and (rows := _non_finite_rows(tau)).size:
             raise not_finite(self._loop.cell, sample.t, int(rows[0]), "torque")
 
     def _check_jacobians(self, t: float, J: np.ndarray, J_inv: np.ndarray) -> None:
-        condition = np.sqrt((J * J).sum((1, 2)) * (J_inv * J_inv).sum((1, 2)))
-        if not (condition < self._limit).all():
-            i = int(np.argmax(~(condition < self._limit)))
-            raise singular(self._loop.cell, t, i, f"its condition number is {condition[i]:.3g}")
-        self._condition = condition
-        sign = np.sign(np.linalg.det(J[self._square, :, : J.shape[1]]))
+        square = _squares(J) * _squares(J_inv)
+        if not square.max() < self._limit**2:
+            i = int(np.argmax(~(square < self._limit**2)))
+            raise singular(self._loop.cell, t, i, f"its condition number is {square[i] ** 0.5:.3g}")
+        self._square_condition = square
+        sign = determinant(J[self._regular, :, : J.shape[1]]) > 0
         if self._sign is not None and (sign != self._sign).any():
-            i = self._square[int(np.argmax(sign != self._sign))]
+            i = int(self._at[self._regular][np.argmax(sign != self._sign)])
             raise singular(self._loop.cell, t, i, "its determinant changed sign since the instant before")
         self._sign = sign
 
@@ -84,8 +88,8 @@ class Guard:
         name, rows = broken[0]
         i = int(rows[0]) if name != PARTS[3] else int(self._loop.cell.coupling.edges[rows[0], 0])
         hint = HINT
-        if self._condition[i] > 100:
-            hint = f"its Jacobian was nearly singular before, with condition number {self._condition[i]:.3g}"
+        if (condition := self._square_condition[i] ** 0.5) > 100:
+            hint = f"its Jacobian was nearly singular before, with condition number {condition:.3g}"
         return not_finite(self._loop.cell, sample.t, i, name, hint)
 
 
@@ -104,6 +108,12 @@ def singular(cell: Cell, t: float, robot: int, cause: str) -> SingularJacobianEr
         time=t,
         robot=robot,
     )
+
+
+def _squares(A: np.ndarray) -> np.ndarray:
+    """Sum of the squares of the entries of every matrix, (n,)."""
+    rows = A.reshape(len(A), -1)
+    return np.vecdot(rows, rows)
 
 
 def _non_finite_rows(part: np.ndarray) -> np.ndarray:

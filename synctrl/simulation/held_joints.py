@@ -71,10 +71,10 @@ class HeldJointsPlant(Plant):
         limits = [joint_limits(robot).torque[held] for robot, held in zip(robots, self._held, strict=True)]
         self._held_limits = np.array(limits) if self.saturate else np.full((cell.n, self._count), np.inf)
         self.hidden0 = self._start()
-
-    def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """v', (n, nv), with the held joints as they are at t = 0."""
-        return self.move(q, v, tau, self.hidden0)[0]
+        self._real_nv = width = max(robot.nv for robot in robots)
+        self._known_at = np.concatenate([i * width + np.array(known) for i, known in enumerate(self._known)])
+        self._held_at = np.concatenate([i * width + np.array(held) for i, held in enumerate(self._held)])
+        self._joints_at = np.concatenate([i * cell.nv + np.arange(r.nv) for i, r in enumerate(cell.robots)])
 
     def move(
         self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, hidden: np.ndarray
@@ -85,16 +85,17 @@ class HeldJointsPlant(Plant):
             )
         rows = hidden.reshape(-1, 3, self._count)
         held_tau = np.clip(self._torque(rows), -self._held_limits, self._held_limits)
-        tau = tau - self.friction(v)
+        state = np.zeros((3, self.cell.n, self._real_nv))
+        flat = state.reshape(3, -1)
+        for part, known, held in zip(
+            flat, (q, v, self.less_friction(tau, v)), (rows[:, 0], rows[:, 1], held_tau), strict=True
+        ):
+            part[self._known_at], part[self._held_at] = known.ravel()[self._joints_at], held.ravel()
+        a = self._dynamics(*state).ravel()
         v_dot, hidden_dot = np.zeros(v.shape), np.empty(rows.shape)
-        for i, nv, dynamics in self._arms:
-            known, held = self._known[i], self._held[i]
-            state = np.empty((3, nv))
-            state[:, known] = q[i, : len(known)], v[i, : len(known)], tau[i, : len(known)]
-            state[:, held] = rows[i, 0], rows[i, 1], held_tau[i]
-            a = dynamics(*state)
-            v_dot[i, : len(known)] = a[known]
-            hidden_dot[i] = rows[i, 1], a[held], self.at_rest - rows[i, 0]
+        v_dot.ravel()[self._joints_at] = a[self._known_at]
+        hidden_dot[:, 0], hidden_dot[:, 2] = rows[:, 1], self.at_rest - rows[:, 0]
+        hidden_dot[:, 1] = a[self._held_at].reshape(-1, self._count)
         return v_dot, hidden_dot.ravel()
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:

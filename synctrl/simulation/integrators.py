@@ -21,6 +21,8 @@ from .closed_loop import ClosedLoop
 from .disturbances import DisturbanceSchedule
 
 ADAPTIVE = ("RK45", "RK23", "DOP853", "Radau", "BDF", "LSODA")
+#: weights of the four stages, times 6
+_SIMPSON = np.array([1.0, 2.0, 2.0, 1.0])
 #: steps whose references are evaluated together
 BLOCK = 256
 #: steps of an adaptive method between two logged instants, after which it is taken to be stuck
@@ -38,8 +40,9 @@ class Sample(NamedTuple):
 
 def rk4(loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule) -> Iterator[Sample]:
     """The classical Runge-Kutta method of fourth order, one step per instant of the clock."""
-    y, stage = loop.state(loop.initial_state()), loop.state()
-    k1, k2, k3, k4 = (loop.state() for _ in range(4))
+    rates = np.empty((4, loop.size))
+    k1, k2, k3, k4 = map(loop.state, rates)
+    y, following, stage = loop.state(loop.initial_state()), loop.state(), loop.state()
     logged = np.isin(clock.times, clock.logged).tolist()
     torques, windows = list(schedule.torques), _windows(schedule, clock)
     disturbance = schedule.torque(0.0)
@@ -49,10 +52,10 @@ def rk4(loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule) -> Iterat
         signals = now.derive(start, y, disturbance, k1)
         if logged[k]:
             yield Sample(t, y.flat, disturbance, signals)
-        now.derive(middle, stage.ahead(y, 0.5 * h, k1), disturbance, k2)
-        now.derive(middle, stage.ahead(y, 0.5 * h, k2), disturbance, k3)
-        now.derive(end, stage.ahead(y, h, k3), disturbance, k4)
-        y = loop.state(y.flat + (h / 6) * (k1.flat + 2 * (k2.flat + k3.flat) + k4.flat))
+        now.derive(middle, stage.ahead(y, 0.5 * h, k1.flat), disturbance, k2)
+        now.derive(middle, stage.ahead(y, 0.5 * h, k2.flat), disturbance, k3)
+        now.derive(end, stage.ahead(y, h, k3.flat), disturbance, k4)
+        y, following = following.ahead(y, h / 6, _SIMPSON.dot(rates)), y
     yield final(loop, clock, y.flat, disturbance)
 
 

@@ -41,12 +41,12 @@ class MujocoArm:
         self._order = np.array([names.index(name) for name in robot.joint_names])
         model.dof_damping[:] = 0
         model.dof_armature[self._order] = robot.armature
-        self._data = mujoco.MjData(model)
+        self._data, self.nv = mujoco.MjData(model), robot.nv
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """v', (nv,), under joint torques tau, (nv,)."""
+        """v', (nv,), under joint torques tau, (nv,); a row (1, nv) of each will do."""
         data, order = self._data, self._order
-        data.qpos[order], data.qvel[order], data.qfrc_applied[order] = q, v, tau
+        data.qpos[order], data.qvel[order], data.qfrc_applied[order] = q.ravel(), v.ravel(), tau.ravel()
         self._mujoco.mj_forward(self.model, data)
         return data.qacc[order]
 

@@ -4,34 +4,46 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from ..checks import instance
+from ..robots.forest import forests
 from ..robots.robot import Robot
 from ..tasks.cell import Cell
 from .limits import torque_limits
 from .payloads import Payload, PayloadSchedule
 
 Dynamics = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
-"""Positions, velocities and torques of one robot's joints -> accelerations."""
+"""Positions, velocities and torques of the joints of all robots, (n, nv), -> accelerations, (n, nv)."""
 
 
-def pinocchio_dynamics(robot: Robot) -> Dynamics:
+def pinocchio_dynamics(robots: Sequence[Robot]) -> Dynamics:
     """Forward dynamics by Pinocchio's articulated-body algorithm."""
-    return robot.acceleration
+    parts = forests(robots)
+    return parts[0][1].acceleration if len(parts) == 1 else partial(_by_part, parts)
 
 
-def mujoco_dynamics(robot: Robot) -> Dynamics:
-    """Forward dynamics by MuJoCo, from its own reading of the robot's URDF."""
+def mujoco_dynamics(robots: Sequence[Robot]) -> Dynamics:
+    """Forward dynamics by MuJoCo, from its own reading of the robots' URDF."""
     from .mujoco_plant import MujocoArm
 
-    return MujocoArm(robot).acceleration
+    return partial(_by_part, [(slice(i, i + 1), MujocoArm(robot)) for i, robot in enumerate(robots)])
+
+
+def _by_part(parts: Any, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    """Accelerations put together from those of some robots at a time."""
+    v_dot = np.zeros(q.shape)
+    for rows, part in parts:
+        k = part.nv
+        v_dot[rows, :k] = part.acceleration(q[rows, :k], v[rows, :k], tau[rows, :k])
+    return v_dot
 
 
 #: libraries that can compute the plant
-PHYSICS: dict[str, Callable[[Robot], Dynamics]] = {
+PHYSICS: dict[str, Callable[[Sequence[Robot]], Dynamics]] = {
     "pinocchio": pinocchio_dynamics,
     "mujoco": mujoco_dynamics,
 }
@@ -77,7 +89,6 @@ class Plant:
         self.robots = self.schedule.robots[0]
         self._set_friction()
         self.torque_limits = torque_limits(cell) if saturate else np.full((cell.n, cell.nv), np.inf)
-        self._arms = self._dynamics(0)
         self._stages: dict[int, Plant] = {0: self}
 
     # -- what happens -------------------------------------------------------------------------------------
@@ -96,19 +107,22 @@ class Plant:
         return np.clip(tau, -self.torque_limits, self.torque_limits) if self.saturate else tau
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """v', (n, nv), under joint torques tau, (n, nv), and friction."""
-        tau = tau - self.friction(v)
-        v_dot = np.zeros(tau.shape)
-        by_robot = zip(self._arms, *map(self.cell.rows, (q, v, tau, v_dot)), strict=True)
-        for (_, _, dynamics), q_i, v_i, tau_i, v_dot_i in by_robot:
-            v_dot_i[...] = dynamics(q_i, v_i, tau_i)
-        return v_dot
+        """v', (n, nv), under joint torques tau, (n, nv), and friction, with the plant's own state as at t = 0."""
+        return self.move(q, v, tau, self.hidden0)[0].copy()
 
     def move(
         self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, hidden: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """`acceleration`, and the rate of the plant's own state."""
-        return self.acceleration(q, v, tau), hidden
+        """v' under tau and friction, and the rate of the plant's own state; valid until the next call."""
+        return self._dynamics(q, v, self.less_friction(tau, v)), hidden
+
+    def friction(self, v: np.ndarray) -> np.ndarray:
+        """Torque by which friction opposes the velocities v, (n, nv), N·m."""
+        return self.viscous * v + self.coulomb * np.tanh(v / self.smoothing)
+
+    def less_friction(self, tau: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """What friction leaves of torques tau, (n, nv), N·m."""
+        return tau - self.friction(v)
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         """What a result says of the plant's own state at its logged instants, (T, size of the state)."""
@@ -125,22 +139,21 @@ class Plant:
             self.viscous[i, :nv] = member.friction.viscous
             self.coulomb[i, :nv] = member.friction.coulomb
             self.smoothing[i] = member.friction.smoothing
-        self.friction = self._friction if self.viscous.any() or self.coulomb.any() else _frictionless
+        if not (self.viscous.any() or self.coulomb.any()):
+            self.less_friction = _frictionless
 
-    def _dynamics(self, window: int) -> list[tuple[int, int, Dynamics]]:
-        """Index, number of joints and dynamics of every robot in a window of the schedule."""
-        make = PHYSICS[self.physics]
-        return [(i, robot.nv, make(robot)) for i, robot in enumerate(self.schedule.robots[window])]
+    @cached_property
+    def _dynamics(self) -> Dynamics:
+        """What moves the robots that stand there now."""
+        return PHYSICS[self.physics](self.robots)
 
     def _stage(self, window: int) -> Plant:
         """A copy with the loads of another window."""
         stage = copy(self)
-        stage.robots, stage._arms = self.schedule.robots[window], self._dynamics(window)
+        stage.robots = self.schedule.robots[window]
+        vars(stage).pop("_dynamics", None)
         return stage
 
-    def _friction(self, v: np.ndarray) -> np.ndarray:
-        return self.viscous * v + self.coulomb * np.tanh(v / self.smoothing)
 
-
-def _frictionless(v: np.ndarray) -> np.ndarray | float:
-    return 0.0
+def _frictionless(tau: np.ndarray, v: np.ndarray) -> np.ndarray:
+    return tau

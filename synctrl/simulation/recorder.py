@@ -21,28 +21,16 @@ class Recorder:
 
     def __init__(self, loop: ClosedLoop, instants: int):
         self._loop = loop
-        self._sizes = {"time": instants, **sizes(loop)}
-        self._arrays = {
-            name: np.zeros([self._sizes[d] for d in dimensions]) for name, (dimensions, _) in LAYOUT.items()
-        }
+        lengths = {"time": instants, **sizes(loop)}
+        shapes = {name: [lengths[d] for d in dimensions] for name, (dimensions, _) in LAYOUT.items()}
+        self._arrays = self._allocate(shapes)
         self._rows = tuple(self._arrays.values())
         self._damping = DampingLog(instants, loop.cell.n)
         self._hidden = np.zeros((instants, loop.plant.hidden0.size))
         self.count = 0
 
-    def add(self, sample: Sample) -> None:
-        """Log one instant."""
-        q, v, theta_hat, integral = self._loop.split(sample.y)
-        s = sample.signals
-        values: tuple[Any, ...] = (
-            sample.t, s.task.x, s.reference.xd, s.e, s.epsilon, integral, s.e_star,
-            q, v, s.s_q, s.tau, sample.disturbance, theta_hat,
-        )  # fmt: skip
-        for array, value in zip(self._rows, values, strict=True):
-            array[self.count] = value
-        self._damping.add(self.count, s)
-        self._hidden[self.count] = self._loop.hidden(sample.y)
-        self.count += 1
+    def _allocate(self, shapes: Mapping[str, list[int]]) -> dict[str, np.ndarray]:
+        return {name: np.zeros(shape) for name, shape in shapes.items()}
 
     def rows_ahead(self) -> list[np.ndarray]:
         """The part of every array not logged yet, in the order of `LAYOUT`, to be filled from outside."""
@@ -62,6 +50,31 @@ class Recorder:
         described["limits"] = limit_report(self._loop.cell, *seen)
         described.update(self._loop.plant.report(self._hidden[: self.count]))
         return Result(**arrays, info=described, experiment=experiment)
+
+
+class SampleRecorder(Recorder):
+    """A recorder that is told one sample at a time, and writes each as one row of numbers."""
+
+    def _allocate(self, shapes: Mapping[str, list[int]]) -> dict[str, np.ndarray]:
+        ends = np.cumsum([int(np.prod(shape[1:])) for shape in shapes.values()])
+        self._log = np.zeros((shapes["t"][0], ends[-1]))
+        columns = np.split(self._log, ends[:-1], axis=1)
+        return {name: part.reshape(shapes[name]) for name, part in zip(shapes, columns, strict=True)}
+
+    def add(self, sample: Sample) -> None:
+        """Log one instant."""
+        q, v, theta_hat, integral = self._loop.split(sample.y)
+        s, row = sample.signals, self._log[self.count]
+        row[0] = sample.t
+        values = (
+            s.task.x, s.reference.xd, s.e, s.epsilon, integral, s.e_star, q, v, s.s_q, s.tau,
+            sample.disturbance, theta_hat,
+        )  # fmt: skip
+        np.concatenate(values, axis=None, out=row[1:])
+        self._damping.add(self.count, s)
+        if self._hidden.size:
+            self._hidden[self.count] = self._loop.hidden(sample.y)
+        self.count += 1
 
 
 def sizes(loop: ClosedLoop) -> dict[str, int]:

@@ -22,7 +22,7 @@ from .guard import Guard
 from .integrators import ADAPTIVE, Sample, adaptive, rk4
 from .payloads import Payload
 from .plant import PHYSICS, Plant
-from .recorder import Recorder
+from .recorder import Recorder, SampleRecorder
 from .result import Result
 from .sampled import sampled_rk4, steps_per_sample
 
@@ -218,7 +218,7 @@ def _needs_plain_plant(plant: Plant) -> None:
 
 def _collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> Result:
     """Log samples one by one."""
-    recorder, guard = Recorder(run.loop, len(run.clock.logged)), Guard(run.loop)
+    recorder, guard = SampleRecorder(run.loop, len(run.clock.logged)), Guard(run.loop)
 
     def log() -> None:
         for sample in samples:

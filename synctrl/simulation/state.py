@@ -30,9 +30,9 @@ class State:
         self.integral = flat[b:c].reshape(layout.integral)
         self.hidden = flat[c:]
 
-    def ahead(self, y: State, h: float, rate: State) -> State:
+    def ahead(self, y: State, h: float, rate: np.ndarray) -> State:
         """This state, made to y + h rate."""
-        np.multiply(rate.flat, h, self.flat)
+        np.multiply(rate, h, self.flat)
         np.add(self.flat, y.flat, self.flat)
         return self
 

@@ -20,6 +20,10 @@ from ..errors import InputError
 from ..robots.robot import Robot
 
 
+#: signs of the cofactors of a matrix with two rows
+_CHECKERED = np.array([[1.0, -1.0], [-1.0, 1.0]])
+
+
 @dataclass(frozen=True, eq=False)
 class Redundancy:
     """What an arm does with the joints that its task leaves free.
@@ -230,7 +234,9 @@ def inverse_map(
 
 
 def inverse(A: np.ndarray) -> np.ndarray:
-    """A^-1 row by row; not-a-number where there is none, so that the run's guard can name the robot."""
+    """A^-1 row by row; nothing finite where there is none, so that the run's guard can name the robot."""
+    if A.shape[-1] == 2:
+        return _CHECKERED * A[:, ::-1, ::-1].mT / determinant(A)[:, None, None]
     try:
         return np.linalg.inv(A)
     except np.linalg.LinAlgError:
@@ -238,6 +244,13 @@ def inverse(A: np.ndarray) -> np.ndarray:
         result = np.full_like(A, np.nan)
         result[regular] = np.linalg.inv(A[regular])
         return result
+
+
+def determinant(A: np.ndarray) -> np.ndarray:
+    """det(A) row by row, (n,), of square matrices."""
+    if A.shape[-1] == 2:
+        return A[:, 0, 0] * A[:, 1, 1] - A[:, 0, 1] * A[:, 1, 0]
+    return np.linalg.det(A)
 
 
 def _smallest(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -242,11 +242,9 @@ class BoundCartesianSpace(BoundTipSpace):
 
     def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
         q, v = motion
-        pose, J, J_dot = self._tips.at(q, v)
-        J, J_dot = J[:, self._rows], J_dot[:, self._rows]
-        moved = np.empty((2, *J.shape[:2]))
-        moved[0] = pose[:, self._rows, 3]
-        np.matvec(J, v, moved[1])
+        rows = self._rows
+        moved, J, J_dot = self._tips.positions(q, v)
+        moved, J, J_dot = moved[:, :, rows], J[:, rows], J_dot[:, rows]
         inversion = self._inverse.invert(J, J_dot, q, v)
         error, rates = desired[:2] - moved, desired[1:]
         return Measurement(moved, error, rates, J, inversion.J_inv, J_dot, inversion)

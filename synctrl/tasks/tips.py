@@ -6,20 +6,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..robots.forest import forests
 from ..robots.robot import Robot
-from .rows import joint_rows
 
 
 class Tips:
     """Where the tips of robots are and how they move with the joints, in world axes."""
 
     def __init__(self, robots: Sequence[Robot]):
-        self._rows = joint_rows(robots)
-        self._kinematics = [robot.tip_kinematics for robot in robots]
-        self._shape = len(robots), 6, max(robot.nv for robot in robots)
+        self._forests = forests(robots)
+        self._shape = len(robots), 3, max(robot.nv for robot in robots)
+        if len(self._forests) == 1:
+            forest = self._forests[0][1]
+            self.positions, self.rotations = forest.tips, forest.turns
 
-    def at(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Poses of the tips, their Jacobians (linear velocity, then angular) and the Jacobians' derivatives.
+    def positions(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions and velocities of the tips, the velocities' Jacobians, and the Jacobians' derivatives.
 
         Columns of joints that a robot does not have are zero.
 
@@ -27,11 +29,20 @@ class Tips:
             q, v: joint positions and velocities, (n, nv).
 
         Returns:
-            Rotations and positions as homogeneous matrices, (n, 4, 4), m; then (n, 6, nv), twice.
+            (2, n, 3), m and m/s; then (n, 3, nv), twice.
         """
-        pose, J, J_dot = np.empty((len(q), 4, 4)), np.zeros(self._shape), np.zeros(self._shape)
-        by_robot = zip(self._kinematics, pose, *map(self._rows, (J, J_dot, q, v)), strict=True)
-        for kinematics, pose_i, J_i, J_dot_i, q_i, v_i in by_robot:
-            placement, J_i[...], J_dot_i[...] = kinematics(q_i, v_i)
-            pose_i[...] = placement.homogeneous
-        return pose, J, J_dot
+        motion, (J, J_dot) = np.empty((2, len(q), 3)), np.zeros((2, *self._shape))
+        for rows, forest in self._forests:
+            k = forest.nv
+            motion[:, rows], J[rows, :, :k], J_dot[rows, :, :k] = forest.tips(q[rows, :k], v[rows, :k])
+        return motion, J, J_dot
+
+    def rotations(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rotation matrices of the tips, (n, 3, 3), and the same of their angular velocities.
+
+        They belong to the joint positions and velocities that `positions` was asked for last.
+        """
+        R, (J, J_dot) = np.empty((self._shape[0], 3, 3)), np.zeros((2, *self._shape))
+        for rows, forest in self._forests:
+            R[rows], J[rows, :, : forest.nv], J_dot[rows, :, : forest.nv] = forest.turns()
+        return R, J, J_dot

@@ -1,0 +1,168 @@
+"""Robots side by side as one mechanism, so that one call of Pinocchio serves all of them.
+
+Calls from Python cost more than what they compute for an arm of few joints. A forest has a tree per robot and
+passes the rigid-body algorithms once; its trees do not act on each other. Arrays have one row per robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from functools import partial
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.lib.stride_tricks import as_strided
+
+from .robot import Robot
+
+#: joints of a forest at most
+LARGE = 96
+#: the same where regressors are asked for: they have a block per tree, in a matrix that grows with the square
+SMALL = 24
+#: p @ _CROSS are the entries of the matrix P with a @ P = a x p
+_CROSS = np.array([[[0, -z, y], [z, 0, -x], [-y, x, 0]] for x, y, z in np.eye(3)]).reshape(3, 9)
+
+
+class Forest:
+    """Robots with equal numbers of joints and bodies under the same gravity, as one mechanism.
+
+    Methods share scratch memory, so one forest must not be used from two threads at once.
+
+    Args:
+        robots: the robots, at least one.
+    """
+
+    def __init__(self, robots: Sequence[Robot]):
+        self.n, self.nv = len(robots), robots[0].nv
+        self._model, tips = _side_by_side(robots)
+        self._weightless = pin.Model(self._model)
+        self._weightless.gravity.setZero()
+        self._data, self._weightless_data = self._model.createData(), self._weightless.createData()
+        self._neutral, self._still = pin.neutral(self._model), np.zeros(self._model.nv)
+        self._plain_q = self._model.nq == self._model.nv
+        self._view_results(tips)
+        self._to_tip, self._to_tip_dot = np.zeros((2, self.n, 6, 3))
+        self._to_tip[:, :3] = np.eye(3)
+        self._arms, self._arms_dot = (A.reshape(self.n, 18)[:, 9:] for A in (self._to_tip, self._to_tip_dot))
+        moves = _joints_that_move(self._model, tips).reshape(self.n, self.nv, 1)
+        self._cut: Callable[[np.ndarray], np.ndarray] = _whole if moves.all() else partial(np.multiply, moves)
+
+    def regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
+        """Slotine-Li regressors, (n, nv, 10 bodies), see `Robot.regressor`; arguments are (n, nv)."""
+        q, mean = self._stored(q), 0.5 * (v + v_ref)
+        pin.computeJointTorqueRegressor(self._model, self._data, q, mean.ravel(), a_ref.ravel())
+        half = (v - mean).ravel()
+        pin.computeJointTorqueRegressor(self._weightless, self._weightless_data, q, half, self._still)
+        return self._Y - self._Y_weightless
+
+    def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
+        """v', (n, nv), under joint torques tau, (n, nv); scratch memory, valid until the next call."""
+        pin.aba(self._model, self._data, self._stored(q), v.ravel(), tau.ravel())
+        return self._v_dot
+
+    def tips(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions and velocities of the tips, (2, n, 3), and the velocities' Jacobians and their derivatives.
+
+        Both of the latter are (n, 3, nv). The columns that Pinocchio has are twists: velocity of the point of
+        a body that passes the origin, and angular velocity. A tip at p moves with linear + angular x p, which
+        is the twist times a matrix `_to_tip`.
+        """
+        pin.computeJointJacobiansTimeVariation(self._model, self._data, self._stored(q), v.ravel())
+        pin.updateFramePlacements(self._model, self._data)
+        motion = np.empty((2, self.n, 3))
+        p, p_dot = motion
+        np.concatenate(self._positions, out=p.reshape(-1))
+        np.matmul(p, _CROSS, out=self._arms)
+        J = self._cut(self._J @ self._to_tip)
+        np.vecmat(v, J, out=p_dot)
+        np.matmul(p_dot, _CROSS, out=self._arms_dot)
+        J_dot = self._cut(self._J_dot @ self._to_tip + self._J @ self._to_tip_dot)
+        return motion, J.mT, J_dot.mT
+
+    def turns(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rotations of the tips, (n, 3, 3), and their angular Jacobians, where `tips` was asked last."""
+        R = np.concatenate(self._rotations).reshape(-1, 3, 3)
+        return R, self._cut(self._J[..., 3:]).mT.copy(), self._cut(self._J_dot[..., 3:]).mT.copy()
+
+    # -- internals ----------------------------------------------------------------------------------------
+
+    def _view_results(self, tips: Sequence[int]) -> None:
+        """Views of where Pinocchio leaves its results, which stay where they are."""
+        data, n, nv = self._data, self.n, self.nv
+        self._v_dot = data.ddq.reshape(n, nv)
+        self._J, self._J_dot = (twists.T.reshape(n, nv, 6) for twists in (data.J, data.dJ))
+        self._positions = [data.oMf[tip].translation for tip in tips]
+        self._rotations = [data.oMf[tip].rotation for tip in tips]
+        self._Y = _blocks(data.jointTorqueRegressor, n)
+        self._Y_weightless = _blocks(self._weightless_data.jointTorqueRegressor, n)
+
+    def _stored(self, q: np.ndarray) -> np.ndarray:
+        """Joint positions as Pinocchio stores them."""
+        return q.ravel() if self._plain_q else pin.integrate(self._model, self._neutral, q.ravel())
+
+
+def forests(
+    robots: Sequence[Robot], joints: int = LARGE, kinds: Sequence[Hashable] | None = None
+) -> list[tuple[slice, Forest]]:
+    """Forests that together have all robots, each with the rows it stands for.
+
+    Args:
+        robots: the robots.
+        joints: joints of a forest at most.
+        kinds: robots of different kinds do not share a forest; by default they may.
+    """
+    kinds = [None] * len(robots) if kinds is None else kinds
+    groups = groupby(range(len(robots)), lambda i: (_size(robots[i]), kinds[i]))
+    found = []
+    for (size, _), group in groups:
+        rows, step = list(group), max(1, joints // size[0])
+        for first in range(rows[0], rows[-1] + 1, step):
+            part = slice(first, min(first + step, rows[-1] + 1))
+            found.append((part, Forest(robots[part])))
+    return found
+
+
+def _size(robot: Robot) -> tuple[Any, ...]:
+    """What robots of one forest have in common."""
+    return robot.nv, robot.model.nq, robot.body_count, tuple(robot.gravity_vector.tolist())
+
+
+def _side_by_side(robots: Sequence[Robot]) -> tuple[pin.Model, list[int]]:
+    """One model with a tree per robot, and the frames of their tips."""
+    model, tips = pin.Model(), []
+    model.gravity = robots[0].model.gravity
+    for i, robot in enumerate(robots):
+        of, shift = robot.model, model.njoints - 1
+        for j in range(1, of.njoints):
+            parent = of.parents[j] + shift if of.parents[j] else 0
+            joint = model.addJoint(parent, of.joints[j], of.jointPlacements[j], f"{i} {of.names[j]}")
+            model.inertias[joint] = of.inertias[j]
+        tip = of.frames[robot.tip_id]
+        parent = tip.parentJoint + shift if tip.parentJoint else 0
+        tips.append(model.addFrame(pin.Frame(f"{i} tip", parent, tip.placement, pin.OP_FRAME)))
+    model.armature = np.concatenate([robot.armature for robot in robots])
+    return model, tips
+
+
+def _joints_that_move(model: pin.Model, tips: Sequence[int]) -> np.ndarray:
+    """1 for joints between the tip of their tree and the world, else 0, (nv,)."""
+    moves = np.zeros(model.nv)
+    for tip in tips:
+        for joint in model.supports[model.frames[tip].parentJoint]:
+            moves[model.joints[joint].idx_v] = joint > 0
+    return moves
+
+
+def _blocks(A: np.ndarray, n: int) -> np.ndarray:
+    """View of the n blocks on the diagonal of a matrix, (n, rows / n, columns / n)."""
+    A = np.atleast_2d(A)  # a single row comes as a vector
+    rows, columns = A.shape[0] // n, A.shape[1] // n
+    strides = rows * A.strides[0] + columns * A.strides[1], *A.strides
+    return as_strided(A, (n, rows, columns), strides)
+
+
+def _whole(J: np.ndarray) -> np.ndarray:
+    """A Jacobian in which every joint of a robot moves its tip."""
+    return J
