@@ -7,7 +7,7 @@ line then serves quantity and derivative at once.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -23,17 +23,36 @@ REFERENCE_ACCELERATIONS = {
 }
 
 
-class Command(NamedTuple):
-    """What the law wants in task space.
+class Command(Protocol):
+    """What the law wants in task space."""
 
-    Attributes:
-        compared: epsilon, epsilon', (2, p, m).
-        shares: E, sigma, sigma', (3, n, m).
-        e_star: (n, m).
-        u: u, u', (2, n, m).
-        xref: xref', xref'', (2, n, m).
-        force: the synchronizing force, (n, m).
-    """
+    @property
+    def compared(self) -> np.ndarray:
+        """epsilon, epsilon', (2, p, m)."""
+
+    @property
+    def shares(self) -> np.ndarray:
+        """E, sigma, sigma', (3, n, m)."""
+
+    @property
+    def e_star(self) -> np.ndarray:
+        """e*, (n, m)."""
+
+    @property
+    def u(self) -> np.ndarray:
+        """u, u', (2, n, m)."""
+
+    @property
+    def xref(self) -> np.ndarray:
+        """xref', xref'', (2, n, m)."""
+
+    @property
+    def force(self) -> np.ndarray:
+        """The synchronizing force, (n, m)."""
+
+
+class Lines(NamedTuple):
+    """A `Command`, as the lines of the law make it."""
 
     compared: np.ndarray
     shares: np.ndarray
@@ -65,10 +84,10 @@ class ConstantWeights:
         self._Lambda, self._beta = (np.broadcast_to(gain, rows).copy() for gain in (Lambda, beta))
         self._K_eps, self._coupling = np.broadcast_to(K_eps, rows[1:]).copy(), cell.coupling
 
-    def __call__(self, task: Measurement, reference: Reference, integral: np.ndarray) -> Command:
+    def __call__(self, task: Measurement, reference: Reference, integral: np.ndarray) -> Lines:
         return self.of(task.error, task.rates, integral)
 
-    def of(self, error: np.ndarray, rates: np.ndarray, integral: np.ndarray) -> Command:
+    def of(self, error: np.ndarray, rates: np.ndarray, integral: np.ndarray) -> Lines:
         """The law for e and e', xd' and xd'', (2, n, m), and the integrals of epsilon, (p, m)."""
         c, Lambda, beta = self._c, self._Lambda, self._beta
         w = law.weighted_error(c, error)
@@ -78,7 +97,7 @@ class ConstantWeights:
         u = law.command(c, ABSENT, rates, error, sigma, e_star, beta, Lambda)
         xref = law.reference_velocity(self._c_inv, u)
         force = law.synchronizing_force(self._c_single, sigma[0], self._K_eps)
-        return Command(compared, shares, e_star[0], u, xref, force)
+        return Lines(compared, shares, e_star[0], u, xref, force)
 
 
 class MovingWeights:
@@ -101,7 +120,7 @@ class MovingWeights:
         self._Lambda, self._beta, self._K_eps, self._coupling = Lambda, beta, K_eps, cell.coupling
         self._reference_acceleration = REFERENCE_ACCELERATIONS[reference_acceleration]
 
-    def __call__(self, task: Measurement, reference: Reference, integral: np.ndarray) -> Command:
+    def __call__(self, task: Measurement, reference: Reference, integral: np.ndarray) -> Lines:
         Lambda, beta = self._Lambda, self._beta
         c, c_dot, c_ddot, c_inv = reference.weights
         (e, e_dot), (xd_dot, xd_ddot) = task.error, task.rates
@@ -117,7 +136,7 @@ class MovingWeights:
         xref_ddot = self._reference_acceleration(c_inv, c_dot, u_dot, xref_dot, task.x_dot)
         force = law.synchronizing_force(c, sigma, self._K_eps)
         u, xref = np.stack((u, u_dot)), np.stack((xref_dot, xref_ddot))
-        return Command(compared, shares, e_star, u, xref, force)
+        return Lines(compared, shares, e_star, u, xref, force)
 
 
 def couple(coupling: Coupling, w: np.ndarray, integral: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..checks import choice, instance
-from ..robots.regressors import Regressors
+from ..robots.regressors import Y, regressors
 from ..tasks.cell import Cell, Reference
 from ..tasks.spaces import Measurement
 from . import law
@@ -31,9 +31,14 @@ class Signals:
     v_ref: np.ndarray
     a_ref: np.ndarray
     s_q: np.ndarray
-    Y: np.ndarray
+    regressor: Y
     tau: np.ndarray
     theta_hat_dot: np.ndarray
+
+    @property
+    def Y(self) -> np.ndarray:  # noqa: N802
+        """The regressors, (n, nv, P)."""
+        return self.regressor.matrices()
 
     e = property(lambda self: self.task.error[0])
     e_dot = property(lambda self: self.task.error[1])
@@ -86,9 +91,9 @@ class Controller:
             self._command = MovingWeights(cell, self.Lambda, self.beta, self.K_eps, reference_acceleration)
 
     @cached_property
-    def _regressor(self) -> Callable[..., np.ndarray]:
-        """q, v, v_ref and a_ref, (n, nv), -> Y, (n, nv, P)."""
-        return Regressors(self.cell.parameters, [robot.nv for robot in self.cell.robots]).at
+    def _regressor(self) -> Callable[..., Y]:
+        """q, v, v_ref and a_ref, (n, nv), -> the regressors."""
+        return regressors(self.cell.parameters, [robot.nv for robot in self.cell.robots])
 
     def evaluate(
         self, reference: Reference, motion: np.ndarray, theta_hat: np.ndarray, integral: np.ndarray
@@ -104,7 +109,7 @@ class Controller:
         space = self.cell.task
         task = space.measure(motion, reference.desired)
         command = self._command(task, reference, integral)
-        v_ref, a_ref = space.to_joints(task, *command.xref)
+        v_ref, a_ref = space.to_joints(task, command.xref)
         q, v = motion
         s_q = v_ref - v
         Y = self._regressor(q, v, v_ref, a_ref)

@@ -34,17 +34,35 @@ class FoldedCommand:
     def __init__(self, rows: np.ndarray, n: int, p: int):
         self._rows, self._n, self._p = rows, n, p
 
-    def _part(self, robots: int, pairs: int, rows: int, count: int) -> np.ndarray:
-        """`count` arrays of so many rows, behind what belongs to some robots and pairs."""
-        start = robots * self._n + pairs * self._p
-        return self._rows[start : start + count * rows].reshape(count, rows, -1)
+    @property
+    def xref(self) -> np.ndarray:
+        return self._robots(0, 2)
 
-    xref = property(lambda self: self._part(0, 0, self._n, 2))
-    force = property(lambda self: self._rows[2 * self._n : 3 * self._n])
-    compared = property(lambda self: self._part(3, 0, self._p, 2))
-    shares = property(lambda self: self._part(3, 2, self._n, 3))
-    e_star = property(lambda self: self._part(6, 2, self._n, 1)[0])
-    u = property(lambda self: self._part(7, 2, self._n, 2))
+    @property
+    def force(self) -> np.ndarray:
+        return self._rows[2 * self._n : 3 * self._n]
+
+    @property
+    def compared(self) -> np.ndarray:
+        p, start = self._p, 3 * self._n
+        return self._rows[start : start + 2 * p].reshape(2, p, -1)
+
+    @property
+    def shares(self) -> np.ndarray:
+        return self._robots(3, 3, 2 * self._p)
+
+    @property
+    def e_star(self) -> np.ndarray:
+        return self._robots(6, 1, 2 * self._p)[0]
+
+    @property
+    def u(self) -> np.ndarray:
+        return self._robots(7, 2, 2 * self._p)
+
+    def _robots(self, first: int, count: int, skip: int = 0) -> np.ndarray:
+        """`count` arrays with a row per robot, behind `first` of them and so many other rows."""
+        start = skip + first * self._n
+        return self._rows[start : start + count * self._n].reshape(count, self._n, -1)
 
 
 class FoldedWeights:

@@ -114,11 +114,11 @@ def synchronizing_force(c: Matrices, sigma: Array, K_eps: Array) -> Array:
     return transposed_times(c, K_eps * sigma)
 
 
-def torque(Y: Array, theta_hat: Array, damping: Array, coupling_torque: Array) -> Array:
+def torque(Y: Matrices, theta_hat: Array, damping: Array, coupling_torque: Array) -> Array:
     """tau_i = Y_i theta_hat_i + (K_r term) + (synchronizing force as torque), eqs. (13) and (32)."""
     return times(Y, theta_hat) + damping + coupling_torque
 
 
-def adaptation(Y: Array, s_q: Array, Gamma: Array) -> Array:
+def adaptation(Y: Matrices, s_q: Array, Gamma: Array) -> Array:
     """theta_hat_i' = Gamma Y_i^T s_q, eq. (14)."""
     return Gamma * transposed_times(Y, s_q)

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.lib.stride_tricks import as_strided
 
+from .blocks import Blocks
 from .robot import Robot
 
 #: joints of a forest at most
@@ -49,13 +49,14 @@ class Forest:
         moves = _joints_that_move(self._model, tips).reshape(self.n, self.nv, 1)
         self._cut: Callable[[np.ndarray], np.ndarray] = _whole if moves.all() else partial(np.multiply, moves)
 
-    def regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
-        """Slotine-Li regressors, (n, nv, 10 bodies), see `Robot.regressor`; arguments are (n, nv)."""
-        q, mean = self._stored(q), 0.5 * (v + v_ref)
-        pin.computeJointTorqueRegressor(self._model, self._data, q, mean.ravel(), a_ref.ravel())
-        half = (v - mean).ravel()
-        pin.computeJointTorqueRegressor(self._weightless, self._weightless_data, q, half, self._still)
-        return self._Y - self._Y_weightless
+    def regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> Blocks:
+        """Slotine-Li regressors, blocks (nv, 10 bodies), see `Robot.regressor`; arguments are (n, nv)."""
+        q, v, half = self._stored(q), v.ravel(), 0.5 * (v_ref - v).ravel()
+        whole = pin.computeJointTorqueRegressor(self._model, self._data, q, v + half, a_ref.ravel())
+        whole -= pin.computeJointTorqueRegressor(
+            self._weightless, self._weightless_data, q, half, self._still
+        )
+        return Blocks(np.atleast_2d(whole), self.n)  # a single row comes as a vector
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """v', (n, nv), under joint torques tau, (n, nv); scratch memory, valid until the next call."""
@@ -63,7 +64,7 @@ class Forest:
         return self._v_dot
 
     def tips(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Positions and velocities of the tips, (2, n, 3), and the velocities' Jacobians and their derivatives.
+        """Positions and velocities of the tips, (2, n, 3), the velocities' Jacobians and their derivatives.
 
         Both of the latter are (n, 3, nv). The columns that Pinocchio has are twists: velocity of the point of
         a body that passes the origin, and angular velocity. A tip at p moves with linear + angular x p, which
@@ -95,8 +96,6 @@ class Forest:
         self._J, self._J_dot = (twists.T.reshape(n, nv, 6) for twists in (data.J, data.dJ))
         self._positions = [data.oMf[tip].translation for tip in tips]
         self._rotations = [data.oMf[tip].rotation for tip in tips]
-        self._Y = _blocks(data.jointTorqueRegressor, n)
-        self._Y_weightless = _blocks(self._weightless_data.jointTorqueRegressor, n)
 
     def _stored(self, q: np.ndarray) -> np.ndarray:
         """Joint positions as Pinocchio stores them."""
@@ -153,14 +152,6 @@ def _joints_that_move(model: pin.Model, tips: Sequence[int]) -> np.ndarray:
         for joint in model.supports[model.frames[tip].parentJoint]:
             moves[model.joints[joint].idx_v] = joint > 0
     return moves
-
-
-def _blocks(A: np.ndarray, n: int) -> np.ndarray:
-    """View of the n blocks on the diagonal of a matrix, (n, rows / n, columns / n)."""
-    A = np.atleast_2d(A)  # a single row comes as a vector
-    rows, columns = A.shape[0] // n, A.shape[1] // n
-    strides = rows * A.strides[0] + columns * A.strides[1], *A.strides
-    return as_strided(A, (n, rows, columns), strides)
 
 
 def _whole(J: np.ndarray) -> np.ndarray:

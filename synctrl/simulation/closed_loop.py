@@ -67,10 +67,11 @@ class ClosedLoop:
         """`evaluate` for states whose views are at hand: y' is written into `rate`."""
         signals = self.controller.evaluate(reference, state.motion, state.theta_hat, state.integral)
         tau = self.plant.applied(signals.tau) + disturbance
-        rate.q[...] = state.v
-        rate.v[...], rate.hidden[...] = self.plant.move(state.q, state.v, tau, state.hidden)
-        rate.theta_hat[...] = signals.theta_hat_dot
-        rate.integral[...] = signals.epsilon
+        v_dot, hidden_dot = self.plant.move(state.q, state.v, tau, state.hidden)
+        rate.q[...], rate.v[...] = state.v, v_dot
+        rate.theta_hat[...], rate.integral[...] = signals.theta_hat_dot, signals.epsilon
+        if hidden_dot.size:
+            rate.hidden[...] = hidden_dot
         return signals
 
     def coast(self, y: np.ndarray, held: np.ndarray, tau: np.ndarray, disturbance: np.ndarray) -> np.ndarray:

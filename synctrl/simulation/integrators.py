@@ -134,12 +134,14 @@ def steps(
     """Every step of the clock with what is desired at its start, in its middle, and just before its end."""
     for k in range(0, len(times) - 1, BLOCK):
         starts, ends = times[k : k + BLOCK + 1][:-1], times[k : k + BLOCK + 1][1:]
-        tables = (
-            loop.cell.references(starts),
-            loop.cell.references(0.5 * (starts + ends)),
-            loop.cell.references(np.nextafter(ends, -np.inf)),
+        instants = starts, 0.5 * (starts + ends), np.nextafter(ends, -np.inf)
+        rows, n = loop.cell.references(np.concatenate(instants)), len(starts)
+        yield from zip(
+            starts.tolist(),
+            ends.tolist(),
+            zip(rows[:n], rows[n : 2 * n], rows[2 * n :], strict=True),
+            strict=True,
         )
-        yield from zip(starts.tolist(), ends.tolist(), zip(*tables, strict=True), strict=True)
 
 
 def _right_hand_side(

@@ -107,7 +107,7 @@ class Plant:
         return np.clip(tau, -self.torque_limits, self.torque_limits) if self.saturate else tau
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """v', (n, nv), under joint torques tau, (n, nv), and friction, with the plant's own state as at t = 0."""
+        """v', (n, nv), under joint torques tau, (n, nv), and friction; the plant's own state as at t = 0."""
         return self.move(q, v, tau, self.hidden0)[0].copy()
 
     def move(
@@ -122,7 +122,7 @@ class Plant:
 
     def less_friction(self, tau: np.ndarray, v: np.ndarray) -> np.ndarray:
         """What friction leaves of torques tau, (n, nv), N·m."""
-        return tau - self.friction(v)
+        return tau - self.friction(v) if self._rubs else tau
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         """What a result says of the plant's own state at its logged instants, (T, size of the state)."""
@@ -139,8 +139,7 @@ class Plant:
             self.viscous[i, :nv] = member.friction.viscous
             self.coulomb[i, :nv] = member.friction.coulomb
             self.smoothing[i] = member.friction.smoothing
-        if not (self.viscous.any() or self.coulomb.any()):
-            self.less_friction = _frictionless
+        self._rubs = bool(self.viscous.any() or self.coulomb.any())
 
     @cached_property
     def _dynamics(self) -> Dynamics:
@@ -153,7 +152,3 @@ class Plant:
         stage.robots = self.schedule.robots[window]
         vars(stage).pop("_dynamics", None)
         return stage
-
-
-def _frictionless(tau: np.ndarray, v: np.ndarray) -> np.ndarray:
-    return tau

@@ -23,10 +23,10 @@ class Recorder:
         self._loop = loop
         lengths = {"time": instants, **sizes(loop)}
         shapes = {name: [lengths[d] for d in dimensions] for name, (dimensions, _) in LAYOUT.items()}
+        self._hidden = np.zeros((instants, loop.plant.hidden0.size))
         self._arrays = self._allocate(shapes)
         self._rows = tuple(self._arrays.values())
         self._damping = DampingLog(instants, loop.cell.n)
-        self._hidden = np.zeros((instants, loop.plant.hidden0.size))
         self.count = 0
 
     def _allocate(self, shapes: Mapping[str, list[int]]) -> dict[str, np.ndarray]:
@@ -56,25 +56,36 @@ class SampleRecorder(Recorder):
     """A recorder that is told one sample at a time, and writes each as one row of numbers."""
 
     def _allocate(self, shapes: Mapping[str, list[int]]) -> dict[str, np.ndarray]:
+        shapes = {name: shapes[name] for name in (*_SIGNALS, *_STATE)}
         ends = np.cumsum([int(np.prod(shape[1:])) for shape in shapes.values()])
-        self._log = np.zeros((shapes["t"][0], ends[-1]))
-        columns = np.split(self._log, ends[:-1], axis=1)
-        return {name: part.reshape(shapes[name]) for name, part in zip(shapes, columns, strict=True)}
+        self._log = np.zeros((shapes["t"][0], ends[-1] + self._loop.plant.hidden0.size))
+        columns = np.split(self._log, ends, axis=1)
+        arrays = {
+            name: part.reshape(shape)
+            for part, (name, shape) in zip(columns[:-1], shapes.items(), strict=True)
+        }
+        self._hidden = columns[-1]
+        return {name: arrays[name] for name in LAYOUT}
 
     def add(self, sample: Sample) -> None:
         """Log one instant."""
-        q, v, theta_hat, integral = self._loop.split(sample.y)
         s, row = sample.signals, self._log[self.count]
+        task, command = s.task, s.command
         row[0] = sample.t
         values = (
-            s.task.x, s.reference.xd, s.e, s.epsilon, integral, s.e_star, q, v, s.s_q, s.tau,
-            sample.disturbance, theta_hat,
+            task.motion[0], s.reference.desired[0], task.error[0], command.compared[0], command.e_star,
+            s.s_q, s.tau, sample.disturbance, sample.y,
         )  # fmt: skip
-        np.concatenate(values, axis=None, out=row[1:])
+        np.concatenate([value.ravel() for value in values], out=row[1:])
         self._damping.add(self.count, s)
-        if self._hidden.size:
-            self._hidden[self.count] = self._loop.hidden(sample.y)
         self.count += 1
+
+
+#: what `SampleRecorder` writes, in order: first what the controller computed, then the parts of the state
+_SIGNALS = (
+    "t", "x", "x_desired", "tracking_error", "sync_error", "coupled_error", "v_error", "tau", "disturbance",
+)  # fmt: skip
+_STATE = "q", "v", "theta_hat", "sync_integral"
 
 
 def sizes(loop: ClosedLoop) -> dict[str, int]:

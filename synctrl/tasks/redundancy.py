@@ -19,7 +19,6 @@ from ..checks import finite_array, non_negative_number, positive_number
 from ..errors import InputError
 from ..robots.robot import Robot
 
-
 #: signs of the cofactors of a matrix with two rows
 _CHECKERED = np.array([[1.0, -1.0], [-1.0, 1.0]])
 

@@ -16,9 +16,7 @@ class Tips:
     def __init__(self, robots: Sequence[Robot]):
         self._forests = forests(robots)
         self._shape = len(robots), 3, max(robot.nv for robot in robots)
-        if len(self._forests) == 1:
-            forest = self._forests[0][1]
-            self.positions, self.rotations = forest.tips, forest.turns
+        self._only = self._forests[0][1] if len(self._forests) == 1 else None
 
     def positions(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Positions and velocities of the tips, the velocities' Jacobians, and the Jacobians' derivatives.
@@ -31,6 +29,8 @@ class Tips:
         Returns:
             (2, n, 3), m and m/s; then (n, 3, nv), twice.
         """
+        if self._only is not None:
+            return self._only.tips(q, v)
         motion, (J, J_dot) = np.empty((2, len(q), 3)), np.zeros((2, *self._shape))
         for rows, forest in self._forests:
             k = forest.nv
@@ -42,6 +42,8 @@ class Tips:
 
         They belong to the joint positions and velocities that `positions` was asked for last.
         """
+        if self._only is not None:
+            return self._only.turns()
         R, (J, J_dot) = np.empty((self._shape[0], 3, 3)), np.zeros((2, *self._shape))
         for rows, forest in self._forests:
             R[rows], J[rows, :, : forest.nv], J_dot[rows, :, : forest.nv] = forest.turns()

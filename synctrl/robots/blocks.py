@@ -1,0 +1,123 @@
+"""Matrices of several robots as the blocks of one matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import as_strided
+
+
+class Blocks:
+    """Block-diagonal matrices with equal blocks, one per robot.
+
+    For a few small robots one product with the whole matrix costs less than a product per block.
+
+    Args:
+        whole: the matrix, (n rows, n columns).
+        n: number of blocks.
+    """
+
+    __slots__ = ("n", "whole")
+
+    def __init__(self, whole: np.ndarray, n: int):
+        self.whole, self.n = whole, n
+
+    def times(self, x: np.ndarray) -> np.ndarray:
+        """Products of the blocks with the rows of x, (n, columns)."""
+        return self.whole.dot(x.ravel()).reshape(self.n, -1)
+
+    def transposed_times(self, x: np.ndarray) -> np.ndarray:
+        """Products of the transposed blocks with the rows of x, (n, rows)."""
+        return x.ravel().dot(self.whole).reshape(self.n, -1)
+
+    def matrices(self) -> np.ndarray:
+        """The blocks, (n, rows, columns)."""
+        whole, n = self.whole, self.n
+        rows, columns = whole.shape[0] // n, whole.shape[1] // n
+        strides = rows * whole.strides[0] + columns * whole.strides[1], *whole.strides
+        return as_strided(whole, (n, rows, columns), strides).copy()
+
+    @classmethod
+    def of(cls, matrices: np.ndarray) -> Blocks:
+        """Blocks with these matrices, (n, rows, columns), on the diagonal."""
+        n, rows, columns = matrices.shape
+        whole = np.zeros((n, rows, n, columns))
+        whole[np.arange(n), :, np.arange(n)] = matrices
+        return cls(whole.reshape(n * rows, n * columns), n)
+
+
+class BlockProduct:
+    """Products A B of blocks, never multiplied out.
+
+    Args:
+        A, B: the blocks.
+    """
+
+    __slots__ = ("A", "B")
+
+    def __init__(self, A: Blocks, B: Blocks):
+        self.A, self.B = A, B
+
+    def times(self, x: np.ndarray) -> np.ndarray:
+        """Products with the rows of x."""
+        return self.A.times(self.B.times(x))
+
+    def transposed_times(self, x: np.ndarray) -> np.ndarray:
+        """Products of the transposed blocks with the rows of x."""
+        return self.B.transposed_times(self.A.transposed_times(x))
+
+    def matrices(self) -> np.ndarray:
+        """The products, one matrix per robot."""
+        return self.A.matrices() @ self.B.matrices()
+
+
+class Part(NamedTuple):
+    """Blocks of some robots: their rows, and the size of each.
+
+    Attributes:
+        robots: which robots.
+        rows, columns: size of a block.
+        blocks: the blocks.
+    """
+
+    robots: slice
+    rows: int
+    columns: int
+    blocks: Blocks | BlockProduct
+
+
+class Padded:
+    """Blocks of all robots, put together from parts; zero where a robot has fewer rows or columns.
+
+    Args:
+        shape: number of robots, rows and columns of the largest blocks.
+        parts: the parts.
+    """
+
+    __slots__ = ("parts", "shape")
+
+    def __init__(self, shape: tuple[int, int, int], parts: Sequence[Part]):
+        self.shape, self.parts = shape, parts
+
+    def times(self, x: np.ndarray) -> np.ndarray:
+        """Products of the blocks with the rows of x, (n, columns)."""
+        product = np.zeros(self.shape[:2])
+        for robots, rows, columns, blocks in self.parts:
+            product[robots, :rows] = blocks.times(x[robots, :columns])
+        return product
+
+    def transposed_times(self, x: np.ndarray) -> np.ndarray:
+        """Products of the transposed blocks with the rows of x, (n, rows)."""
+        product = np.zeros(self.shape[::2])
+        for robots, rows, columns, blocks in self.parts:
+            product[robots, :columns] = blocks.transposed_times(x[robots, :rows])
+        return product
+
+    def matrices(self) -> np.ndarray:
+        """The blocks, (n, rows, columns)."""
+        matrices = np.zeros(self.shape)
+        for robots, rows, columns, blocks in self.parts:
+            matrices[robots, :rows, :columns] = blocks.matrices()
+        return matrices
