@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,6 +11,7 @@ import numpy as np
 from ..checks import instance
 from ..control.controller import Signals
 from ..errors import InputError
+from ..robots.forest import Forest, forests
 from ..simulation.clock import before
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.disturbances import DisturbanceSchedule
@@ -24,6 +25,10 @@ BLOCK = 256
 MISMATCH = 1e-6
 #: share of the model's torque from which something in Y theta counts as friction, and not as rounding
 KNOWN = 1e-9
+
+
+Bodies = Sequence[tuple[slice, Forest]]
+"""The robots of a cell as `forests` groups them."""
 
 
 class Row(NamedTuple):
@@ -175,29 +180,32 @@ def _stretches(logged: np.ndarray, jumps: list[int], crossed: list[int]) -> tupl
 
 
 def _rows(result: Result, loop: ClosedLoop, jumps: list[int]) -> Iterator[Row]:
-    t, references = result.t, loop.cell.references
+    t, references, bodies = result.t, loop.cell.references, forests(loop.cell.robots)
     for start in range(0, len(t), BLOCK):
         for k, reference in enumerate(references(t[start : start + BLOCK]), start):
             if k in jumps:
                 from_left = references(np.array([before(t[k])]))[0]
-                yield _row(result, loop.at(before(t[k])), k, from_left, result.disturbance[k - 1])
-            yield _row(result, loop.at(t[k]), k, reference, result.disturbance[k])
+                yield _row(result, loop.at(before(t[k])), bodies, k, from_left, result.disturbance[k - 1])
+            yield _row(result, loop.at(t[k]), bodies, k, reference, result.disturbance[k])
 
 
-def _row(result: Result, loop: ClosedLoop, k: int, reference: Reference, disturbance: np.ndarray) -> Row:
+def _row(
+    result: Result, loop: ClosedLoop, bodies: Bodies, k: int, reference: Reference, disturbance: np.ndarray
+) -> Row:
     q, v, theta_hat = result.q[k], result.v[k], result.theta_hat[k]
     y = np.concatenate([part.ravel() for part in (q, v, theta_hat, result.sync_integral[k])])
     y_dot, s = loop.evaluate(reference, y, disturbance)
     theta, adapted = loop.cell.theta, loop.controller.Gamma > 0
     J, J_inv = _jacobians(loop, s)
-    M, C_s = _dynamics(loop, q, v, s.s_q)
-    friction, friction_damping = _friction(loop, q, v, s, M)
+    tilde = theta - theta_hat
+    M, C_s = _dynamics(bodies, q, v, s.s_q)
+    friction, friction_damping = _friction(loop, bodies, q, v, s)
     return Row(
         v, loop.split(y_dot)[1], s.v_ref, s.a_ref, s.s_q, s.tau, disturbance, friction, friction_damping,
-        s.tau - loop.plant.applied(s.tau), theta - theta_hat, s.theta_hat_dot, s.epsilon, s.epsilon_dot,
+        s.tau - loop.plant.applied(s.tau), tilde, s.theta_hat_dot, s.epsilon, s.epsilon_dot,
         s.E, s.sigma, s.e_star, s.u, s.r, reference.c, reference.c_dot, reference.c_inv, J, J_inv, M, C_s,
-        np.matvec(s.Y, np.where(adapted, 0.0, theta - theta_hat)),
-        np.matvec(np.abs(s.Y), np.abs(theta_hat) + np.abs(theta)),
+        s.regressor.times(np.where(adapted, 0.0, tilde)),
+        s.regressor.size(np.abs(theta_hat) + np.abs(theta)),
     )  # fmt: skip
 
 
@@ -208,40 +216,35 @@ def _jacobians(loop: ClosedLoop, s: Signals) -> tuple[np.ndarray, np.ndarray]:
     return identities, identities
 
 
-def _dynamics(
-    loop: ClosedLoop, q: np.ndarray, v: np.ndarray, s_q: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _dynamics(bodies: Bodies, q: np.ndarray, v: np.ndarray, s_q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mass matrices, (n, nv, nv), and C s_q, (n, nv)."""
-    n, nv = q.shape
-    M, C_s = np.zeros((n, nv, nv)), np.zeros((n, nv))
-    for i, robot in enumerate(loop.cell.robots):
-        k = robot.nv
-        M[i, :k, :k] = robot.mass_matrix(q[i, :k])
-        C_s[i, :k] = robot.coriolis_matrix(q[i, :k], v[i, :k]) @ s_q[i, :k]
+    M, C_s = np.zeros((*q.shape, q.shape[1])), np.zeros(q.shape)
+    for rows, forest in bodies:
+        k = forest.nv
+        M[rows, :k, :k] = forest.mass_matrices(q[rows, :k])
+        C_s[rows, :k] = forest.coriolis_torque(q[rows, :k], v[rows, :k], s_q[rows, :k])
     return M, C_s
 
 
 def _friction(
-    loop: ClosedLoop, q: np.ndarray, v: np.ndarray, s: Signals, M: np.ndarray
+    loop: ClosedLoop, bodies: Bodies, q: np.ndarray, v: np.ndarray, s: Signals
 ) -> tuple[np.ndarray, np.ndarray]:
     """Torque of friction that is not in Y, and torque by which friction in Y damps, each (n, nv).
 
     What Y theta has beyond M a_ref + C v_ref + g is friction that the controller knows. With the viscous part
     taken at v_ref, F_v s_q of the plant's friction remains as damping.
     """
-    unknown = loop.plant.friction(v)
-    damping = np.zeros_like(v)
-    if not (loop.plant.viscous.any() or loop.plant.coulomb.any()):
+    unknown, damping = loop.plant.friction(v), np.zeros_like(v)
+    if not loop.plant.rubs:
         return unknown, damping
-    for i, robot in enumerate(loop.cell.robots):
-        k = robot.nv
-        Y, theta = s.Y[i, :k], loop.cell.theta[i]
-        C, g = robot.coriolis_matrix(q[i, :k], v[i, :k]), robot.gravity(q[i, :k])
-        known = Y @ theta - (M[i, :k, :k] @ s.a_ref[i, :k] + C @ s.v_ref[i, :k] + g)
-        if (np.abs(known) > KNOWN * (np.abs(Y) @ np.abs(theta))).any():
-            damping[i, :k] = loop.plant.viscous[i, :k] * s.s_q[i, :k]
-            unknown[i, :k] += damping[i, :k] - known
-    return unknown, damping
+    theta = loop.cell.theta
+    known = s.regressor.times(theta)
+    for rows, forest in bodies:
+        k = forest.nv
+        known[rows, :k] -= forest.torque(*(x[rows, :k] for x in (q, v, s.v_ref, s.a_ref)))
+    knows = (np.abs(known) > KNOWN * s.regressor.size(np.abs(theta))).any(axis=1, keepdims=True)
+    damping = np.where(knows, loop.plant.viscous * s.s_q, 0.0)
+    return unknown + damping - np.where(knows, known, 0.0), damping
 
 
 # -- checks -----------------------------------------------------------------------------------------------

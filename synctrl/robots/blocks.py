@@ -32,6 +32,10 @@ class Blocks:
         """Products of the transposed blocks with the rows of x, (n, rows)."""
         return x.ravel().dot(self.whole).reshape(self.n, -1)
 
+    def size(self, x: np.ndarray) -> np.ndarray:
+        """`times` with absolute values in the blocks: what its rounding errors are relative to."""
+        return np.abs(self.whole).dot(x.ravel()).reshape(self.n, -1)
+
     def matrices(self) -> np.ndarray:
         """The blocks, (n, rows, columns)."""
         whole, n = self.whole, self.n
@@ -67,6 +71,10 @@ class BlockProduct:
     def transposed_times(self, x: np.ndarray) -> np.ndarray:
         """Products of the transposed blocks with the rows of x."""
         return self.B.transposed_times(self.A.transposed_times(x))
+
+    def size(self, x: np.ndarray) -> np.ndarray:
+        """`times` with absolute values in both factors."""
+        return self.A.size(self.B.size(x))
 
     def matrices(self) -> np.ndarray:
         """The products, one matrix per robot."""
@@ -106,6 +114,13 @@ class Padded:
         product = np.zeros(self.shape[:2])
         for robots, rows, columns, blocks in self.parts:
             product[robots, :rows] = blocks.times(x[robots, :columns])
+        return product
+
+    def size(self, x: np.ndarray) -> np.ndarray:
+        """`times` with absolute values in the blocks."""
+        product = np.zeros(self.shape[:2])
+        for robots, rows, columns, blocks in self.parts:
+            product[robots, :rows] = blocks.size(x[robots, :columns])
         return product
 
     def transposed_times(self, x: np.ndarray) -> np.ndarray:

@@ -58,6 +58,19 @@ class Forest:
         )
         return Blocks(np.atleast_2d(whole), self.n)  # a single row comes as a vector
 
+    def torque(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
+        """M a_ref + C(q, v) v_ref + g, (n, nv), with the true parameters by the identity of `regressor`."""
+        return self._torque(self._model, self._data, q, v, v_ref, a_ref)
+
+    def coriolis_torque(self, q: np.ndarray, v: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """C(q, v) w, (n, nv)."""
+        return self._torque(self._weightless, self._weightless_data, q, v, w, self._still)
+
+    def mass_matrices(self, q: np.ndarray) -> np.ndarray:
+        """M(q), (n, nv, nv)."""
+        each, n, nv = np.arange(self.n), self.n, self.nv
+        return pin.crba(self._model, self._data, self._stored(q)).reshape(n, nv, n, nv)[each, :, each]
+
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """v', (n, nv), under joint torques tau, (n, nv); scratch memory, valid until the next call."""
         pin.aba(self._model, self._data, self._stored(q), v.ravel(), tau.ravel())
@@ -88,6 +101,14 @@ class Forest:
         return R, self._cut(self._J[..., 3:]).mT.copy(), self._cut(self._J_dot[..., 3:]).mT.copy()
 
     # -- internals ----------------------------------------------------------------------------------------
+
+    def _torque(
+        self, model: pin.Model, data: pin.Data, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a: np.ndarray
+    ) -> np.ndarray:
+        q, v, half = self._stored(q), v.ravel(), 0.5 * (v_ref - v).ravel()
+        torque = pin.rnea(model, data, q, v + half, a.ravel()).copy()
+        torque -= pin.rnea(self._weightless, self._weightless_data, q, half, self._still)
+        return torque.reshape(self.n, self.nv)
 
     def _view_results(self, tips: Sequence[int]) -> None:
         """Views of where Pinocchio leaves its results, which stay where they are."""

@@ -64,6 +64,7 @@ class Plant:
     Attributes:
         viscous, coulomb: coefficients of friction, (n, nv), N·m·s/rad and N·m.
         smoothing: velocity at which Coulomb friction reaches tanh(1) of its value, (n, 1), rad/s.
+        rubs: whether any joint has friction.
         torque_limits: (n, nv), N·m; infinite without saturation.
         robots: what stands there, with the loads it carries now.
         payloads: the payloads.
@@ -122,7 +123,7 @@ class Plant:
 
     def less_friction(self, tau: np.ndarray, v: np.ndarray) -> np.ndarray:
         """What friction leaves of torques tau, (n, nv), N·m."""
-        return tau - self.friction(v) if self._rubs else tau
+        return tau - self.friction(v) if self.rubs else tau
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         """What a result says of the plant's own state at its logged instants, (T, size of the state)."""
@@ -139,7 +140,7 @@ class Plant:
             self.viscous[i, :nv] = member.friction.viscous
             self.coulomb[i, :nv] = member.friction.coulomb
             self.smoothing[i] = member.friction.smoothing
-        self._rubs = bool(self.viscous.any() or self.coulomb.any())
+        self.rubs = bool(self.viscous.any() or self.coulomb.any())
 
     @cached_property
     def _dynamics(self) -> Dynamics:

@@ -1,0 +1,218 @@
+"""Robots evaluated together move as they do alone: forests, blocks, and the law as one matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from machines import random_robot, seeds
+
+from synctrl import CartesianSpace, Cell, Coupling, Cubic, Gains, Member, Robot, load_robot
+from synctrl.control.commands import ConstantWeights
+from synctrl.control.controller import Controller
+from synctrl.control.folded import FoldedWeights
+from synctrl.robots.base_parameters import BaseParameters
+from synctrl.robots.blocks import BlockProduct, Blocks
+from synctrl.robots.forest import LARGE, Forest, forests
+from synctrl.robots.friction import Friction
+from synctrl.robots.friction_parameters import FrictionParameters
+from synctrl.robots.parameters import FullParameters, planar_two_link_parameters
+from synctrl.robots.regressors import regressors
+from synctrl.tasks.tips import Tips
+
+NAMES = ("planar2r", "a460", "ur5", "panda", "kinova")
+
+
+def several(robot: Robot, seed: int, count: int = 3) -> list[Robot]:
+    """A robot on several bases, in turn controlled at different frames and with different rotors."""
+    rng = np.random.default_rng(seed)
+    frames = [frame.name for frame in robot.model.frames if frame.name != "universe"]
+    made = []
+    for k in range(count):
+        placed = robot.placed(rng.uniform(-1, 1, 3), rng.uniform(-3, 3, 3))
+        moved = placed.with_tip(frames[rng.integers(len(frames))] if k else robot.tip)
+        made.append(moved.with_armature(rng.uniform(0, 1)))
+    return made
+
+
+def motion(seed: int, count: int, n: int, nv: int) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(-2, 2, (count, n, nv))
+
+
+def assert_moves_as_its_robots(robots: list[Robot], seed: int) -> None:
+    forest, nv = Forest(robots), robots[0].nv
+    q, v, v_ref, a_ref = motion(seed, 4, len(robots), nv)
+    (p, p_dot), J, J_dot = forest.tips(q, v)
+    R, J_w, J_w_dot = forest.turns()
+    Y, v_dot = forest.regressor(q, v, v_ref, a_ref).matrices(), forest.acceleration(q, v, a_ref)
+    M, C_w, tau = (
+        forest.mass_matrices(q),
+        forest.coriolis_torque(q, v, a_ref),
+        forest.torque(q, v, v_ref, a_ref),
+    )
+    for i, robot in enumerate(robots):
+        pose, J_i, J_i_dot = robot.tip_kinematics(q[i], v[i])
+        C, g = robot.coriolis_matrix(q[i], v[i]), robot.gravity(q[i])
+        pairs = [
+            (p[i], pose.translation), (p_dot[i], J_i[:3] @ v[i]), (R[i], pose.rotation), (J[i], J_i[:3]),
+            (J_w[i], J_i[3:]), (J_dot[i], J_i_dot[:3]), (J_w_dot[i], J_i_dot[3:]),
+            (Y[i], robot.regressor(q[i], v[i], v_ref[i], a_ref[i])),
+            (v_dot[i], robot.forward_dynamics(q[i], v[i], a_ref[i])), (M[i], robot.mass_matrix(q[i])),
+            (C_w[i], C @ a_ref[i]), (tau[i], M[i] @ a_ref[i] + C @ v_ref[i] + g),
+        ]  # fmt: skip
+        for found, expected in pairs:
+            size = max(1.0, float(np.abs(expected).max()))
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * size)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@given(seed=seeds)
+@settings(max_examples=8)
+def test_a_forest_of_a_ready_robot_moves_as_its_robots_do_alone(name: str, seed: int) -> None:
+    assert_moves_as_its_robots(several(load_robot(name), seed), seed)
+
+
+@given(seeds, st.integers(1, 6), st.booleans(), st.integers(1, 4))
+@settings(max_examples=30)
+def test_a_forest_of_random_robots_moves_as_they_do_alone(seed, joints, chain, count) -> None:
+    assert_moves_as_its_robots(several(random_robot(seed, joints, chain), seed, count), seed)
+
+
+def mixed(seed: int) -> list[Robot]:
+    """Robots of different sizes; equal ones stand beside each other and apart."""
+    return [
+        robot
+        for name, count in (("planar2r", 2), ("ur5", 3), ("planar2r", 1), ("a460", 2))
+        for robot in several(load_robot(name), seed, count)
+    ]
+
+
+@given(seeds, st.integers(1, 20))
+@settings(max_examples=10)
+def test_forests_have_every_robot_once_and_in_order(seed: int, joints: int) -> None:
+    robots = mixed(seed)
+    found = forests(robots, joints)
+    assert [i for rows, _ in found for i in range(len(robots))[rows]] == list(range(len(robots)))
+    for rows, forest in found:
+        assert {robot.nv for robot in robots[rows]} == {forest.nv}
+        assert forest.n == 1 or forest.n * forest.nv <= joints
+
+
+def test_robots_under_different_gravity_are_apart() -> None:
+    robot = load_robot("a460")
+    light = Robot(robot._weightless, robot.tip)
+    assert [forest.n for _, forest in forests([robot, robot, light, robot])] == [2, 1, 1]
+
+
+def test_cost_per_robot_is_bounded_by_bounded_forests() -> None:
+    found = forests([load_robot("planar2r")] * 200)
+    assert max(forest.n * forest.nv for _, forest in found) <= LARGE < 400
+
+
+def parameters_of(kind: str, robot: Robot):
+    made: dict[str, Callable] = {
+        "full": FullParameters,
+        "base": BaseParameters,
+        "theta 50": lambda _: planar_two_link_parameters(load_robot("planar2r")),  # arms that do not lean
+        "friction": lambda robot: FrictionParameters(robot, Friction(1.0, 0.5), armature=True),
+    }
+    return made[kind](robot)
+
+
+@pytest.mark.parametrize(
+    "kinds",
+    [
+        ("full",) * 8,
+        ("base",) * 8,
+        ("theta 50", "theta 50", *("full",) * 6),
+        ("theta 50", "full", "friction", "base", "friction", "full", "base", "friction"),
+    ],
+)
+def test_regressors_of_a_cell_are_those_of_its_robots(kinds: tuple[str, ...]) -> None:
+    robots = mixed(7)
+    parameters = [parameters_of(kind, robot) for kind, robot in zip(kinds, robots, strict=True)]
+    n, nv, P = len(robots), max(r.nv for r in robots), max(p.theta.size for p in parameters)
+    rows = motion(3, 4, n, nv)
+    Y = regressors(parameters, [robot.nv for robot in robots])(*rows)
+    theta, s = np.random.default_rng(1).normal(size=(n, P)), motion(4, 1, n, nv)[0]
+    products = Y.matrices(), Y.times(theta), Y.transposed_times(s), Y.size(np.abs(theta))
+    for i, (robot, p) in enumerate(zip(robots, parameters, strict=True)):
+        k, size = robot.nv, p.theta.size
+        Y_i = p.regressor(*rows[:, i, :k])
+        expected = np.zeros((nv, P))
+        expected[:k, :size] = Y_i
+        scale = 1 + np.abs(expected).max()
+        np.testing.assert_allclose(products[0][i], expected, rtol=0, atol=1e-12 * scale)
+        np.testing.assert_allclose(products[1][i], expected @ theta[i], rtol=0, atol=1e-10 * scale)
+        np.testing.assert_allclose(products[2][i], expected.T @ s[i], rtol=0, atol=1e-10 * scale)
+        assert (products[3][i] >= np.abs(expected) @ np.abs(theta[i]) - 1e-9 * scale).all()
+
+
+def test_parameters_with_a_regressor_of_their_own_are_asked() -> None:
+    class Doubled(FullParameters):
+        def regressor(self, *motion: np.ndarray) -> np.ndarray:
+            return 2 * super().regressor(*motion)
+
+    robot, rows = load_robot("planar2r"), motion(0, 4, 2, 2)
+    plain, doubled = (
+        regressors([kind(robot)] * 2, [2, 2])(*rows).matrices() for kind in (FullParameters, Doubled)
+    )
+    np.testing.assert_array_equal(doubled, 2 * plain)
+
+
+def test_tips_of_different_robots_are_padded_with_zeros() -> None:
+    robots = mixed(5)
+    (q, v), nv = motion(6, 2, len(robots), 6), 6
+    tips = Tips(robots)
+    (p, p_dot), J, J_dot = tips.positions(q, v)
+    R, J_w, J_w_dot = tips.rotations()
+    for i, robot in enumerate(robots):
+        k = robot.nv
+        pose, J_i, J_i_dot = robot.tip_kinematics(q[i, :k], v[i, :k])
+        np.testing.assert_allclose(p[i], pose.translation, atol=1e-13)
+        np.testing.assert_allclose(R[i], pose.rotation, atol=1e-13)
+        for found, expected in ((J, J_i[:3]), (J_w, J_i[3:]), (J_dot, J_i_dot[:3]), (J_w_dot, J_i_dot[3:])):
+            np.testing.assert_allclose(found[i, :, :k], expected, atol=1e-12)
+            np.testing.assert_array_equal(found[i, :, k:], 0.0)
+        np.testing.assert_allclose(p_dot[i], J_i[:3] @ v[i, :k], atol=1e-12)
+    assert nv == J.shape[2]
+
+
+@given(seeds, st.integers(1, 4), st.integers(1, 3), st.integers(1, 5), st.integers(1, 4))
+def test_blocks_multiply_as_their_matrices(seed: int, n: int, rows: int, inner: int, columns: int) -> None:
+    rng = np.random.default_rng(seed)
+    A, B = rng.normal(size=(n, rows, inner)), rng.normal(size=(n, inner, columns))
+    x, y, z = rng.normal(size=(n, inner)), rng.normal(size=(n, rows)), rng.normal(size=(n, columns))
+    one, two = Blocks.of(A), BlockProduct(Blocks.of(A), Blocks.of(B))
+    pairs = [
+        (one.matrices(), A), (one.times(x), np.matvec(A, x)), (one.transposed_times(y), np.matvec(A.mT, y)),
+        (one.size(x), np.matvec(np.abs(A), x)), (two.matrices(), A @ B), (two.times(z), np.matvec(A @ B, z)),
+        (two.transposed_times(y), np.matvec((A @ B).mT, y)),
+        (two.size(z), np.matvec(np.abs(A), np.matvec(np.abs(B), z))),
+    ]  # fmt: skip
+    for found, expected in pairs:
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+
+
+@given(seeds, st.sampled_from([("ring", 4), ("signed_ring", 3), ("star", 4), ("complete", 4)]), st.booleans())
+@settings(max_examples=25, deadline=None)
+def test_the_law_as_a_matrix_is_the_law_line_by_line(seed: int, graph: tuple[str, int], full: bool) -> None:
+    rng, (kind, n) = np.random.default_rng(seed), graph
+    c = rng.normal(size=(n, 2, 2)) + 3 * np.eye(2) if full else rng.uniform(0.5, 2, n)
+    arm, q0 = load_robot("planar2r"), np.array([0.4, 1.2])
+    tip = arm.tip_position(q0)[:2]
+    members = [Member(arm, Cubic(tip, tip + 0.05, 1.0), q0)] * n
+    cell = Cell(members, getattr(Coupling, kind)(n, c=c), CartesianSpace("xy"))
+    controller = Controller(cell, Gains(*rng.uniform(0.5, 20, (4, 2)), 0.1))
+    matrix = controller._command
+    assert isinstance(matrix, FoldedWeights)
+    lines = ConstantWeights(cell, controller.Lambda, controller.beta, controller.K_eps)
+    task = cell.task.measure(rng.normal(size=(2, n, 2)), rng.normal(size=(3, n, 2)))
+    integral, reference = rng.normal(size=(cell.coupling.pairs, 2)), cell.references(np.zeros(1))[0]
+    found, expected = (way(task, reference, integral) for way in (matrix, lines))
+    for name in ("compared", "shares", "e_star", "u", "xref", "force"):
+        one, other = getattr(found, name), getattr(expected, name)
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-11 * (1 + np.abs(other).max()))
