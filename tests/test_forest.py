@@ -118,6 +118,9 @@ def parameters_of(kind: str, robot: Robot):
         "base": BaseParameters,
         "theta 50": lambda _: planar_two_link_parameters(load_robot("planar2r")),  # arms that do not lean
         "friction": lambda robot: FrictionParameters(robot, Friction(1.0, 0.5), armature=True),
+        "friction of base parameters": lambda robot: FrictionParameters(
+            robot, Friction(1.0, 0.5, 0.1 * robot.nv), BaseParameters(robot)
+        ),
     }
     return made[kind](robot)
 
@@ -128,6 +131,8 @@ def parameters_of(kind: str, robot: Robot):
         ("full",) * 8,
         ("base",) * 8,
         ("theta 50", "theta 50", *("full",) * 6),
+        ("friction",) * 8,
+        ("friction of base parameters",) * 8,
         ("theta 50", "full", "friction", "base", "friction", "full", "base", "friction"),
     ],
 )

@@ -81,6 +81,48 @@ class BlockProduct:
         return self.A.matrices() @ self.B.matrices()
 
 
+class Beside:
+    """Blocks with diagonal matrices to their right, [A, diag(d_1), diag(d_2), ...].
+
+    Args:
+        A: blocks of n robots.
+        diagonals: d_k of every robot, (n, k, rows).
+    """
+
+    __slots__ = ("A", "diagonals")
+
+    def __init__(self, A: Blocks | BlockProduct, diagonals: np.ndarray):
+        self.A, self.diagonals = A, diagonals
+
+    def times(self, x: np.ndarray) -> np.ndarray:
+        """Products with the rows of x."""
+        left, right = self._split(x)
+        return self.A.times(left) + (self.diagonals * right).sum(axis=1)
+
+    def transposed_times(self, x: np.ndarray) -> np.ndarray:
+        """Products of the transposed blocks with the rows of x."""
+        right = self.diagonals * x[:, None]
+        return np.concatenate((self.A.transposed_times(x), right.reshape(len(x), -1)), axis=1)
+
+    def size(self, x: np.ndarray) -> np.ndarray:
+        """`times` with absolute values in the blocks."""
+        left, right = self._split(x)
+        return self.A.size(left) + (np.abs(self.diagonals) * right).sum(axis=1)
+
+    def matrices(self) -> np.ndarray:
+        """The blocks, one matrix per robot."""
+        n, k, rows = self.diagonals.shape
+        right = np.zeros((n, rows, k, rows))
+        each = np.arange(rows)
+        right[:, each, :, each] = self.diagonals.transpose(2, 0, 1)
+        return np.concatenate((self.A.matrices(), right.reshape(n, rows, -1)), axis=2)
+
+    def _split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The columns of x that belong to A, and those of the diagonals, (n, k, rows)."""
+        n, k, rows = self.diagonals.shape
+        return x[:, : -k * rows], x[:, -k * rows :].reshape(n, k, rows)
+
+
 class Part(NamedTuple):
     """Blocks of some robots: their rows, and the size of each.
 
@@ -93,7 +135,7 @@ class Part(NamedTuple):
     robots: slice
     rows: int
     columns: int
-    blocks: Blocks | BlockProduct
+    blocks: Blocks | BlockProduct | Beside
 
 
 class Padded:

@@ -6,7 +6,7 @@ passes the rigid-body algorithms once; its trees do not act on each other. Array
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import groupby
 from typing import Any
@@ -123,20 +123,15 @@ class Forest:
         return q.ravel() if self._plain_q else pin.integrate(self._model, self._neutral, q.ravel())
 
 
-def forests(
-    robots: Sequence[Robot], joints: int = LARGE, kinds: Sequence[Hashable] | None = None
-) -> list[tuple[slice, Forest]]:
+def forests(robots: Sequence[Robot], joints: int = LARGE) -> list[tuple[slice, Forest]]:
     """Forests that together have all robots, each with the rows it stands for.
 
     Args:
         robots: the robots.
         joints: joints of a forest at most.
-        kinds: robots of different kinds do not share a forest; by default they may.
     """
-    kinds = [None] * len(robots) if kinds is None else kinds
-    groups = groupby(range(len(robots)), lambda i: (_size(robots[i]), kinds[i]))
     found = []
-    for (size, _), group in groups:
+    for size, group in groupby(range(len(robots)), lambda i: _size(robots[i])):
         rows, step = list(group), max(1, joints // size[0])
         for first in range(rows[0], rows[-1] + 1, step):
             part = slice(first, min(first + step, rows[-1] + 1))
@@ -170,8 +165,8 @@ def _joints_that_move(model: pin.Model, tips: Sequence[int]) -> np.ndarray:
     """1 for joints between the tip of their tree and the world, else 0, (nv,)."""
     moves = np.zeros(model.nv)
     for tip in tips:
-        for joint in model.supports[model.frames[tip].parentJoint]:
-            moves[model.joints[joint].idx_v] = joint > 0
+        for joint in list(model.supports[model.frames[tip].parentJoint])[1:]:  # the first one is the world
+            moves[model.joints[joint].idx_v] = 1
     return moves
 
 

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from functools import partial
 from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from .blocks import BlockProduct, Blocks, Padded, Part
+from .blocks import Beside, BlockProduct, Blocks, Padded, Part
 from .forest import SMALL, forests
+from .friction_parameters import FrictionParameters
 from .parameters import FullParameters, LinearParameters, Parameters
 
 #: what is linear in the regressor of all inertial parameters, and so can share a forest
 _RIGID = (FullParameters.regressor, LinearParameters.regressor)
 
-
-Y = Blocks | BlockProduct | Padded
+Y = Blocks | BlockProduct | Beside | Padded
 """Regressors of all robots, with the products that the law needs."""
+Regressor = Callable[..., Any]
+"""q, v, v_ref and a_ref of some robots, (k, nv), -> their regressors."""
 
 
 class Group(NamedTuple):
@@ -27,13 +29,13 @@ class Group(NamedTuple):
     Attributes:
         rows: which robots.
         nv, size: numbers of joints and of parameters of each.
-        regressor: q, v, v_ref, a_ref, (k, nv), -> Y of k robots.
+        regressor: of these robots.
     """
 
     rows: slice
     nv: int
     size: int
-    regressor: Callable[..., Blocks | BlockProduct]
+    regressor: Regressor
 
 
 def regressors(parameters: Sequence[Parameters], joints: Sequence[int]) -> Callable[..., Y]:
@@ -58,28 +60,48 @@ def _together(groups: Sequence[Group], shape: tuple[int, int, int], *motion: np.
 
 
 def _groups(parameters: Sequence[Any], joints: Sequence[int]) -> Iterator[Group]:
-    rigid = [type(p).regressor in _RIGID for p in parameters]
-    for shared, group in groupby(range(len(joints)), rigid.__getitem__):
+    kinds = [_kind(p) for p in parameters]
+    for kind, group in groupby(range(len(joints)), kinds.__getitem__):
         rows = list(group)
-        if shared:
-            yield from _in_forests(rows[0], parameters[rows[0] : rows[-1] + 1])
-        else:
+        if kind is None:
             yield from (_alone(i, parameters[i], joints[i]) for i in rows)
+        else:
+            yield from _in_forests(rows[0], parameters[rows[0] : rows[-1] + 1])
+
+
+def _kind(parameters: Any) -> Hashable:
+    """What parameters in one group have in common; None for a kind with a regressor of its own."""
+    own, size = type(parameters).regressor, len(parameters.theta)
+    if own is FrictionParameters.regressor:
+        base = _kind(parameters.base)
+        return None if base is None else (base, parameters.armature, size)
+    return (own, size) if own in _RIGID else None
 
 
 def _in_forests(first: int, parameters: Sequence[Any]) -> Iterator[Group]:
-    """Groups of parameters that are linear in the inertial ones, Y = Y_full B."""
-    kinds = [(type(p).regressor, len(p.theta)) for p in parameters]
-    for rows, forest in forests([p.robot for p in parameters], SMALL, kinds):
-        regressor: Callable[..., Blocks | BlockProduct] = forest.regressor
-        kind, size = kinds[rows.start]
-        if kind is LinearParameters.regressor:
-            regressor = _mapped(forest.regressor, Blocks.of(np.stack([p.matrix for p in parameters[rows]])))
-        yield Group(slice(first + rows.start, first + rows.stop), forest.nv, size, regressor)
+    """Groups of parameters of one kind whose robots share forests."""
+    rigid: list[Any] = [p.base if isinstance(p, FrictionParameters) else p for p in parameters]
+    for rows, forest in forests([p.robot for p in rigid], SMALL):
+        regressor: Regressor = forest.regressor
+        if isinstance(rigid[0], LinearParameters):
+            regressor = partial(_mapped, regressor, Blocks.of(np.stack([p.matrix for p in rigid[rows]])))
+        if isinstance(parameters[0], FrictionParameters):
+            smoothing = np.array([[p.smoothing] for p in parameters[rows]])
+            regressor = partial(_rubbing, regressor, smoothing, parameters[0].armature)
+        place = slice(first + rows.start, first + rows.stop)
+        yield Group(place, forest.nv, len(parameters[0].theta), regressor)
 
 
-def _mapped(regressor: Callable[..., Blocks], B: Blocks) -> Callable[..., BlockProduct]:
-    return lambda *motion: BlockProduct(regressor(*motion), B)
+def _mapped(regressor: Regressor, B: Blocks, *motion: np.ndarray) -> BlockProduct:
+    """Y B, see `LinearParameters`."""
+    return BlockProduct(regressor(*motion), B)
+
+
+def _rubbing(regressor: Regressor, smoothing: np.ndarray, armature: bool, *motion: np.ndarray) -> Beside:
+    """[Y_b, diag(v_ref), diag(tanh(v / smoothing)), diag(a_ref)], see `FrictionParameters`."""
+    _, v, v_ref, a_ref = motion
+    diagonals = (v_ref, np.tanh(v / smoothing), *((a_ref,) if armature else ()))
+    return Beside(regressor(*motion), np.stack(diagonals, axis=1))
 
 
 def _alone(i: int, parameters: Parameters, nv: int) -> Group:

@@ -69,7 +69,7 @@ class HeldJointsPlant(Plant):
             raise InputError("robots: expected the same number of held joints for all of them")
         self.at_rest = np.broadcast_to(finite_array("at", at), (self._count,))
         limits = [joint_limits(robot).torque[held] for robot, held in zip(robots, self._held, strict=True)]
-        self._held_limits = np.array(limits) if self.saturate else np.full((cell.n, self._count), np.inf)
+        self._held_limits = np.array(limits)
         self.hidden0 = self._start()
         self._real_nv = width = max(robot.nv for robot in robots)
         self._known_at = np.concatenate([i * width + np.array(known) for i, known in enumerate(self._known)])
@@ -84,7 +84,9 @@ class HeldJointsPlant(Plant):
                 f"state: expected {self.hidden0.size} numbers of the held joints, found {hidden.size}"
             )
         rows = hidden.reshape(-1, 3, self._count)
-        held_tau = np.clip(self._torque(rows), -self._held_limits, self._held_limits)
+        held_tau = self._torque(rows)
+        if self.saturate:
+            held_tau = np.clip(held_tau, -self._held_limits, self._held_limits)
         state = np.zeros((3, self.cell.n, self._real_nv))
         flat = state.reshape(3, -1)
         for part, known, held in zip(
