@@ -27,8 +27,12 @@ class Command(Protocol):
     """What the law wants in task space."""
 
     @property
-    def compared(self) -> np.ndarray:
-        """epsilon, epsilon', (2, p, m)."""
+    def epsilon(self) -> np.ndarray:
+        """epsilon, (p, m)."""
+
+    @property
+    def epsilon_dot(self) -> np.ndarray:
+        """epsilon', (p, m)."""
 
     @property
     def shares(self) -> np.ndarray:
@@ -54,7 +58,8 @@ class Command(Protocol):
 class Lines(NamedTuple):
     """A `Command`, as the lines of the law make it."""
 
-    compared: np.ndarray
+    epsilon: np.ndarray
+    epsilon_dot: np.ndarray
     shares: np.ndarray
     e_star: np.ndarray
     u: np.ndarray
@@ -97,7 +102,7 @@ class ConstantWeights:
         u = law.command(c, ABSENT, rates, error, sigma, e_star, beta, Lambda)
         xref = law.reference_velocity(self._c_inv, u)
         force = law.synchronizing_force(self._c_single, sigma[0], self._K_eps)
-        return Lines(compared, shares, e_star[0], u, xref, force)
+        return Lines(compared[0], compared[1], shares, e_star[0], u, xref, force)
 
 
 class MovingWeights:
@@ -136,7 +141,7 @@ class MovingWeights:
         xref_ddot = self._reference_acceleration(c_inv, c_dot, u_dot, xref_dot, task.x_dot)
         force = law.synchronizing_force(c, sigma, self._K_eps)
         u, xref = np.stack((u, u_dot)), np.stack((xref_dot, xref_ddot))
-        return Lines(compared, shares, e_star, u, xref, force)
+        return Lines(compared[0], compared[1], shares, e_star, u, xref, force)
 
 
 def couple(coupling: Coupling, w: np.ndarray, integral: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -42,8 +42,8 @@ class Signals:
 
     e = property(lambda self: self.task.error[0])
     e_dot = property(lambda self: self.task.error[1])
-    epsilon = property(lambda self: self.command.compared[0])
-    epsilon_dot = property(lambda self: self.command.compared[1])
+    epsilon = property(lambda self: self.command.epsilon)
+    epsilon_dot = property(lambda self: self.command.epsilon_dot)
     E = property(lambda self: self.command.shares[0])
     sigma = property(lambda self: self.command.shares[1])
     e_star = property(lambda self: self.command.e_star)

@@ -14,55 +14,56 @@ import numpy as np
 
 from ..tasks.cell import Cell, Reference
 from ..tasks.spaces import Measurement
-from .commands import Command, ConstantWeights
+from .commands import ConstantWeights, Lines
 
 #: entries of a matrix that is still faster than the lines
 LARGEST = 20_000
 
 
 class FoldedCommand:
-    """A `Command` whose parts are cut out of one array when they are asked for.
+    """A `Command` in rows of one array; what only a log asks for is computed when it does.
 
     Args:
-        rows: all of them, (9 n + 2 p, m): xref, force, compared, shares, e_star, u, one below the other.
-        n: number of robots.
-        p: number of pairs.
+        law: the law that made it.
+        z: errors, rates and integrals, one after another.
     """
 
-    __slots__ = ("_n", "_p", "_rows")
+    __slots__ = ("_law", "_rows", "_z")
 
-    def __init__(self, rows: np.ndarray, n: int, p: int):
-        self._rows, self._n, self._p = rows, n, p
+    def __init__(self, law: FoldedWeights, z: np.ndarray):
+        self._law, self._z = law, z
+        self._rows = law.acting.dot(z).reshape(-1, law.m)
 
     @property
     def xref(self) -> np.ndarray:
-        return self._robots(0, 2)
+        return self._rows[: 2 * self._law.n].reshape(2, self._law.n, -1)
 
     @property
     def force(self) -> np.ndarray:
-        return self._rows[2 * self._n : 3 * self._n]
+        return self._rows[2 * self._law.n : 3 * self._law.n]
 
     @property
-    def compared(self) -> np.ndarray:
-        p, start = self._p, 3 * self._n
-        return self._rows[start : start + 2 * p].reshape(2, p, -1)
-
-    @property
-    def shares(self) -> np.ndarray:
-        return self._robots(3, 3, 2 * self._p)
+    def epsilon(self) -> np.ndarray:
+        return self._rows[3 * self._law.n :]
 
     @property
     def e_star(self) -> np.ndarray:
-        return self._robots(6, 1, 2 * self._p)[0]
+        return self._told("e_star", self._law.n)
+
+    @property
+    def epsilon_dot(self) -> np.ndarray:
+        return self._told("epsilon_dot", self._law.p)
+
+    @property
+    def shares(self) -> np.ndarray:
+        return self._told("shares", 3, self._law.n)
 
     @property
     def u(self) -> np.ndarray:
-        return self._robots(7, 2, 2 * self._p)
+        return self._told("u", 2, self._law.n)
 
-    def _robots(self, first: int, count: int, skip: int = 0) -> np.ndarray:
-        """`count` arrays with a row per robot, behind `first` of them and so many other rows."""
-        start = skip + first * self._n
-        return self._rows[start : start + count * self._n].reshape(count, self._n, -1)
+    def _told(self, name: str, *shape: int) -> np.ndarray:
+        return self._law.telling(name).dot(self._z).reshape(*shape, self._law.m)
 
 
 class FoldedWeights:
@@ -74,32 +75,38 @@ class FoldedWeights:
     """
 
     def __init__(self, cell: Cell, lines: ConstantWeights):
-        self._n, self._p, self._m = cell.n, cell.coupling.pairs, cell.m
+        self.n, self.p, self.m = cell.n, cell.coupling.pairs, cell.m
         self._lines = lines
 
     def __call__(self, task: Measurement, reference: Reference, integral: np.ndarray) -> FoldedCommand:
-        z = np.concatenate((task.error.ravel(), task.rates.ravel(), integral.ravel()))
-        return FoldedCommand(self._matrix.dot(z).reshape(-1, self._m), self._n, self._p)
+        return FoldedCommand(self, np.concatenate((task.error.ravel(), task.rates.ravel(), integral.ravel())))
 
     @cached_property
-    def _matrix(self) -> np.ndarray:
-        n, p, m = self._n, self._p, self._m
-        units = np.eye((4 * n + p) * m)
-        return np.stack([_flat(self._lines.of(*self._split(unit))) for unit in units], axis=1)
+    def acting(self) -> np.ndarray:
+        """The rows of xref, force and epsilon, which every step needs."""
+        return np.concatenate([self.telling(name) for name in ("xref", "force", "epsilon")])
+
+    def telling(self, name: str) -> np.ndarray:
+        """The rows of a part of `Command`."""
+        return self._matrices[name]
+
+    @cached_property
+    def _matrices(self) -> dict[str, np.ndarray]:
+        units = np.eye((4 * self.n + self.p) * self.m)
+        commands = [self._lines.of(*self._split(unit)) for unit in units]
+        return {
+            name: np.stack([getattr(command, name).ravel() for command in commands], axis=1)
+            for name in Lines._fields
+        }
 
     def _split(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Error, rates and integral in z."""
-        rows, k = z.reshape(-1, self._m), 2 * self._n
-        shape = 2, self._n, self._m
+        rows, k = z.reshape(-1, self.m), 2 * self.n
+        shape = 2, self.n, self.m
         return rows[:k].reshape(shape), rows[k : 2 * k].reshape(shape), rows[2 * k :]
 
 
 def folded(cell: Cell, lines: ConstantWeights) -> FoldedWeights | ConstantWeights:
     """The law as a matrix where that pays, else line by line."""
     n, p, m = cell.n, cell.coupling.pairs, cell.m
-    return FoldedWeights(cell, lines) if (9 * n + 2 * p) * (4 * n + p) * m * m <= LARGEST else lines
-
-
-def _flat(command: Command) -> np.ndarray:
-    parts = command.xref, command.force, command.compared, command.shares, command.e_star, command.u
-    return np.concatenate([part.ravel() for part in parts])
+    return FoldedWeights(cell, lines) if (3 * n + p) * (4 * n + p) * m * m <= LARGEST else lines

@@ -30,10 +30,10 @@ class Guard:
         self._loop = loop
         self._limit = getattr(loop.cell.space, "max_condition", np.inf)
         square = np.array([robot.nv == loop.cell.m for robot in loop.cell.robots])
-        self._regular, self._at = slice(None) if square.all() else square, np.arange(loop.cell.n)
+        self._square, self._at = slice(None) if square.all() else square, np.arange(loop.cell.n)
         self._pose = isinstance(loop.cell.space, PoseSpace)
-        self._sign: np.ndarray | None = None
-        self._square_condition = np.ones(loop.cell.n)
+        self._sides: bytes | None = None
+        self._jacobians: tuple[np.ndarray, np.ndarray] | None = None
 
     def check(self, sample: Sample) -> None:
         """Stop the run if its numbers at this instant mean nothing.
@@ -43,7 +43,7 @@ class Guard:
             SingularJacobianError: a robot cannot follow its reference because its Jacobian is singular.
             OrientationError: an orientation error is so large that its direction is about to be undefined.
         """
-        if not isfinite(sample.y.sum()) and not np.isfinite(sample.y).all():
+        if not isfinite(np.add.reduce(sample.y)) and not np.isfinite(sample.y).all():
             raise self._non_finite(sample)
         task = sample.signals.task
         if self._pose:
@@ -51,20 +51,30 @@ class Guard:
         if task.J is not None and task.J_inv is not None and self._limit < inf:
             self._check_jacobians(sample.t, task.J, task.J_inv)
         tau = sample.signals.tau
-        if not isfinite(tau.sum()) and (rows := _non_finite_rows(tau)).size:
+        if not isfinite(np.add.reduce(tau, axis=None)) and (rows := _non_finite_rows(tau)).size:
             raise not_finite(self._loop.cell, sample.t, int(rows[0]), "torque")
 
     def _check_jacobians(self, t: float, J: np.ndarray, J_inv: np.ndarray) -> None:
-        square = _squares(J) * _squares(J_inv)
-        if not square.max() < self._limit**2:
-            i = int(np.argmax(~(square < self._limit**2)))
-            raise singular(self._loop.cell, t, i, f"its condition number is {square[i] ** 0.5:.3g}")
-        self._square_condition = square
-        sign = determinant(J[self._regular, :, : J.shape[1]]) > 0
-        if self._sign is not None and (sign != self._sign).any():
-            i = int(self._at[self._regular][np.argmax(sign != self._sign)])
+        self._jacobians = J, J_inv
+        if not _total(J) * _total(J_inv) < self._limit**2:  # else it holds for every robot
+            condition = self._conditions()
+            i = int(np.argmax(~(condition < self._limit)))
+            if not condition[i] < self._limit:
+                raise singular(self._loop.cell, t, i, f"its condition number is {condition[i]:.3g}")
+        positive = determinant(J[self._square, :, : J.shape[1]]) > 0
+        sides = positive.tobytes()
+        if self._sides not in (None, sides):
+            changed = positive != np.frombuffer(self._sides, dtype=bool)
+            i = int(self._at[self._square][np.argmax(changed)])
             raise singular(self._loop.cell, t, i, "its determinant changed sign since the instant before")
-        self._sign = sign
+        self._sides = sides
+
+    def _conditions(self) -> np.ndarray:
+        """Condition numbers of the Jacobians seen last, (n,), by the Frobenius norm."""
+        if self._jacobians is None:
+            return np.ones(self._loop.cell.n)
+        J, J_inv = self._jacobians
+        return np.sqrt((J * J).sum((1, 2)) * (J_inv * J_inv).sum((1, 2)))
 
     def _check_orientations(self, t: float, e: np.ndarray) -> None:
         angle = np.linalg.norm(e, axis=1)
@@ -88,7 +98,7 @@ class Guard:
         name, rows = broken[0]
         i = int(rows[0]) if name != PARTS[3] else int(self._loop.cell.coupling.edges[rows[0], 0])
         hint = HINT
-        if (condition := self._square_condition[i] ** 0.5) > 100:
+        if (condition := self._conditions()[i]) > 100:
             hint = f"its Jacobian was nearly singular before, with condition number {condition:.3g}"
         return not_finite(self._loop.cell, sample.t, i, name, hint)
 
@@ -110,10 +120,10 @@ def singular(cell: Cell, t: float, robot: int, cause: str) -> SingularJacobianEr
     )
 
 
-def _squares(A: np.ndarray) -> np.ndarray:
-    """Sum of the squares of the entries of every matrix, (n,)."""
-    rows = A.reshape(len(A), -1)
-    return np.vecdot(rows, rows)
+def _total(A: np.ndarray) -> float:
+    """Sum of the squares of all entries."""
+    entries = A.ravel()
+    return float(entries.dot(entries))
 
 
 def _non_finite_rows(part: np.ndarray) -> np.ndarray:

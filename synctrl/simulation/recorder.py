@@ -73,7 +73,7 @@ class SampleRecorder(Recorder):
         task, command = s.task, s.command
         row[0] = sample.t
         values = (
-            task.motion[0], s.reference.desired[0], task.error[0], command.compared[0], command.e_star,
+            task.motion[0], s.reference.desired[0], task.error[0], command.epsilon, command.e_star,
             s.s_q, s.tau, sample.disturbance, sample.y,
         )  # fmt: skip
         np.concatenate([value.ravel() for value in values], out=row[1:])
