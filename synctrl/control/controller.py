@@ -109,7 +109,7 @@ class Controller:
         space = self.cell.task
         task = space.measure(motion, reference.desired)
         command = self._command(task, reference, integral)
-        v_ref, a_ref = space.to_joints(task, command.xref)
+        v_ref, a_ref = space.to_joints(task, *command.xref)
         q, v = motion
         s_q = v_ref - v
         Y = self._regressor(q, v, v_ref, a_ref)

@@ -6,7 +6,7 @@ there to joint space. All arrays have one row per robot.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -19,6 +19,7 @@ from .redundancy import Damping, InverseMap, Inversion, Redundancy, inverse_map
 from .tips import Tips
 
 AXES = "xyz"
+Joints = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(slots=True)
@@ -61,8 +62,8 @@ class BoundSpace(Protocol):
             desired: xd, xd' and xd'', (3, n, m).
         """
 
-    def to_joints(self, task: Measurement, xref: np.ndarray) -> Iterable[np.ndarray]:
-        """v_ref and a_ref, (n, nv), of a reference velocity and acceleration in task space, (2, n, m)."""
+    def to_joints(self, task: Measurement, xref_dot: np.ndarray, xref_ddot: np.ndarray) -> Joints:
+        """v_ref and a_ref, (n, nv), of a reference velocity and acceleration in task space, (n, m)."""
 
     def to_torque(self, task: Measurement, force: np.ndarray) -> np.ndarray:
         """Joint torques, (n, nv), of forces in task space, (n, m)."""
@@ -116,8 +117,8 @@ class BoundJointSpace:
     def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
         return Measurement(motion, desired[:2] - motion, desired[1:])
 
-    def to_joints(self, task: Measurement, xref: np.ndarray) -> Iterable[np.ndarray]:
-        return xref
+    def to_joints(self, task: Measurement, xref_dot: np.ndarray, xref_ddot: np.ndarray) -> Joints:
+        return xref_dot, xref_ddot
 
     def to_torque(self, task: Measurement, force: np.ndarray) -> np.ndarray:
         return force
@@ -221,8 +222,8 @@ class BoundTipSpace:
     def __init__(self, tips: Tips, inverse: InverseMap):
         self._tips, self._inverse = tips, inverse
 
-    def to_joints(self, task: Measurement, xref: np.ndarray) -> Iterable[np.ndarray]:
-        return self._inverse.to_joints(task.J, task.J_dot, task.inversion, *xref)  # type: ignore[arg-type]
+    def to_joints(self, task: Measurement, xref_dot: np.ndarray, xref_ddot: np.ndarray) -> Joints:
+        return self._inverse.to_joints(task.J, task.J_dot, task.inversion, xref_dot, xref_ddot)  # type: ignore[arg-type]
 
     def to_torque(self, task: Measurement, force: np.ndarray) -> np.ndarray:
         return np.vecmat(force, task.J)  # type: ignore[arg-type]
