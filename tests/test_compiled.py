@@ -183,9 +183,10 @@ def test_code_that_differs_from_pinocchio_is_refused(monkeypatch, tmp_path):
     compile_sources = build._compile
 
     def tampered(sources, folder):
-        driver = sources[-1].replace("c->Gamma + (size_t)i * c->P;", "c->pi;")
-        assert driver != sources[-1]
-        return compile_sources([*sources[:-1], driver], folder)
+        *functions, driver = sources
+        broken = driver.replace("c->Gamma + (size_t)i * c->P;", "c->pi;")
+        assert broken != driver
+        return compile_sources([*functions, broken], folder)
 
     monkeypatch.setattr(build, "_compile", tampered)
     with pytest.raises(CompilationError, match="differs from Pinocchio"):

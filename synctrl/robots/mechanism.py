@@ -65,7 +65,8 @@ def mechanism(robot: Robot) -> tuple[Mechanism, pin.SE3]:
     fixed = Mechanism(
         joints, tip.parentJoint - 1, _snap(tip.placement.translation), _snap(tip.placement.rotation)
     )
-    return fixed, model.jointPlacements[roots[0]]
+    base = model.jointPlacements[roots[0]]
+    return fixed, pin.SE3(_snap(base.rotation), base.translation)
 
 
 def _joint(model: pin.Model, j: int, first: bool) -> Joint:
