@@ -178,7 +178,7 @@ class Symbols:
 
 
 def _moments(ca: Any, pi: Any) -> tuple[Any, Any, Any]:
-    """Integrals of 1, r and r r^T over the mass of a body, about the joint origin, from its ten parameters."""
+    """Integrals of 1, r and r r^T over the mass of a body, about the joint origin, from ten parameters."""
     half = 0.5 * (pi[4] + pi[6] + pi[9])
     xx, yy, zz = half - pi[4], half - pi[6], half - pi[9]
     rows = ((xx, -pi[5], -pi[7]), (-pi[5], yy, -pi[8]), (-pi[7], -pi[8], zz))

@@ -87,7 +87,7 @@ def cached_library(
 
     Args:
         key: see `content_key`.
-        generate: writes the C sources, called only if they are needed; the first are compiled while it writes.
+        generate: writes the C sources, called only if they are needed; they are compiled as they come.
         check: raises if a newly built library computes something else than it should.
 
     Raises:
