@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -103,8 +104,14 @@ def generate(kinds: list[Kind]) -> Iterator[str]:
             function = make()
             generator = ca.CodeGenerator(f"{function.name()}.c")
             generator.add(function)
-            yield generator.dump()
+            yield _unchecked(generator.dump())
     yield _table(kinds) + (Path(__file__).parent / "driver.c").read_text(encoding="utf-8")
+
+
+def _unchecked(source: str) -> str:
+    """Generated code without its tests for arguments and results left out: the driver leaves none out."""
+    source = re.sub(r"arg\[\d+\]\? (arg\[\d+\]\[\d+\]) : 0;", r"\1;", source)
+    return re.sub(r"if \(res\[\d+\]!=0\) res", "res", source)
 
 
 def _table(kinds: list[Kind]) -> str:
