@@ -244,15 +244,15 @@ class Trace:
 def _solve_positive(ca: Any, M: Any, b: Any) -> Any:
     """M^-1 b for a symmetric positive definite matrix, by M = L D L^T without pivoting."""
     n = M.shape[0]
-    L, D = ca.SX.eye(n), [None] * n
+    L, LD = ca.SX.eye(n), ca.SX.zeros(n, n)
     for j in range(n):
-        D[j] = M[j, j] - sum(L[j, k] ** 2 * D[k] for k in range(j))
-        for i in range(j + 1, n):
-            L[i, j] = (M[i, j] - sum(L[i, k] * L[j, k] * D[k] for k in range(j))) / D[j]
+        for i in range(j, n):
+            LD[i, j] = M[i, j] - sum(LD[i, k] * L[j, k] for k in range(j))
+            L[i, j] = LD[i, j] / LD[j, j]
     x = [b[i] for i in range(n)]
     for i in range(n):
         x[i] -= sum(L[i, k] * x[k] for k in range(i))
-    x = [x[i] / D[i] for i in range(n)]
+    x = [x[i] / LD[i, i] for i in range(n)]
     for i in reversed(range(n)):
         x[i] -= sum(L[k, i] * x[k] for k in range(i + 1, n))
     return ca.vertcat(*x)
