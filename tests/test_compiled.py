@@ -17,7 +17,7 @@ from synctrl.errors import (
     SingularJacobianError,
 )
 from synctrl.experiments import a460_pair, planar_four
-from synctrl.simulation.compiled import build
+from synctrl.simulation.compiled import build, engine
 from synctrl.simulation.compiled.program import Program
 from synctrl.simulation.result import LAYOUT
 from synctrl.simulation.simulate import Experiment
@@ -183,14 +183,49 @@ def test_code_that_differs_from_pinocchio_is_refused(monkeypatch, tmp_path):
     compile_sources = build._compile
 
     def tampered(sources, folder):
-        driver = sources[-1].replace("c->Gamma + (size_t)i * c->P;", "c->pi;")
-        assert driver != sources[-1]
-        return compile_sources([*sources[:-1], driver], folder)
+        *functions, driver = sources
+        broken = driver.replace("c->Gamma + (size_t)i * c->P;", "c->pi;")
+        assert broken != driver
+        return compile_sources([*functions, broken], folder)
 
     monkeypatch.setattr(build, "_compile", tampered)
     with pytest.raises(CompilationError, match="differs from Pinocchio"):
         Program(planar_four().closed_loop())
     assert not list(tmp_path.glob("*.so"))
+
+
+def test_code_that_the_compiler_refuses_leaves_nothing_behind(monkeypatch, tmp_path):
+    monkeypatch.setenv("SYNCTRL_CACHE", str(tmp_path))
+    sources = iter(["int good(void) { return 0; }", "int bad(void) {", "int unfinished(void) {"])
+    with pytest.raises(CompilationError, match="the C compiler refused generated code"):
+        build.cached_library("key", lambda: sources, lambda library: None)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_goes_wrong_while_code_is_written_comes_through(monkeypatch, tmp_path):
+    monkeypatch.setenv("SYNCTRL_CACHE", str(tmp_path))
+
+    def write():
+        yield "int good(void) { return 0; }"
+        raise InputError("no more")
+
+    with pytest.raises(InputError, match="no more"):
+        build.cached_library("key", write, lambda library: None)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("coupling", [Coupling.pair(), Coupling.pair(c=weights)])
+def test_tables_hold_what_the_cell_desires(coupling):
+    cell = planar_cell(2, coupling).cell
+    instants = np.array([[0.0, 0.1], [0.05, 0.15], [0.1, 0.2]])
+    desired, c = engine._tables(cell, instants)
+    c = np.broadcast_to(c.reshape(-1, *c.shape[-4:]), (6, *c.shape[-4:])).reshape(3, 2, *c.shape[-4:])
+    for stage, times in enumerate(instants):
+        for step, reference in enumerate(cell.references(times)):
+            np.testing.assert_allclose(
+                desired.reshape(3, 2, 2, 3, 2)[stage, step].swapaxes(0, 1), reference.desired
+            )
+            np.testing.assert_allclose(c[stage, step].swapaxes(0, 1), reference.weights)
 
 
 def test_two_processes_may_build_the_same_code_at_once(monkeypatch, tmp_path):

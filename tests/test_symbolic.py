@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -69,6 +72,16 @@ def test_a_mechanism_does_not_depend_on_where_the_robot_stands():
     there, base = mechanism(robot.placed((1, 2, 3), (0.1, 0.2, 0.3)))
     assert here.key() == there.key()
     np.testing.assert_allclose(base.translation[:2], (1, 2), atol=0.2)
+
+
+def test_a_mechanism_is_found_once_for_as_long_as_its_robot_exists():
+    robot = load_robot("planar2r")
+    placed = [robot.placed((i, 0, 0)) for i in range(300)]
+    found = [mechanism(each) for each in placed]
+    assert all(mechanism(each) is kept for each, kept in zip(placed, found, strict=True))
+    gone = weakref.ref(placed.pop())
+    gc.collect()
+    assert gone() is None
 
 
 def test_a_tip_on_the_base_is_refused():

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import pinocchio as pin
@@ -46,13 +46,22 @@ class Mechanism:
         return [joints, self.tip_parent, self.tip_translation.tolist(), self.tip_rotation.tolist()]
 
 
-@lru_cache(maxsize=256)  # a robot does not change
+#: what was found for each robot that still exists: a robot does not change
+_FOUND: WeakKeyDictionary[Robot, tuple[Mechanism, pin.SE3]] = WeakKeyDictionary()
+
+
 def mechanism(robot: Robot) -> tuple[Mechanism, pin.SE3]:
     """A robot's mechanism, and the placement of its first joint in the world.
 
     Raises:
         RobotError: several joints on the base, or a tip on the base.
     """
+    if robot not in _FOUND:
+        _FOUND[robot] = _mechanism(robot)
+    return _FOUND[robot]
+
+
+def _mechanism(robot: Robot) -> tuple[Mechanism, pin.SE3]:
     model = robot.model
     tip = model.frames[robot.tip_id]
     roots = [j for j in range(1, model.njoints) if model.parents[j] == 0]
@@ -65,7 +74,8 @@ def mechanism(robot: Robot) -> tuple[Mechanism, pin.SE3]:
     fixed = Mechanism(
         joints, tip.parentJoint - 1, _snap(tip.placement.translation), _snap(tip.placement.rotation)
     )
-    return fixed, model.jointPlacements[roots[0]]
+    base = model.jointPlacements[roots[0]]
+    return fixed, pin.SE3(_snap(base.rotation), base.translation)
 
 
 def _joint(model: pin.Model, j: int, first: bool) -> Joint:

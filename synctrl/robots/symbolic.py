@@ -95,7 +95,8 @@ class Symbols:
         """M a_ref + C(v) v_ref + g, (nv, 1), with the symmetric C of Christoffel symbols.
 
         One recursion with two velocities: every quadratic term of the Newton-Euler recursion is replaced by
-        half the sum over both orders of its two factors.
+        half the sum over both orders of its two factors. The points r of a body accelerate with A + B r, and
+        the force on the body and its moment are the integrals of A + B r and r x (A + B r) over its mass.
 
         Args:
             pi: inertial parameters, (10 bodies, 1), in Pinocchio's order.
@@ -103,35 +104,25 @@ class Symbols:
             gravity: acceleration of gravity in the frame of the first joint's placement, (3, 1).
         """
         ca = self.ca
-        twists, references = self._twists(v), self._twists(v_ref)
         forces = []
-        accelerations: list[Any] = []
-        for i, joint in enumerate(self.fixed.joints):
-            subspace = self._subspace(joint)
-            above = accelerations[joint.parent] if joint.parent >= 0 else (-gravity, ca.SX.zeros(3))
-            bias = _mean(
-                _motion_cross(ca, twists[i], _scale(subspace, v_ref[i])),
-                _motion_cross(ca, references[i], _scale(subspace, v[i])),
-            )
-            accelerations.append(_add(self._down(i, above), _scale(subspace, a_ref[i]), bias))
-            inertia = _Inertia(ca, pi[10 * i : 10 * i + 10])
-            swirl = _mean(
-                _force_cross(ca, twists[i], inertia.times(references[i])),
-                _force_cross(ca, references[i], inertia.times(twists[i])),
-            )
-            forces.append(_add(inertia.times(accelerations[i]), swirl))
+        for i, (A, B) in enumerate(self._accelerations(v, v_ref, a_ref, gravity)):
+            mass, first, second = _moments(ca, pi[10 * i : 10 * i + 10])
+            spread = ca.mtimes(B, second)  # integral of (B r) r^T
+            moment = ca.vertcat(*(spread[k - 1, k - 2] - spread[k - 2, k - 1] for k in range(3)))
+            forces.append((mass * A + ca.mtimes(B, first), ca.cross(first, A) + moment))
         return self._gather(forces)
 
     def mass_matrix(self, pi: Any) -> Any:
         """M(q) with armature, (nv, nv), by the composite-rigid-body algorithm."""
         ca, joints = self.ca, self.fixed.joints
-        composite = [pi[10 * i : 10 * i + 10] for i in range(len(joints))]
+        composite = [_moments(ca, pi[10 * i : 10 * i + 10]) for i in range(len(joints))]
         for i in reversed(range(len(joints))):
-            if joints[i].parent >= 0:
-                composite[joints[i].parent] += _moved_inertia(ca, composite[i], self._R[i], self._p[i])
+            if (up := joints[i].parent) >= 0:
+                moved = _moved(ca, composite[i], self._R[i], self._p[i])
+                composite[up] = tuple(a + b for a, b in zip(composite[up], moved, strict=True))
         M = ca.SX.zeros(len(joints), len(joints))
         for i, joint in enumerate(joints):
-            force = _Inertia(ca, composite[i]).times(self._subspace(joint))
+            force = _momentum(ca, composite[i], joint)
             M[i, i] = self._project(joint, force) + joint.armature
             j = i
             while joints[j].parent >= 0:
@@ -142,13 +133,30 @@ class Symbols:
 
     # -- steps of the recursions --------------------------------------------------------------------------
 
-    def _twists(self, v: Any) -> list:
-        zero = self.ca.SX.zeros(3)
-        twists: list[Any] = []
+    def _accelerations(self, v: Any, v_ref: Any, a_ref: Any, gravity: Any) -> list[tuple[Any, Any]]:
+        """A, (3, 1), and B, (3, 3), per body, in its coordinates; gravity is an acceleration of the base."""
+        ca, zero = self.ca, self.ca.SX.zeros(3)
+        w: list[Any] = []
+        w_ref, turning, fields = list(w), list(w), list(w)
         for i, joint in enumerate(self.fixed.joints):
-            above = twists[joint.parent] if joint.parent >= 0 else (zero, zero)
-            twists.append(_add(self._down(i, above), _scale(self._subspace(joint), v[i])))
-        return twists
+            back, axis = self._R[i].T, ca.SX(joint.axis)
+            if joint.parent < 0:
+                above, (A, B) = (zero, zero, zero), (-gravity, ca.SX.zeros(3, 3))
+            else:
+                above = tuple(part[joint.parent] for part in (w, w_ref, turning))
+                A, B = fields[joint.parent]
+            w_i, w_ref_i, turning_i = (ca.mtimes(back, part) for part in above)
+            A = ca.mtimes(back, A + ca.mtimes(B, self._p[i]))
+            swept = ca.cross(w_i, axis * v_ref[i]) + ca.cross(w_ref_i, axis * v[i])
+            if joint.turns:
+                w_i, w_ref_i = w_i + axis * v[i], w_ref_i + axis * v_ref[i]
+                turning_i += axis * a_ref[i] + 0.5 * swept
+            else:
+                A += axis * a_ref[i] + swept
+            for parts, part in zip((w, w_ref, turning), (w_i, w_ref_i, turning_i), strict=True):
+                parts.append(part)
+            fields.append((A, ca.skew(turning_i) + _centripetal(ca, w_i, w_ref_i)))
+        return fields
 
     def _gather(self, forces: list) -> Any:
         tau = [self.ca.SX(0)] * len(forces)
@@ -159,17 +167,8 @@ class Symbols:
                 forces[joint.parent] = _add(forces[joint.parent], self._up(i, forces[i]))
         return self.ca.vertcat(*tau)
 
-    def _subspace(self, joint: Joint) -> tuple[Any, Any]:
-        axis, zero = self.ca.SX(joint.axis), self.ca.SX.zeros(3)
-        return (zero, axis) if joint.turns else (axis, zero)
-
     def _project(self, joint: Joint, force: Sequence) -> Any:
         return self.ca.dot(self.ca.SX(joint.axis), force[1] if joint.turns else force[0])
-
-    def _down(self, i: int, motion: Sequence) -> tuple[Any, Any]:
-        """A motion of the parent body, seen from body i."""
-        ca, back = self.ca, self._R[i].T
-        return ca.mtimes(back, motion[0] + ca.cross(motion[1], self._p[i])), ca.mtimes(back, motion[1])
 
     def _up(self, i: int, force: Sequence) -> tuple[Any, Any]:
         """A force on body i, seen from its parent."""
@@ -178,31 +177,38 @@ class Symbols:
         return push, twist + ca.cross(self._p[i], push)
 
 
-class _Inertia:
-    """Ten parameters of a body as the map from its motion to its momentum, about the joint origin."""
-
-    def __init__(self, ca: Any, pi: Any):
-        self._ca, self._m, self._h = ca, pi[0], pi[1:4]
-        rows = ((4, 5, 7), (5, 6, 8), (7, 8, 9))
-        self._I = ca.vertcat(*(ca.horzcat(*(pi[k] for k in row)) for row in rows))
-
-    def times(self, motion: Sequence) -> tuple[Any, Any]:
-        ca, (linear, angular) = self._ca, motion
-        return (
-            self._m * linear + ca.cross(angular, self._h),
-            ca.mtimes(self._I, angular) + ca.cross(self._h, linear),
-        )
+def _moments(ca: Any, pi: Any) -> tuple[Any, Any, Any]:
+    """Integrals of 1, r and r r^T over the mass of a body, about the joint origin, from ten parameters."""
+    half = 0.5 * (pi[4] + pi[6] + pi[9])
+    xx, yy, zz = half - pi[4], half - pi[6], half - pi[9]
+    rows = ((xx, -pi[5], -pi[7]), (-pi[5], yy, -pi[8]), (-pi[7], -pi[8], zz))
+    return pi[0], pi[1:4], ca.vertcat(*(ca.horzcat(*row) for row in rows))
 
 
-def _moved_inertia(ca: Any, pi: Any, R: Any, p: Any) -> Any:
-    """Parameters of a body in the coordinates of its parent."""
-    m, h = pi[0], ca.mtimes(R, pi[1:4])
-    body = _Inertia(ca, pi)
-    about = ca.mtimes(ca.mtimes(R, body._I), R.T)
-    cross_h, cross_p = ca.skew(h), ca.skew(p)
-    shift = -(ca.mtimes(cross_h, cross_p) + ca.mtimes(cross_p, cross_h)) - m * ca.mtimes(cross_p, cross_p)
-    I = about + shift
-    return ca.vertcat(m, h + m * p, I[0, 0], I[0, 1], I[1, 1], I[0, 2], I[1, 2], I[2, 2])
+def _moved(ca: Any, moments: Sequence, R: Any, p: Any) -> tuple[Any, Any, Any]:
+    """Moments of a body in the coordinates of its parent: there r is R r + p."""
+    mass, first, second = moments
+    turned = ca.mtimes(R, first)
+    half = ca.mtimes(turned + 0.5 * mass * p, p.T)
+    whole = ca.mtimes(ca.mtimes(R, second), R.T) + half + half.T
+    return mass, turned + mass * p, ca.tril2symm(ca.tril(whole))
+
+
+def _momentum(ca: Any, moments: Sequence, joint: Joint) -> tuple[Any, Any]:
+    """Linear and angular momentum of a body about its joint, of which the velocity is one."""
+    mass, first, second = moments
+    axis = ca.SX(joint.axis)
+    if joint.turns:
+        return ca.cross(axis, first), ca.trace(second) * axis - ca.mtimes(second, axis)
+    return mass * axis, ca.cross(first, axis)
+
+
+def _centripetal(ca: Any, a: Any, b: Any) -> Any:
+    """([a][b] + [b][a]) / 2 = (a b^T + b a^T) / 2 - (a . b) I."""
+    x, y, z = (a[k] * b[k] for k in range(3))
+    xy, xz, yz = (0.5 * (a[j] * b[k] + a[k] * b[j]) for j, k in ((0, 1), (0, 2), (1, 2)))
+    rows = ((-y - z, xy, xz), (xy, -x - z, yz), (xz, yz, -x - y))
+    return ca.vertcat(*(ca.horzcat(*row) for row in rows))
 
 
 def _rotation(ca: Any, axis: np.ndarray, sine: Any, cosine: Any) -> Any:
@@ -214,19 +220,3 @@ def _rotation(ca: Any, axis: np.ndarray, sine: Any, cosine: Any) -> Any:
 
 def _add(*parts: Sequence) -> tuple[Any, Any]:
     return sum(part[0] for part in parts), sum(part[1] for part in parts)
-
-
-def _scale(motion: Sequence, factor: Any) -> tuple[Any, Any]:
-    return motion[0] * factor, motion[1] * factor
-
-
-def _mean(a: Sequence, b: Sequence) -> tuple[Any, Any]:
-    return 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])
-
-
-def _motion_cross(ca: Any, a: Sequence, b: Sequence) -> tuple[Any, Any]:
-    return ca.cross(a[1], b[0]) + ca.cross(a[0], b[1]), ca.cross(a[1], b[1])
-
-
-def _force_cross(ca: Any, a: Sequence, f: Sequence) -> tuple[Any, Any]:
-    return ca.cross(a[1], f[0]), ca.cross(a[1], f[1]) + ca.cross(a[0], f[0])

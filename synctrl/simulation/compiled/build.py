@@ -16,13 +16,14 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from ...errors import CompilationError, MissingDependencyError
 
 #: -O1, because generated code is one long sum of products: -O2 makes it no faster, only longer to compile
-FLAGS = ("-O1", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off")
+FLAGS = ("-O1", "-fPIC", "-fno-math-errno", "-ffp-contract=off")
 
 
 def require_casadi() -> str:
@@ -80,13 +81,13 @@ def content_key(*parts: object) -> str:
 
 
 def cached_library(
-    key: str, generate: Callable[[], list[str]], check: Callable[[ctypes.CDLL], None]
+    key: str, generate: Callable[[], Iterable[str]], check: Callable[[ctypes.CDLL], None]
 ) -> ctypes.CDLL:
     """The library of a key, from the cache or built now.
 
     Args:
         key: see `content_key`.
-        generate: writes the C sources, called only if they are needed.
+        generate: writes the C sources, called only if they are needed; they are compiled as they come.
         check: raises if a newly built library computes something else than it should.
 
     Raises:
@@ -95,11 +96,10 @@ def cached_library(
     library = cache_folder() / f"{key}.so"
     loaded = _load(library)
     if loaded is None:
-        sources = generate()
         try:
             library.parent.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory(dir=library.parent, prefix="building-") as folder:
-                built = _compile(sources, Path(folder))
+                built = _compile(generate(), Path(folder))
                 check(ctypes.CDLL(str(built)))
                 _publish(built, library)
         except OSError as error:
@@ -129,30 +129,25 @@ def _publish(built: Path, library: Path) -> None:
     digest.replace(library.with_suffix(".sha256"))
 
 
-def _compile(sources: list[str], folder: Path) -> Path:
-    """Compile each source on its own, at the same time, and link them."""
-    objects, processes = [], []
-    for k, source in enumerate(sources):
-        path = folder / f"part{k}.c"
-        path.write_text(source, encoding="utf-8")
-        objects.append(path.with_suffix(".o"))
-        flags = [flag for flag in FLAGS if flag != "-shared"]
-        processes.append(_start([*compiler(), *flags, "-c", str(path), "-o", str(objects[-1])]))
-    for process in processes:
-        _finish(process)
+def _compile(sources: Iterable[str], folder: Path) -> Path:
+    """Compile each source as soon as it is there, as many at a time as there are cores, and link them."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        jobs = [pool.submit(_compile_one, source, folder / f"part{k}.c") for k, source in enumerate(sources)]
     library = folder / "library.so"
-    _finish(_start([*compiler(), *FLAGS, *map(str, objects), "-o", str(library), "-lm"]))
+    _run([*compiler(), "-shared", *(str(job.result()) for job in jobs), "-o", str(library), "-lm"])
     return library
 
 
-def _start(command: list[str]) -> subprocess.Popen[str]:
-    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+def _compile_one(source: str, path: Path) -> Path:
+    path.write_text(source, encoding="utf-8")
+    _run([*compiler(), *FLAGS, "-c", str(path), "-o", str(path.with_suffix(".o"))])
+    return path.with_suffix(".o")
 
 
-def _finish(process: subprocess.Popen[str]) -> None:
-    _, complaint = process.communicate()
-    if process.returncode != 0:
-        raise CompilationError(f"the C compiler refused generated code:\n{complaint.strip()[:2000]}")
+def _run(command: list[str]) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise CompilationError(f"the C compiler refused generated code:\n{done.stderr.strip()[:2000]}")
 
 
 def _generating_code() -> list[Path]:

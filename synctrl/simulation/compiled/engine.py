@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import NonFiniteError, OrientationError, SimulationError
-from ...tasks.cell import Reference
+from ...tasks.cell import Cell
 from ..clock import Clock
 from ..disturbances import DisturbanceSchedule
 from ..guard import PARTS, not_finite, singular
@@ -41,8 +41,7 @@ def blocks(program: Program, clock: Clock) -> Iterator[Block]:
         last = min(first + length, count)
         starts, ends = clock.times[first:last], clock.times[first + 1 : last + 1]
         middles, ends = 0.5 * (starts + ends), np.nextafter(ends, -np.inf)
-        tables = [cell.reference_table(times) for times in (starts, middles, ends)]
-        yield Block(first, last, *_pack(cell.coupling.is_constant, tables))
+        yield Block(first, last, *_tables(cell, np.array([starts, middles, ends])))
 
 
 class Tables:
@@ -121,10 +120,9 @@ class _Steps:
     def finish(self, y: np.ndarray, recorder: Recorder) -> None:
         """Log the end of the run: one step of no length."""
         end = self._clock.times[-1:]
-        table = self._program.loop.cell.reference_table(end)
-        packed = _pack(self._program.loop.cell.coupling.is_constant, [table] * 3)
+        tables = _tables(self._program.loop.cell, np.array([end] * 3))
         times, yes, no = np.repeat(end, 2), np.array([True]), np.array([False])
-        self._call(Block(0, 1, *packed), times, yes, no, self._window[-1:], y, recorder)
+        self._call(Block(0, 1, *tables), times, yes, no, self._window[-1:], y, recorder)
 
     def _call(
         self,
@@ -159,14 +157,18 @@ class _Steps:
             raise _failure(program, float(times[report.step]), report)
 
 
-def _pack(constant: bool, tables: list[Reference]) -> tuple[np.ndarray, np.ndarray]:
-    """Tables of three stages as the driver's `Reference` wants them."""
-    desired = np.stack([table.desired.swapaxes(1, 2) for table in tables])  # (3, T, n, 3, m)
-    if constant:
-        weights = np.stack([part[0] for part in tables[0].weights], axis=1)
-    else:
-        weights = np.stack([np.stack(table.weights, axis=2) for table in tables])
-    return np.ascontiguousarray(desired), np.ascontiguousarray(weights)
+def _tables(cell: Cell, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Desired motion, (3, T, n, 3, m), and weights at the instants of three stages, (3, T).
+
+    Every motion is asked once and goes straight to its place: what a step costs does not grow with n.
+    """
+    flat = instants.ravel()
+    desired = np.empty((flat.size, cell.n, 3, cell.m))
+    for i, member in enumerate(cell.members):
+        for k, part in enumerate(member.trajectory(flat)):
+            desired[:, i, k] = part
+    parts = cell.coupling.weights(flat[:1] if cell.coupling.is_constant else flat, cell.m)
+    return desired, np.stack(parts, axis=2)  # as one row of instants after the other
 
 
 def _failure(program: Program, t: float, report: ReportStruct) -> SimulationError:

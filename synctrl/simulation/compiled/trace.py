@@ -52,16 +52,9 @@ class Trace:
         w = law.weighted_error(c, e)
         w_dot = law.weighted_error_dot(c, c_dot, e, xd_dot - x_dot)
         outputs = [x, e, x_dot, xd_dot, xd_ddot, w, w_dot]
-        return ca.Function(
-            f"{self.name}_measure",
-            [self.q, self.v, self.base, self.desired, self.weights, W_inv],
-            [
-                *(self._flat(part) for part in outputs),
-                sine,
-                cosine,
-                *(self._flat(p) for p in (J, J_dot, J_inv, G)),
-            ],
-        )
+        inputs = [self.q, self.v, self.base, self.desired, self.weights, W_inv]
+        flat = [*map(self._flat, outputs), sine, cosine, *map(self._flat, (J, J_dot, J_inv, G))]
+        return self._function("measure", inputs, flat)
 
     def _task(self, sine: Any, cosine: Any) -> tuple:
         kind, m = self.kind, self.kind.m
@@ -125,7 +118,7 @@ class Trace:
             self.G, self.weights, *gains, K_r, Gamma, *posture, self.base,
         ]  # fmt: skip
         outputs = [self._flat(tau), theta_hat_dot, self._flat(e_star), self._flat(s_q)]
-        return ca.Function(f"{self.name}_control", inputs, outputs)
+        return self._function("control", inputs, outputs)
 
     def _law(self, task: list, shares: list, gains: list) -> tuple:
         """The same lines as `Controller.evaluate`, for one robot."""
@@ -199,9 +192,13 @@ class Trace:
         bias = symbols.torque(pi, self.v, self.v, still, self._gravity())
         v_dot = _solve_positive(ca, symbols.mass_matrix(pi), tau - bias)
         inputs = [self.q, self.v, self.sine, self.cosine, tau, pi, self.base]
-        return ca.Function(f"{self.name}_plant", inputs, [v_dot])
+        return self._function("plant", inputs, [v_dot])
 
     # -- symbols and arrays -------------------------------------------------------------------------------
+
+    def _function(self, name: str, inputs: list, outputs: list) -> Any:
+        """A function in which nothing is computed twice."""
+        return self.ca.Function(f"{self.name}_{name}", inputs, self.ca.cse(outputs))
 
     def _base(self) -> tuple[Any, Any]:
         ca, shared = self.ca, self.kind.base_rotation
@@ -247,15 +244,15 @@ class Trace:
 def _solve_positive(ca: Any, M: Any, b: Any) -> Any:
     """M^-1 b for a symmetric positive definite matrix, by M = L D L^T without pivoting."""
     n = M.shape[0]
-    L, D = ca.SX.eye(n), [None] * n
+    L, LD = ca.SX.eye(n), ca.SX.zeros(n, n)
     for j in range(n):
-        D[j] = M[j, j] - sum(L[j, k] ** 2 * D[k] for k in range(j))
-        for i in range(j + 1, n):
-            L[i, j] = (M[i, j] - sum(L[i, k] * L[j, k] * D[k] for k in range(j))) / D[j]
+        for i in range(j, n):
+            LD[i, j] = M[i, j] - sum(LD[i, k] * L[j, k] for k in range(j))
+            L[i, j] = LD[i, j] / LD[j, j]
     x = [b[i] for i in range(n)]
     for i in range(n):
         x[i] -= sum(L[i, k] * x[k] for k in range(i))
-    x = [x[i] / D[i] for i in range(n)]
+    x = [x[i] / LD[i, i] for i in range(n)]
     for i in reversed(range(n)):
         x[i] -= sum(L[k, i] * x[k] for k in range(i + 1, n))
     return ca.vertcat(*x)
