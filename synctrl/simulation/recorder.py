@@ -43,7 +43,7 @@ class Recorder:
 
     def result(self, status: str, info: Mapping[str, Any], experiment: Any) -> Result:
         """What was logged until now."""
-        arrays = {name: array[: self.count].copy() for name, array in self._arrays.items()}
+        arrays = {name: _taken(array, self.count) for name, array in self._arrays.items()}
         described = {"status": status, **describe(self._loop), **info}
         described["damping"] = self._damping.report(arrays["t"])
         seen = (arrays[name] for name in ("t", "q", "v", "tau"))
@@ -86,6 +86,11 @@ _SIGNALS = (
     "t", "x", "x_desired", "tracking_error", "sync_error", "coupled_error", "v_error", "tau", "disturbance",
 )  # fmt: skip
 _STATE = "q", "v", "theta_hat", "sync_integral"
+
+
+def _taken(array: np.ndarray, count: int) -> np.ndarray:
+    """The rows that were logged; a copy only where the array is not all of that."""
+    return np.ascontiguousarray(array) if count == len(array) else array[:count].copy()
 
 
 def sizes(loop: ClosedLoop) -> dict[str, int]:
