@@ -219,5 +219,5 @@ def test_the_law_as_a_matrix_is_the_law_line_by_line(seed: int, graph: tuple[str
     integral, reference = rng.normal(size=(cell.coupling.pairs, 2)), cell.references(np.zeros(1))[0]
     found, expected = (way(task, reference, integral) for way in (matrix, lines))
     for name in Lines._fields:
-        one, other = getattr(found, name), getattr(expected, name)
+        one, other = np.array(getattr(found, name)), np.array(getattr(expected, name))
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-11 * (1 + np.abs(other).max()))

@@ -47,8 +47,8 @@ class Command(Protocol):
         """u, u', (2, n, m)."""
 
     @property
-    def xref(self) -> np.ndarray:
-        """xref', xref'', (2, n, m)."""
+    def xref(self) -> tuple[np.ndarray, np.ndarray]:
+        """xref' and xref'', each (n, m)."""
 
     @property
     def force(self) -> np.ndarray:
@@ -63,7 +63,7 @@ class Lines(NamedTuple):
     shares: np.ndarray
     e_star: np.ndarray
     u: np.ndarray
-    xref: np.ndarray
+    xref: tuple[np.ndarray, np.ndarray]
     force: np.ndarray
 
 
@@ -102,7 +102,7 @@ class ConstantWeights:
         u = law.command(c, ABSENT, rates, error, sigma, e_star, beta, Lambda)
         xref = law.reference_velocity(self._c_inv, u)
         force = law.synchronizing_force(self._c_single, sigma[0], self._K_eps)
-        return Lines(compared[0], compared[1], shares, e_star[0], u, xref, force)
+        return Lines(compared[0], compared[1], shares, e_star[0], u, (xref[0], xref[1]), force)
 
 
 class MovingWeights:
@@ -140,8 +140,8 @@ class MovingWeights:
         xref_dot = law.reference_velocity(c_inv, u)
         xref_ddot = self._reference_acceleration(c_inv, c_dot, u_dot, xref_dot, task.x_dot)
         force = law.synchronizing_force(c, sigma, self._K_eps)
-        u, xref = np.stack((u, u_dot)), np.stack((xref_dot, xref_ddot))
-        return Lines(compared[0], compared[1], shares, e_star, u, xref, force)
+        u = np.stack((u, u_dot))
+        return Lines(compared[0], compared[1], shares, e_star, u, (xref_dot, xref_ddot), force)
 
 
 def couple(coupling: Coupling, w: np.ndarray, integral: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

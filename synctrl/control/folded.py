@@ -35,8 +35,9 @@ class FoldedCommand:
         self._rows = law.acting.dot(z).reshape(-1, law.m)
 
     @property
-    def xref(self) -> np.ndarray:
-        return self._rows[: 2 * self._law.n].reshape(2, self._law.n, -1)
+    def xref(self) -> tuple[np.ndarray, np.ndarray]:
+        n = self._law.n
+        return self._rows[:n], self._rows[n : 2 * n]
 
     @property
     def force(self) -> np.ndarray:
@@ -95,7 +96,7 @@ class FoldedWeights:
         units = np.eye((4 * self.n + self.p) * self.m)
         commands = [self._lines.of(*self._split(unit)) for unit in units]
         return {
-            name: np.stack([getattr(command, name).ravel() for command in commands], axis=1)
+            name: np.stack([np.ravel(getattr(command, name)) for command in commands], axis=1)
             for name in Lines._fields
         }
 

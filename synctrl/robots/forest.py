@@ -56,7 +56,7 @@ class Forest:
         whole -= pin.computeJointTorqueRegressor(
             self._weightless, self._weightless_data, q, half, self._still
         )
-        return Blocks(np.atleast_2d(whole), self.n)  # a single row comes as a vector
+        return Blocks(whole.reshape(self._model.nv, -1), self.n)  # a single row comes as a vector
 
     def torque(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
         """M a_ref + C(q, v) v_ref + g, (n, nv), with the true parameters by the identity of `regressor`."""

@@ -63,7 +63,7 @@ class Plant:
 
     Attributes:
         viscous, coulomb: coefficients of friction, (n, nv), N·m·s/rad and N·m.
-        smoothing: velocity at which Coulomb friction reaches tanh(1) of its value, (n, 1), rad/s.
+        smoothing: velocity at which Coulomb friction reaches tanh(1) of its value, (n, nv), rad/s.
         rubs: whether any joint has friction.
         torque_limits: (n, nv), N·m; infinite without saturation.
         robots: what stands there, with the loads it carries now.
@@ -134,7 +134,7 @@ class Plant:
     def _set_friction(self) -> None:
         cell = self.cell
         self.viscous, self.coulomb = np.zeros((2, cell.n, cell.nv))
-        self.smoothing = np.ones((cell.n, 1))
+        self.smoothing = np.ones((cell.n, cell.nv))
         for i, member in enumerate(cell.members):
             nv = member.robot.nv
             self.viscous[i, :nv] = member.friction.viscous

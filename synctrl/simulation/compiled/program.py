@@ -195,7 +195,7 @@ class Program:
             np.array(index, dtype=np.intc), coupling.edges.astype(np.intc), coupling.signs.copy(),
             first.astype(np.intc), incident.astype(np.intc), incident_sign.copy(),
             controller.Lambda, controller.beta, controller.K_eps, controller.K_r, controller.Gamma,
-            W_inv, posture, gain, base, pi, plant.viscous, plant.coulomb, plant.smoothing,
+            W_inv, posture, gain, base, pi, plant.viscous, plant.coulomb, plant.smoothing[:, 0],
         )  # fmt: skip
         sizes = (cell.n, cell.m, cell.nv, cell.theta.shape[1], coupling.pairs, bodies)
         limit = float(getattr(cell.space, "max_condition", np.inf))
