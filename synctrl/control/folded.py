@@ -28,24 +28,13 @@ class FoldedCommand:
         z: errors, rates and integrals, one after another.
     """
 
-    __slots__ = ("_law", "_rows", "_z")
+    __slots__ = ("_law", "_z", "epsilon", "force", "xref")
 
     def __init__(self, law: FoldedWeights, z: np.ndarray):
-        self._law, self._z = law, z
-        self._rows = law.acting.dot(z).reshape(-1, law.m)
-
-    @property
-    def xref(self) -> tuple[np.ndarray, np.ndarray]:
-        n = self._law.n
-        return self._rows[:n], self._rows[n : 2 * n]
-
-    @property
-    def force(self) -> np.ndarray:
-        return self._rows[2 * self._law.n : 3 * self._law.n]
-
-    @property
-    def epsilon(self) -> np.ndarray:
-        return self._rows[3 * self._law.n :]
+        self._law, self._z, n = law, z, law.n
+        rows = law.acting.dot(z).reshape(-1, law.m)
+        self.xref = rows[:n], rows[n : 2 * n]
+        self.force, self.epsilon = rows[2 * n : 3 * n], rows[3 * n :]
 
     @property
     def e_star(self) -> np.ndarray:

@@ -41,7 +41,9 @@ class Forest:
         self._weightless.gravity.setZero()
         self._data, self._weightless_data = self._model.createData(), self._weightless.createData()
         self._neutral, self._still = pin.neutral(self._model), np.zeros(self._model.nv)
-        self._plain_q = self._model.nq == self._model.nv
+        plain = self._model.nq == self._model.nv
+        #: joint positions as Pinocchio stores them
+        self._stored: Callable[[np.ndarray], np.ndarray] = np.ndarray.ravel if plain else self._integrated
         self._view_results(tips)
         self._to_tip, self._to_tip_dot = np.zeros((2, self.n, 6, 3))
         self._to_tip[:, :3] = np.eye(3)
@@ -118,9 +120,9 @@ class Forest:
         self._positions = [data.oMf[tip].translation for tip in tips]
         self._rotations = [data.oMf[tip].rotation for tip in tips]
 
-    def _stored(self, q: np.ndarray) -> np.ndarray:
-        """Joint positions as Pinocchio stores them."""
-        return q.ravel() if self._plain_q else pin.integrate(self._model, self._neutral, q.ravel())
+    def _integrated(self, q: np.ndarray) -> np.ndarray:
+        """Joint positions of robots with joints that turn without end, as cosine and sine."""
+        return pin.integrate(self._model, self._neutral, q.ravel())
 
 
 def forests(robots: Sequence[Robot], joints: int = LARGE) -> list[tuple[slice, Forest]]:

@@ -63,13 +63,17 @@ class ClosedLoop:
         signals = self.derive(reference, self.state(y), disturbance, rate)
         return rate.flat, signals
 
-    def derive(self, reference: Reference, state: State, disturbance: np.ndarray, rate: State) -> Signals:
+    def derive(
+        self, reference: Reference, state: State, disturbance: np.ndarray | None, rate: State
+    ) -> Signals:
         """`evaluate` for states whose views are at hand: y' is written into `rate`."""
         signals = self.controller.evaluate(reference, state.motion, state.theta_hat, state.integral)
-        tau = self.plant.applied(signals.tau) + disturbance
+        tau = self.plant.applied(signals.tau)
+        if disturbance is not None:
+            tau = tau + disturbance
         v_dot, hidden_dot = self.plant.move(state.q, state.v, tau, state.hidden)
         rate.q[...], rate.v[...] = state.v, v_dot
-        rate.theta_hat[...], rate.integral[...] = signals.theta_hat_dot, signals.epsilon
+        rate.theta_hat[...], rate.integral[...] = signals.theta_hat_dot, signals.command.epsilon
         if hidden_dot.size:
             rate.hidden[...] = hidden_dot
         return signals

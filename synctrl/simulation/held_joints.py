@@ -90,7 +90,7 @@ class HeldJointsPlant(Plant):
         state = np.zeros((3, self.cell.n, self._real_nv))
         flat = state.reshape(3, -1)
         for part, known, held in zip(
-            flat, (q, v, self.less_friction(tau, v)), (rows[:, 0], rows[:, 1], held_tau), strict=True
+            flat, (q, v, tau - self.friction(v)), (rows[:, 0], rows[:, 1], held_tau), strict=True
         ):
             part[self._known_at], part[self._held_at] = known.ravel()[self._joints_at], held.ravel()
         a = self._dynamics(*state).ravel()

@@ -44,19 +44,18 @@ def rk4(loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule) -> Iterat
     k1, k2, k3, k4 = map(loop.state, rates)
     y, following, stage = loop.state(loop.initial_state()), loop.state(), loop.state()
     logged = np.isin(clock.times, clock.logged).tolist()
-    torques, windows = list(schedule.torques), _windows(schedule, clock)
-    disturbance = schedule.torque(0.0)
+    windows, pushes = _windows(schedule, clock), [tau if tau.any() else None for tau in schedule.torques]
     for k, (t, t_next, (start, middle, end)) in enumerate(steps(loop, clock.times)):
-        disturbance = torques[windows[k]]
+        push = pushes[windows[k]]
         h, now = t_next - t, loop.at(0.5 * (t + t_next))
-        signals = now.derive(start, y, disturbance, k1)
+        signals = now.derive(start, y, push, k1)
         if logged[k]:
-            yield Sample(t, y.flat, disturbance, signals)
-        now.derive(middle, stage.ahead(y, 0.5 * h, k1.flat), disturbance, k2)
-        now.derive(middle, stage.ahead(y, 0.5 * h, k2.flat), disturbance, k3)
-        now.derive(end, stage.ahead(y, h, k3.flat), disturbance, k4)
+            yield Sample(t, y.flat, schedule.torques[windows[k]], signals)
+        now.derive(middle, stage.ahead(y, 0.5 * h, k1.flat), push, k2)
+        now.derive(middle, stage.ahead(y, 0.5 * h, k2.flat), push, k3)
+        now.derive(end, stage.ahead(y, h, k3.flat), push, k4)
         y, following = following.ahead(y, h / 6, _SIMPSON.dot(rates)), y
-    yield final(loop, clock, y.flat, disturbance)
+    yield final(loop, clock, y.flat, schedule.torques[windows[-1]])
 
 
 def _windows(schedule: DisturbanceSchedule, clock: Clock) -> list[int]:

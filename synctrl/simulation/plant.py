@@ -115,15 +115,11 @@ class Plant:
         self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, hidden: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """v' under tau and friction, and the rate of the plant's own state; valid until the next call."""
-        return self._dynamics(q, v, self.less_friction(tau, v)), hidden
+        return self._dynamics(q, v, tau - self.friction(v) if self.rubs else tau), hidden
 
     def friction(self, v: np.ndarray) -> np.ndarray:
         """Torque by which friction opposes the velocities v, (n, nv), N·m."""
         return self.viscous * v + self.coulomb * np.tanh(v / self.smoothing)
-
-    def less_friction(self, tau: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """What friction leaves of torques tau, (n, nv), N·m."""
-        return tau - self.friction(v) if self.rubs else tau
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         """What a result says of the plant's own state at its logged instants, (T, size of the state)."""
