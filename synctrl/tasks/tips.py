@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
-from ..robots.forest import forests
+from ..robots.forest import Forest, forests
 from ..robots.robot import Robot
 
 
@@ -14,9 +15,17 @@ class Tips:
     """Where the tips of robots are and how they move with the joints, in world axes."""
 
     def __init__(self, robots: Sequence[Robot]):
-        self._forests = forests(robots)
+        self._robots = robots
         self._shape = len(robots), 3, max(robot.nv for robot in robots)
-        self._only = self._forests[0][1] if len(self._forests) == 1 else None
+
+    @cached_property
+    def _forests(self) -> list[tuple[slice, Forest]]:
+        return forests(self._robots)
+
+    @cached_property
+    def _only(self) -> Forest | None:
+        """The forest, if there is only one."""
+        return self._forests[0][1] if len(self._forests) == 1 else None
 
     def positions(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Positions and velocities of the tips, the velocities' Jacobians, and the Jacobians' derivatives.
