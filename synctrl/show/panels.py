@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 WIDTH = 6.4  # inches
 DPI = 150
-#: margins around the panels, inches: room for a label and for ticks such as "-0.0025"
-LEFT, RIGHT, BOTTOM = 0.82, 0.16, 0.48
-#: from the edges of a figure to the labels of its axes, inches
-LABEL = 0.18
+#: margins around the panels, inches: room for a label and for ticks such as −169.95
+LEFT, RIGHT, BOTTOM = 0.86, 0.22, 0.48
+#: from the edges of a figure to the labels of its axes, and to the power of ten of all ticks, inches
+LABEL, EDGE = 0.18, 0.04
 #: room above a panel: for nothing, for a title, and for a line of a legend, inches
-GAP, TITLE, LEGEND = 0.1, 0.27, 0.2
+GAP, TITLE, LEGEND = 0.15, 0.31, 0.2
 
 _SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
@@ -62,4 +62,4 @@ def _place_labels(panel: Axes, height: float) -> None:
     width = WIDTH - LEFT - RIGHT
     panel.yaxis.set_label_coords((LABEL - LEFT) / width, 0.5)
     panel.xaxis.set_label_coords(0.5, (LABEL - BOTTOM) / height)
-    panel.yaxis.get_offset_text().set_x(-LEFT / width)
+    panel.yaxis.get_offset_text().set_x((EDGE - LEFT) / width)
