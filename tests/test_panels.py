@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.text import Text
 
 from synctrl.experiments import a460_pair, planar_four
 from synctrl.show.panels import BOTTOM, LEFT, RIGHT, WIDTH, power_of_ten, stacked_panels
@@ -31,38 +32,34 @@ def written(figure):
     """Boxes of all words of a figure that can be seen, in dots."""
     with style():
         figure.canvas.draw()
-        renderer = figure.canvas.get_renderer()
         texts = [text for legend in figure.legends for text in legend.get_texts()]
         for panel in figure.axes:
-            texts += [panel._left_title, panel.xaxis.label, panel.yaxis.label]
-            texts += [panel.yaxis.get_offset_text(), *panel.get_xticklabels(), *panel.get_yticklabels()]
-            texts += panel.get_legend().get_texts() if panel.get_legend() else []
-        boxes = {
-            text: text.get_window_extent(renderer) for text in texts if text.get_visible() and text.get_text()
-        }
-    return {text: box for text, box in boxes.items() if is_shown(text, figure)}
+            texts += [panel.xaxis.label, panel.yaxis.label, panel.yaxis.get_offset_text()]
+            texts += [text for text in panel.findobj(Text) if text.get_text() == panel.get_title(loc="left")]
+            texts += [text for axis in (panel.xaxis, panel.yaxis) for text in tick_labels(axis)]
+        return {text: text.get_window_extent() for text in texts if text.get_visible() and text.get_text()}
 
 
-def is_shown(text, figure):
-    """Ticks outside the limits of their axis are there but not drawn."""
-    for panel in figure.axes:
-        for axis in (panel.xaxis, panel.yaxis):
-            labels = [tick.label1 for tick in axis.get_major_ticks()]
-            if text in labels:
-                low, high = sorted(axis.get_view_interval())
-                drawn = text.get_position()[axis is panel.yaxis]
-                return low <= drawn <= high and axis.get_tick_params().get("labelbottom", True)
-    return True
+def tick_labels(axis):
+    """Labels of the ticks within the limits: the others are there, but not drawn."""
+    low, high = sorted(axis.get_view_interval())
+    places = axis.get_majorticklocs()
+    return [
+        tick.label1
+        for place, tick in zip(places, axis.get_major_ticks(), strict=True)
+        if low <= place <= high
+    ]
 
 
 def check_places(figure):
-    """Nothing that is written leaves the figure or covers something else that is written."""
+    """Nothing that is written leaves the figure, reaches into a panel or covers other words."""
     boxes = written(figure)
     for text, box in boxes.items():
         assert box.x0 >= 0, text
         assert box.y0 >= 0, text
         assert box.x1 <= figure.bbox.x1 + 1e-6, text
         assert box.y1 <= figure.bbox.y1 + 1e-6, text
+        assert not any(box.overlaps(panel.bbox) for panel in figure.axes), text
     for (one, a), (other, b) in combinations(boxes.items(), 2):
         assert not a.overlaps(b), (one, other)
 

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 WIDTH = 6.4  # inches
 DPI = 150
-#: margins around the panels, inches: room for a label and for ticks such as −169.95
-LEFT, RIGHT, BOTTOM = 0.86, 0.22, 0.48
+#: margins around the panels, inches: room for a label and for ticks such as −181.975
+LEFT, RIGHT, BOTTOM = 0.88, 0.22, 0.46
 #: from the edges of a figure to the labels of its axes, and to the power of ten of all ticks, inches
-LABEL, EDGE = 0.18, 0.04
+LABEL, EDGE = 0.15, 0.04
 #: room above a panel: for nothing, for a title, and for a line of a legend, inches
 GAP, TITLE, LEGEND = 0.15, 0.31, 0.2
 

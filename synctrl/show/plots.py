@@ -29,6 +29,7 @@ _STYLE: Any = {
     "axes.titlesize": 10,
     "axes.titley": 1.0,
     "axes.formatter.limits": (-3, 5),
+    "axes.formatter.useoffset": False,
     "axes.labelsize": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
