@@ -83,10 +83,10 @@ def reproduce(out: Path, workers: int, jobs: Mapping[str, Job]) -> Path:
     runs = {name: every[name] for name in JOBS}
     print("\nchecking the proof along every run, comparing controllers, drawing ...", flush=True)
     with ThreadPoolExecutor(1) as background:
-        examined = background.submit(examine, out / "runs", workers)
+        examined = background.submit(examine, out / "runs", out / "figures", workers)
         claims, sections = tell(runs, out)
+        learned = identified(runs)
         certificates, comparisons = examined.result()
-    learned = identified(runs)
     sections += [
         identification_section(learned),
         baseline_section(comparisons),

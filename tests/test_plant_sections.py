@@ -17,7 +17,8 @@ from synctrl.experiments.reproduction import JOBS, judge_jobs, judged
 from synctrl.show.judge_plots import differences
 from synctrl.show.judge_section import judge_section
 from synctrl.show.plant_sections import friction_section, full_a460_section, identification_section
-from synctrl.show.report import write_page
+from synctrl.show.plots import joint_trajectories, save
+from synctrl.show.report import Row, write_page
 
 
 @pytest.fixture(scope="module")
@@ -35,11 +36,25 @@ def runs():
 
 
 def test_the_page_shows_three_and_six_joints_side_by_side(runs, tmp_path) -> None:
-    page = write_page(tmp_path / "index.html", "page", [full_a460_section(runs, tmp_path)]).read_text("utf-8")
-    for figure in range(2, 8):
-        for joints in ("three", "six"):
-            assert f"Figure {figure}, " in page
-            assert (tmp_path / f"figure_{figure:02d}_{joints}_joints.svg").stat().st_size > 1000
+    of_the_paper = {
+        2: ("synchronized", 0),
+        3: ("synchronized", 1),
+        5: ("independent", 0),
+        6: ("independent", 1),
+    }
+    for figure, (kind, robot) in of_the_paper.items():
+        save(joint_trajectories(runs[kind], robot), tmp_path / f"figure_{figure:02d}")
+    section = full_a460_section(runs, tmp_path)
+    page = write_page(tmp_path / "index.html", "page", [section]).read_text("utf-8")
+    rows = [block for block in section.blocks if isinstance(block, Row)]
+    assert len(rows) == 6
+    for figure, row in enumerate(rows, start=2):
+        for picture, joints in zip(row.blocks, ("three", "six"), strict=True):
+            assert f"Figure {figure}, " in picture.caption
+            assert f"{joints} joints" in picture.caption
+            assert picture.caption in page
+            assert f"figure_{figure:02d}" in picture.svg.name
+    assert all(rows[k - 2].blocks[0].svg == tmp_path / f"figure_{k:02d}.svg" for k in of_the_paper)
     assert "joint5" in page
 
 

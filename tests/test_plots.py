@@ -57,7 +57,7 @@ def test_colour_is_the_robot_and_line_style_the_axis(planar):
 
 def test_the_legend_names_every_robot_axis_and_disturbance(planar, disturbed):
     assert legend(tracking_errors(planar)) == ["robot 1", "robot 2", "robot 3", "robot 4", "x", "y"]
-    assert legend(sync_errors(planar)) == [*(f"ε$_{{{k}}}$" for k in range(1, 5)), "x", "y"]
+    assert legend(sync_errors(planar)) == ["ε₁", "ε₂", "ε₃", "ε₄", "x", "y"]
     assert legend(tracking_errors(disturbed))[-1] == "torque on robot 1"
 
 

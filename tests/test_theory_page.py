@@ -17,7 +17,7 @@ from synctrl.experiments.reproduction import JOBS
 from synctrl.experiments.theory import CERTIFIED, examine
 from synctrl.show.lyapunov_plots import growth_mark, lyapunov_figure
 from synctrl.show.report import Table, Text, write_page
-from synctrl.show.theory_sections import baseline_section, certificate_section
+from synctrl.show.theory_sections import baseline_section, certificate_section, draw_certificate
 
 PUSH = Disturbance(robot=0, torque=-60.0, start=0.01, stop=0.03)
 
@@ -35,13 +35,13 @@ def comparison() -> Comparison:
 
 
 def test_the_section_has_a_figure_and_a_verdict_for_every_run(certificates, tmp_path: Path) -> None:
+    for name, certificate in certificates.items():
+        assert draw_certificate(name, certificate, tmp_path) == tmp_path / f"lyapunov_{name}.svg"
     section = certificate_section(certificates, tmp_path)
     page = write_page(tmp_path / "page.html", "page", [section]).read_text()
     assert page.count("<img") == len(certificates)
     table = next(block for block in section.blocks if isinstance(block, Table))
     assert [row[1] for row in table.rows] == ["certified", "outside the theorem"]
-    for name in certificates:
-        assert (tmp_path / f"lyapunov_{name}.svg").is_file()
     assert "V first grows at t = 0.01" in page
 
 
@@ -89,4 +89,4 @@ def test_every_run_of_the_figures_is_certified() -> None:
 
 def test_a_missing_run_is_a_clear_error(tmp_path: Path) -> None:
     with pytest.raises(ResultError, match="planar_four_synchronized"):
-        examine(tmp_path, 1, ["planar_four_synchronized"])
+        examine(tmp_path, tmp_path, 1, ["planar_four_synchronized"])

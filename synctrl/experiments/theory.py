@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..analysis.baselines import Comparison, compare
 from ..analysis.certify import Certificate, certify
+from ..show.theory_sections import draw_certificate
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .a460_pair import a460_pair
@@ -37,29 +38,32 @@ COMPARED: Mapping[str, tuple[Callable[[], Experiment], float]] = {
 
 
 def examine(
-    folder: Path, workers: int = 2, names: Iterable[str] = CERTIFIED
+    folder: Path, figures: Path, workers: int = 2, names: Iterable[str] = CERTIFIED
 ) -> tuple[dict[str, Certificate], list[Comparison]]:
-    """Certify saved runs, and compare the controllers of both cells, several at a time.
+    """Certify saved runs and draw their certificates, and compare the controllers of both cells.
 
     Args:
         folder: where `run_all` has saved the runs.
+        figures: where the figures of the certificates go.
         workers: number of processes.
         names: runs to certify.
 
     Raises:
-        ResultError: a run is missing or damaged.
+        ResultError: a run is missing or damaged, or a figure cannot be written.
     """
     names = tuple(names)
     for name in names:
         Result.load(folder / f"{name}.npz")
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         compared = [pool.submit(_compare, name) for name in COMPARED]
-        certified = {name: pool.submit(_certify, name, folder) for name in names}
+        certified = {name: pool.submit(_certify, name, folder, figures) for name in names}
         return {name: f.result() for name, f in certified.items()}, [f.result() for f in compared]
 
 
-def _certify(name: str, folder: Path) -> Certificate:
-    return certify(Result.load(folder / f"{name}.npz"), JOBS[name].make())
+def _certify(name: str, folder: Path, figures: Path) -> Certificate:
+    certificate = certify(Result.load(folder / f"{name}.npz"), JOBS[name].make())
+    draw_certificate(name, certificate, figures)
+    return certificate
 
 
 def _compare(name: str) -> Comparison:

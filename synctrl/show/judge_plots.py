@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..analysis.judge import AGREEMENT, Comparison
+from .panels import power_of_ten
 from .plots import new_figure, plain, style
 from .style import ACCENT, robot_color
 
@@ -28,6 +29,7 @@ def differences(comparisons: Sequence[Comparison]) -> Figure:
                 panel.semilogy(comparison.t, values, color=robot_color(k), label=plain(comparison.title))
             panel.axhline(AGREEMENT, color=ACCENT, linestyle="--", linewidth=1.0, label="asked for")
             panel.set_xlabel("time, s")
+            panel.yaxis.set_major_formatter(power_of_ten)
             panel.margins(x=0)
         panels[0, 0].set_ylabel("difference / largest error")
         panels[0, 0].set_title("tracking error e", loc="left")

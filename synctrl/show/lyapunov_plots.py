@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from ..analysis.lyapunov import ENERGIES, POWERS, THEOREM, Growth, Lyapunov
-from .plots import new_figure, style
+from .panels import GAP, LEGEND, power_of_ten, stacked_panels
+from .plots import style
 from .style import ACCENT, DESIRED, PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+#: names of terms and their colours
+Terms: TypeAlias = list[tuple[str, str]]
+#: height of a panel, inches, and how many names a line of its legend takes
+PANEL, COLUMNS = 2.0, 4
 #: terms that never exceed this share of the largest are left out
 VISIBLE = 1e-9
 #: powers below this share of the largest are drawn on a linear scale
@@ -28,12 +33,15 @@ def lyapunov_figure(record: Lyapunov) -> Figure:
         record: of `synctrl.analysis.lyapunov.lyapunov`.
     """
     with style():
-        figure, panels = new_figure(5.6, 2, sharex=True)
-        _energies(panels[0, 0], record)
-        _powers(panels[1, 0], record)
-        for panel in panels[:, 0]:
+        energies, powers = _visible(record.energy, ENERGIES), _visible(record.power, POWERS)
+        above = [GAP + LEGEND * -(-(len(terms) + 1) // COLUMNS) for terms in (energies, powers)]
+        figure, panels = stacked_panels([PANEL, PANEL], above)
+        _energies(panels[0], record, energies)
+        _powers(panels[1], record, powers)
+        for panel in panels:
             panel.margins(x=0)
-            panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.2)
+            panel.yaxis.set_major_formatter(power_of_ten)
+            panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=COLUMNS, borderaxespad=0.2)
     return figure
 
 
@@ -53,21 +61,20 @@ def growth_mark(figure: Figure, growth: Growth) -> Figure:
     return figure
 
 
-def _energies(panel: Axes, record: Lyapunov) -> None:
+def _energies(panel: Axes, record: Lyapunov, shown: Terms) -> None:
     panel.set_yscale("log")
     floor = VISIBLE * float(record.V.max())
-    for name, color in _visible(record.energy, ENERGIES, floor):
+    for name, color in shown:
         panel.plot(record.t, np.maximum(record.energy[name], floor), color=color, label=name)
     panel.plot(record.t, record.V, color=DESIRED, linewidth=2.0, label="V", zorder=1)
     panel.set_ylim(bottom=floor)
     panel.set_ylabel("V and its terms")
 
 
-def _powers(panel: Axes, record: Lyapunov) -> None:
+def _powers(panel: Axes, record: Lyapunov, shown: Terms) -> None:
     largest = float(np.abs(list(record.power.values())).max())
-    floor = VISIBLE * largest
     panel.set_yscale("symlog", linthresh=max(LINEAR * largest, float(record.rounding.max()), 1e-300))
-    for name, color in _visible(record.power, POWERS, floor):
+    for name, color in shown:
         inside = "-" if name in THEOREM else "--"
         panel.plot(record.t, record.power[name], inside, color=color, label=name)
     panel.plot(record.t, record.V_dot, color=DESIRED, linewidth=2.0, label="V'", zorder=1)
@@ -76,8 +83,8 @@ def _powers(panel: Axes, record: Lyapunov) -> None:
     panel.set_xlabel("time, s")
 
 
-def _visible(terms: Mapping[str, np.ndarray], names: tuple[str, ...], floor: float) -> list[tuple[str, str]]:
+def _visible(terms: Mapping[str, np.ndarray], names: tuple[str, ...]) -> Terms:
     """Names of the terms that can be seen, each with the colour it has in all figures."""
-    return [
-        (name, PALETTE[k % len(PALETTE)]) for k, name in enumerate(names) if np.abs(terms[name]).max() > floor
-    ]
+    sizes = {name: float(np.abs(terms[name]).max()) for name in names}
+    floor = VISIBLE * max(sizes.values())
+    return [(name, PALETTE[k % len(PALETTE)]) for k, name in enumerate(names) if sizes[name] > floor]

@@ -23,7 +23,7 @@ def full_a460_section(runs: Mapping[str, Result], folder: Path) -> Section:
 
     Args:
         runs: `synchronized` and `independent`, and with six joints `full` and `full_alone`.
-        folder: where figures go.
+        folder: where figures go, and where those of `a460_section` are.
     """
     limits = common_limits("sync_error", *(runs[name] for pair in FULL.items() for name in pair))
     blocks: list[Any] = [
@@ -38,10 +38,12 @@ def full_a460_section(runs: Mapping[str, Result], folder: Path) -> Section:
     for first, kind in zip((2, 5), FULL, strict=True):
         pair = (runs[kind], runs[FULL[kind]])
         for robot in range(2):
-            blocks.append(
-                _beside(folder, first + robot, [joint_trajectories(run, robot) for run in pair], kind)
-            )
-        blocks.append(_beside(folder, first + 2, [sync_errors(run, limits) for run in pair], kind))
+            three = folder / f"figure_{first + robot:02d}.svg"  # drawn once
+            six = _drawn(folder, first + robot, joint_trajectories(pair[1], robot), "six")
+            blocks.append(_beside(first + robot, kind, three, six))
+        errors = [sync_errors(run, limits) for run in pair]
+        drawn = (_drawn(folder, first + 2, *each) for each in zip(errors, ("three", "six"), strict=True))
+        blocks.append(_beside(first + 2, kind, *drawn))
     return Section("The A460 with six joints", (*blocks, _wrist_table(runs), _error_table(runs)))
 
 
@@ -119,13 +121,15 @@ def identification_section(found: Mapping[str, Sequence[Identification]]) -> Sec
     )
 
 
-def _beside(folder: Path, k: int, figures: Sequence[Any], kind: str) -> Row:
+def _drawn(folder: Path, k: int, figure: Any, joints: str) -> Path:
+    _, svg = save(figure, folder / f"figure_{k:02d}_{joints}_joints")
+    return svg
+
+
+def _beside(k: int, kind: str, three: Path, six: Path) -> Row:
     """One figure of the paper for the plant with three joints, and with six."""
-    pictures = []
-    for figure, joints in zip(figures, ("three", "six"), strict=True):
-        _, svg = save(figure, folder / f"figure_{k:02d}_{joints}_joints")
-        pictures.append(Picture(svg, f"Figure {k}, {kind}, {joints} joints in the plant."))
-    return Row(tuple(pictures))
+    captions = (f"Figure {k}, {kind}, {joints} joints in the plant." for joints in ("three", "six"))
+    return Row(tuple(map(Picture, (three, six), captions)))
 
 
 def _wrist_table(runs: Mapping[str, Result]) -> Table:

@@ -16,19 +16,20 @@ import numpy as np
 from ..analysis.metrics import row_names
 from ..errors import InputError, ResultError
 from ..simulation.result import Result
+from .panels import DPI, GAP, LEGEND, TITLE, WIDTH, stacked_panels
 from .style import ACCENT, DESIRED, display, line_style, robot_color
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WIDTH = 6.4  # inches
-DPI = 150
-
 _STYLE: Any = {
     "font.family": "DejaVu Sans",
     "font.size": 9,
     "axes.titlesize": 10,
+    "axes.titley": 1.0,
+    "axes.formatter.limits": (-3, 5),
+    "axes.formatter.useoffset": False,
     "axes.labelsize": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -50,6 +51,9 @@ _STYLE: Any = {
     "path.simplify_threshold": 0.2,
 }
 
+#: the next levels take twice the time and more for files that are a few kB smaller
+_PNG = {"compress_level": 2}
+
 
 @contextmanager
 def style() -> Iterator[None]:
@@ -57,14 +61,17 @@ def style() -> Iterator[None]:
     from matplotlib import rc_context, rcParamsDefault
 
     default: Any = {k: v for k, v in rcParamsDefault.items() if k != "backend"}
-    with rc_context(default), rc_context(_STYLE):
+    with rc_context({**default, **_STYLE}):
         yield
 
 
 def new_figure(
     height: float, rows: int = 1, columns: int = 1, *, width: float = WIDTH, **options: Any
 ) -> tuple[Figure, np.ndarray]:
-    """A figure, its size in inches, and its axes, (rows, columns); to be called within `style`."""
+    """A figure, its size in inches, and its axes, (rows, columns); to be called within `style`.
+
+    It arranges itself around its labels, for which it measures all of them: `stacked_panels` need not.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -86,11 +93,12 @@ def save(figure: Figure, stem: str | Path) -> tuple[Path, Path]:
     try:
         png.parent.mkdir(parents=True, exist_ok=True)
         with style():
-            figure.draw_without_rendering()
-            figure.set_layout_engine("none")  # it is arranged now, for both files
+            if engine := figure.get_layout_engine():
+                engine.execute(figure)
+                figure.set_layout_engine("none")  # it is arranged now, for both files
             # savefig would draw once more for each file, only to arrange again
             FigureCanvasSVG(figure).print_svg(svg, metadata={"Date": None, "Creator": None})
-            FigureCanvasAgg(figure).print_png(png, metadata={"Software": None})
+            FigureCanvasAgg(figure).print_png(png, metadata={"Software": None}, pil_kwargs=_PNG)
     except OSError as error:
         raise ResultError(f"cannot write the figure '{stem}': {error.strerror or error}") from error
     return png, svg
@@ -113,16 +121,17 @@ def joint_trajectories(result: Result, robot: int) -> Figure:
     unit, factor = display(result.unit("x"))
     axes_names = result.info["axes"]
     with style():
-        figure, panels = new_figure(1.55 * len(axes_names) + 0.5, len(axes_names), sharex=True)
-        for k, panel in enumerate(panels[:, 0]):
+        above = [LEGEND + TITLE, *[GAP] * (len(axes_names) - 1)]
+        figure, panels = stacked_panels([COORDINATE] * len(axes_names), above)
+        for k, panel in enumerate(panels):
             actual, desired = factor * result.x[:, robot, k], factor * result.x_desired[:, robot, k]
             panel.plot(result.t, actual, color=robot_color(robot), label="actual")
             panel.plot(result.t, desired, "-.", color=DESIRED, linewidth=1.1, label="desired")
             panel.set_ylabel(f"{axes_names[k]}, {unit}")
             panel.margins(x=0)
-        panels[-1, 0].set_xlabel("time, s")
-        panels[0, 0].set_title(plain(result.names[robot]), loc="left")
-        _legend(figure, panels[0, 0].get_lines())
+        panels[-1].set_xlabel("time, s")
+        panels[0].set_title(plain(result.names[robot]), loc="left")
+        _legend(figure, panels[0].get_lines())
     return figure
 
 
@@ -157,10 +166,11 @@ def common_limits(kind: str, *results: Result) -> tuple[float, float]:
 
 #: below this share of the common limits an error gets a magnified panel
 SMALL = 0.4
-#: heights of a panel and of a magnified one, and what labels need, inches
-PANEL, MAGNIFIED, LABELS = 2.2, 1.6, 0.75
+#: heights of the panel of a coordinate, of errors, and of magnified errors, inches
+COORDINATE, PANEL, MAGNIFIED = 1.3, 2.1, 1.5
 #: widths of the first and of the last line of a figure, points
 WIDE, NARROW = 3.0, 1.3
+_INDEX = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
 def _errors(result: Result, kind: str, what: str, limits: tuple[float, float] | None) -> Figure:
@@ -170,11 +180,9 @@ def _errors(result: Result, kind: str, what: str, limits: tuple[float, float] | 
         shown.append(own)
     unit, factor = display(result.unit(kind))
     with style():
-        heights = [PANEL, MAGNIFIED][: len(shown)]
-        figure, panels = new_figure(
-            sum(heights) + LABELS, len(shown), sharex=True, gridspec_kw={"height_ratios": heights}
-        )
-        for panel, (low, high) in zip(panels[:, 0], shown, strict=True):
+        heights, above = (PANEL, MAGNIFIED), (LEGEND + GAP, TITLE)
+        figure, panels = stacked_panels(heights[: len(shown)], above[: len(shown)])
+        for panel, (low, high) in zip(panels, shown, strict=True):
             _error_lines(panel, result, kind, factor)
             marks = _mark_disturbances(panel, result)
             panel.set_ylim(factor * low, factor * high)
@@ -182,9 +190,9 @@ def _errors(result: Result, kind: str, what: str, limits: tuple[float, float] | 
             panel.margins(x=0)
         if len(shown) == 2:
             times = (shown[0][1] - shown[0][0]) / (shown[1][1] - shown[1][0])
-            panels[1, 0].set_title(f"the same, on 1/{times:.2g} of the range", loc="left")
-            panels[1, 0].set_ylabel(f"{what.split()[-1]}, {unit}")
-        panels[-1, 0].set_xlabel("time, s")
+            panels[1].set_title(f"the same, on 1/{times:.2g} of the range", loc="left")
+            panels[1].set_ylabel(f"{what.split()[-1]}, {unit}")
+        panels[-1].set_xlabel("time, s")
         _legend(figure, [*_row_handles(result, kind), *_axis_handles(result), *marks])
     return figure
 
@@ -215,7 +223,7 @@ def _row_handles(result: Result, kind: str) -> list[Any]:
 
     names = row_names(result, kind)
     if kind == "sync_error":
-        names = [f"ε$_{{{k}}}$" for k in range(1, len(names) + 1)] if len(names) > 1 else []
+        names = [f"ε{str(k).translate(_INDEX)}" for k in range(1, len(names) + 1)] if len(names) > 1 else []
     widths = _widths(len(names))
     return [
         Line2D([], [], color=_row_color(result, kind, k), linewidth=widths[k], label=plain(name))
@@ -225,7 +233,7 @@ def _row_handles(result: Result, kind: str) -> list[Any]:
 
 def plain(name: str) -> str:
     """A name with nothing in it that matplotlib would read as a formula."""
-    return name if name.startswith("ε$") else name.replace("$", r"\$")
+    return name.replace("$", r"\$")
 
 
 def _axis_handles(result: Result) -> list[Any]:
@@ -240,7 +248,13 @@ def _axis_handles(result: Result) -> list[Any]:
 def _legend(figure: Figure, handles: Sequence[Any]) -> None:
     columns = min(len(handles), 7)
     figure.legend(
-        handles=list(handles), loc="outside upper right", ncols=columns, handlelength=2.2, columnspacing=1.2
+        handles=list(handles),
+        loc="upper right",
+        ncols=columns,
+        handlelength=2.0,
+        handletextpad=0.5,
+        columnspacing=1.0,
+        borderaxespad=0.2,
     )
 
 

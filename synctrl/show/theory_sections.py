@@ -21,11 +21,11 @@ with d = θ - θ̂, E = Sᵀ ∫ε, σ = Sᵀ ε"""
 
 
 def certificate_section(certificates: Mapping[str, Certificate], folder: Path) -> Section:
-    """V, V' and the verdict of every run; the figures are written into a folder.
+    """V, V' and the verdict of every run.
 
     Args:
         certificates: by name of the run; the name is also that of its figure's file.
-        folder: where figures go.
+        folder: where `draw_certificate` has drawn each.
     """
     pictures = [_picture(name, c, folder) for name, c in certificates.items()]
     rows = [Row(tuple(pictures[k : k + 2])) for k in range(0, len(pictures), 2)]
@@ -40,6 +40,15 @@ def certificate_section(certificates: Mapping[str, Certificate], folder: Path) -
             Text(texts, "formula"),
         ),
     )
+
+
+def draw_certificate(name: str, certificate: Certificate, folder: Path) -> Path:
+    """Draw V and V' along a run, and where V first grows; returns the path of the SVG file."""
+    figure = lyapunov_figure(certificate.lyapunov)
+    if certificate.growth is not None:
+        growth_mark(figure, certificate.growth)
+    _, svg = save(figure, _stem(name, folder))
+    return svg
 
 
 def baseline_section(comparisons: Sequence[Comparison]) -> Section:
@@ -73,11 +82,12 @@ _FAIRNESS = (
 
 
 def _picture(name: str, certificate: Certificate, folder: Path) -> Picture:
-    figure = lyapunov_figure(certificate.lyapunov)
-    if certificate.growth is not None:
-        growth_mark(figure, certificate.growth)
-    _, svg = save(figure, folder / f"lyapunov_{name}")
+    svg = _stem(name, folder).with_suffix(".svg")
     return Picture(svg, f"{_words(name)}: {certificate.verdict}. Dashed: powers the theorem does not know.")
+
+
+def _stem(name: str, folder: Path) -> Path:
+    return folder / f"lyapunov_{name}"
 
 
 def _words(name: str) -> str:
