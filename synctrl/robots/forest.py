@@ -21,6 +21,7 @@ from .robot import Robot
 LARGE = 96
 #: the same where regressors are asked for: they have a block per tree, in a matrix that grows with the square
 SMALL = 24
+_WORLD = pin.Convention.WORLD  # quantities of bodies in world axes, which is the faster way here
 #: p @ _CROSS are the entries of the matrix P with a @ P = a x p
 _CROSS = np.array([[[0, -z, y], [z, 0, -x], [-y, x, 0]] for x, y, z in np.eye(3)]).reshape(3, 9)
 
@@ -75,7 +76,7 @@ class Forest:
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """v', (n, nv), under joint torques tau, (n, nv); scratch memory, valid until the next call."""
-        pin.aba(self._model, self._data, self._stored(q), v.ravel(), tau.ravel())
+        pin.aba(self._model, self._data, self._stored(q), v.ravel(), tau.ravel(), _WORLD)
         return self._v_dot
 
     def tips(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

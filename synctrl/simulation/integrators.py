@@ -134,13 +134,9 @@ def steps(
     for k in range(0, len(times) - 1, BLOCK):
         starts, ends = times[k : k + BLOCK + 1][:-1], times[k : k + BLOCK + 1][1:]
         instants = starts, 0.5 * (starts + ends), np.nextafter(ends, -np.inf)
-        rows, n = loop.cell.references(np.concatenate(instants)), len(starts)
-        yield from zip(
-            starts.tolist(),
-            ends.tolist(),
-            zip(rows[:n], rows[n : 2 * n], rows[2 * n :], strict=True),
-            strict=True,
-        )
+        table, n = loop.cell.reference_table(np.concatenate(instants)), len(starts)
+        stages = (loop.cell.instants(table, slice(i * n, (i + 1) * n)) for i in range(3))
+        yield from zip(starts.tolist(), ends.tolist(), zip(*stages, strict=True), strict=True)
 
 
 def _right_hand_side(

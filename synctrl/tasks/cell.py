@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -152,13 +152,16 @@ class Cell:
 
     def references(self, times: np.ndarray) -> list[Reference]:
         """What is desired at each of the times, (T,)."""
-        table = self.reference_table(times)
-        desired, weights = np.ascontiguousarray(table.desired), table.weights
+        return list(self.instants(self.reference_table(times)))
+
+    def instants(self, table: Reference, part: slice = slice(None)) -> Iterator[Reference]:
+        """The instants in a part of a table, one after another."""
+        desired = np.ascontiguousarray(table.desired[part])
         if self.coupling.is_constant:
-            constant = Weights(*(part[0] for part in weights))
-            return [Reference(row, constant) for row in desired]
-        rows = zip(desired, *weights, strict=True)
-        return [Reference(row, Weights(*parts)) for row, *parts in rows]
+            constant = Weights(*(weight[0] for weight in table.weights))
+            return (Reference(row, constant) for row in desired)
+        rows = zip(desired, *(weight[part] for weight in table.weights), strict=True)
+        return (Reference(row, Weights(*weights)) for row, *weights in rows)
 
     # -- internals ----------------------------------------------------------------------------------------
 
