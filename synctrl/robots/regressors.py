@@ -108,6 +108,6 @@ def _alone(i: int, parameters: Parameters, nv: int) -> Group:
     """One robot with parameters of a kind of their own."""
 
     def regressor(*motion: np.ndarray) -> Blocks:
-        return Blocks(parameters.regressor(*(part[0] for part in motion)), 1)
+        return Blocks(np.asarray(parameters.regressor(*(part[0] for part in motion))), 1)
 
     return Group(slice(i, i + 1), nv, len(parameters.theta), regressor)
