@@ -237,7 +237,8 @@ def inverse(A: np.ndarray) -> np.ndarray:
     if A.shape[-1] == 2:
         across = A[:, ::-1, ::-1]
         products = A * across
-        return _CHECKERED * across.mT / (products[:, 0, :1] - products[:, 0, 1:])[:, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return _CHECKERED * across.mT / (products[:, 0, :1] - products[:, 0, 1:])[:, None]
     try:
         return np.linalg.inv(A)
     except np.linalg.LinAlgError:
