@@ -54,12 +54,13 @@ class Forest:
 
     def regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> Blocks:
         """Slotine-Li regressors, blocks (nv, 10 bodies), see `Robot.regressor`; arguments are (n, nv)."""
-        q, v, half = self._stored(q), v.ravel(), 0.5 * (v_ref - v).ravel()
+        q, v = self._stored(q), v.ravel()
+        half = 0.5 * (v_ref.ravel() - v)
         whole = pin.computeJointTorqueRegressor(self._model, self._data, q, v + half, a_ref.ravel())
         whole -= pin.computeJointTorqueRegressor(
             self._weightless, self._weightless_data, q, half, self._still
         )
-        return Blocks(whole.reshape(self._model.nv, -1), self.n)  # a single row comes as a vector
+        return Blocks(whole if whole.ndim == 2 else whole[None], self.n)  # a single row comes as a vector
 
     def torque(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
         """M a_ref + C(q, v) v_ref + g, (n, nv), with the true parameters by the identity of `regressor`."""
