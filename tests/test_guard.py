@@ -29,7 +29,7 @@ from synctrl.errors import (
     SingularJacobianError,
     UnreachableError,
 )
-from synctrl.experiments import planar_four
+from synctrl.experiments import a460_pair, planar_four
 from synctrl.simulation.integrators import ADAPTIVE
 from synctrl.tasks.reachability import inverse_kinematics
 
@@ -244,3 +244,16 @@ def test_arms_that_start_far_from_a_reachable_path_may_run():
         simulate(Cell(members, Coupling.pair(), CartesianSpace("xy")), SMALL_GAINS, 0.01).status
         == "completed"
     )
+
+
+@pytest.mark.parametrize("engine", ["pinocchio", "compiled"])
+@pytest.mark.parametrize("robot", [0, 1])
+def test_of_coupled_robots_the_unstable_one_is_named(robot: int, engine: str) -> None:
+    experiment = a460_pair()
+    K_r = np.full((2, 3), 8.0)
+    K_r[robot] *= 400
+    unstable = a460_pair(gains=experiment.gains.replace(K_r=K_r))
+    error = stop(unstable, dt=1e-3, engine=engine)
+    assert isinstance(error, NonFiniteError)
+    assert error.robot == robot
+    assert unstable.cell.names[robot] in str(error)

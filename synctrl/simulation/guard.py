@@ -34,6 +34,7 @@ class Guard:
         self._pose = isinstance(loop.cell.space, PoseSpace)
         self._sides: bytes | None = None
         self._jacobians: tuple[np.ndarray, np.ndarray] | None = None
+        self._v = np.zeros((loop.cell.n, loop.cell.nv))
 
     def check(self, sample: Sample) -> None:
         """Stop the run if its numbers at this instant mean nothing.
@@ -44,7 +45,8 @@ class Guard:
             OrientationError: an orientation error is so large that its direction is about to be undefined.
         """
         if not isfinite(np.add.reduce(sample.y)) and not np.isfinite(sample.y).all():
-            raise self._non_finite(sample)
+            raise run_away(self._loop, sample.t, sample.y, self._v, self._conditions())
+        self._v[...] = sample.y[self._v.size : 2 * self._v.size].reshape(self._v.shape)
         task = sample.signals.task
         if self._pose:
             self._check_orientations(sample.t, task.e[:, 3:])
@@ -52,7 +54,7 @@ class Guard:
             self._check_jacobians(sample.t, task.J, task.J_inv)
         tau = sample.signals.tau
         if not isfinite(np.add.reduce(tau, axis=None)) and (rows := _non_finite_rows(tau)).size:
-            raise not_finite(self._loop.cell, sample.t, int(rows[0]), "torque")
+            raise not_finite(self._loop.cell, sample.t, fastest(rows, self._v), "torque")
 
     def _check_jacobians(self, t: float, J: np.ndarray, J_inv: np.ndarray) -> None:
         self._jacobians = J, J_inv
@@ -88,19 +90,39 @@ class Guard:
                 robot=i,
             )
 
-    def _non_finite(self, sample: Sample) -> NonFiniteError:
-        parts = zip(PARTS, self._loop.split(sample.y), strict=True)
-        broken = [(name, bad) for name, part in parts if (bad := _non_finite_rows(part)).size]
-        if not broken:
-            return NonFiniteError(
-                f"the plant's own state is no longer finite at t = {sample.t:g} s", time=sample.t
-            )
-        name, rows = broken[0]
-        i = int(rows[0]) if name != PARTS[3] else int(self._loop.cell.coupling.edges[rows[0], 0])
-        hint = HINT
-        if (condition := self._conditions()[i]) > 100:
-            hint = f"its Jacobian was nearly singular before, with condition number {condition:.3g}"
-        return not_finite(self._loop.cell, sample.t, i, name, hint)
+
+def run_away(
+    loop: ClosedLoop, t: float, y: np.ndarray, v: np.ndarray, conditions: np.ndarray | None = None
+) -> NonFiniteError:
+    """The error of a state with infinite or undefined numbers.
+
+    Args:
+        loop: the closed loop.
+        t: when, s.
+        y: the state.
+        v: joint velocities at the instant before, (n, nv), rad/s.
+        conditions: condition numbers of the Jacobians there, (n,), if they are known.
+    """
+    parts = zip(PARTS, loop.split(y), strict=True)
+    broken = [(name, bad) for name, part in parts if (bad := _non_finite_rows(part)).size]
+    if not broken:
+        return NonFiniteError(f"the plant's own state is no longer finite at t = {t:g} s", time=t)
+    name, rows = broken[0]
+    i = fastest(rows if name != PARTS[3] else np.unique(loop.cell.coupling.edges[rows]), v)
+    hint = HINT
+    if conditions is not None and conditions[i] > 100:
+        hint = f"its Jacobian was nearly singular before, with condition number {conditions[i]:.3g}"
+    return not_finite(loop.cell, t, i, name, hint)
+
+
+def fastest(robots: np.ndarray, v: np.ndarray) -> int:
+    """Of robots that broke down in one step, as coupled ones do, the one that began: it moved fastest.
+
+    Args:
+        robots: their indices.
+        v: joint velocities at the last instant at which all were finite, (n, nv), rad/s.
+    """
+    return int(robots[np.abs(v[robots]).max(axis=1).argmax()])
 
 
 def not_finite(cell: Cell, t: float, robot: int, what: str, hint: str = HINT) -> NonFiniteError:

@@ -41,6 +41,11 @@ class Recorder:
         self._rows[0][self.count : self.count + len(times)] = times
         self.count += len(times)
 
+    def last(self, name: str) -> np.ndarray:
+        """An array at the last instant that was logged; zeros if there is none."""
+        array = self._arrays[name]
+        return array[self.count - 1] if self.count else np.zeros(array.shape[1:])
+
     def result(self, status: str, info: Mapping[str, Any], experiment: Any) -> Result:
         """What was logged until now."""
         arrays = {name: _taken(array, self.count) for name, array in self._arrays.items()}

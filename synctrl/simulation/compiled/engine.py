@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...errors import NonFiniteError, OrientationError, SimulationError
+from ...errors import OrientationError, SimulationError
 from ...tasks.cell import Cell
 from ..clock import Clock
 from ..disturbances import DisturbanceSchedule
-from ..guard import PARTS, not_finite, singular
+from ..guard import fastest, not_finite, run_away, singular
 from ..recorder import Recorder
 from .program import Program
 from .structs import LogStruct, ReferenceStruct, ReportStruct
@@ -154,7 +154,7 @@ class _Steps:
         )
         recorder.advance(times[:-1][logged][:count])
         if report.status:
-            raise _failure(program, float(times[report.step]), report)
+            raise _failure(program, float(times[report.step]), report, y, recorder.last("v"))
 
 
 def _tables(cell: Cell, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -171,10 +171,14 @@ def _tables(cell: Cell, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return desired, np.stack(parts, axis=2)  # as one row of instants after the other
 
 
-def _failure(program: Program, t: float, report: ReportStruct) -> SimulationError:
-    cell = program.loop.cell
+def _failure(
+    program: Program, t: float, report: ReportStruct, y: np.ndarray, v: np.ndarray
+) -> SimulationError:
+    loop, cell = program.loop, program.loop.cell
+    if report.status == 1 and report.robot < loop.size:  # an entry of the state, or of the torques after it
+        return run_away(loop, t, y, v)
     if report.status == 1:
-        return _not_finite(program, t, report.robot)
+        return not_finite(cell, t, fastest(np.arange(cell.n), loop.split(y)[1]), "torque")
     i, name = report.robot, cell.names[report.robot]
     if report.status == 4:
         return OrientationError(
@@ -186,19 +190,3 @@ def _failure(program: Program, t: float, report: ReportStruct) -> SimulationErro
     if report.status == 3:
         return singular(cell, t, i, "its determinant changed sign since the instant before")
     return singular(cell, t, i, f"its condition number is {report.value:.3g}")
-
-
-def _not_finite(program: Program, t: float, entry: int) -> NonFiniteError:
-    """The error for an entry of the flat state, or of the torques that come after it."""
-    loop, cell = program.loop, program.loop.cell
-    if entry >= loop.size:
-        return not_finite(cell, t, (entry - loop.size) // cell.nv, "torque")
-    marker = np.zeros(loop.size)
-    marker[entry] = 1
-    name, row = next(
-        (name, int(np.argwhere(part)[0, 0]))
-        for name, part in zip(PARTS, loop.split(marker), strict=True)
-        if part.any()
-    )
-    i = row if name != PARTS[3] else int(cell.coupling.edges[row, 0])
-    return not_finite(cell, t, i, name)
