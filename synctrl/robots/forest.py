@@ -21,7 +21,8 @@ from .robot import Robot
 LARGE = 96
 #: the same where regressors are asked for: they have a block per tree, in a matrix that grows with the square
 SMALL = 24
-_WORLD = pin.Convention.WORLD  # quantities of bodies in world axes, which is the faster way here
+#: quantities of bodies in world axes, which is the faster way here
+_WORLD = pin.Convention.WORLD
 #: p @ _CROSS are the entries of the matrix P with a @ P = a x p
 _CROSS = np.array([[[0, -z, y], [z, 0, -x], [-y, x, 0]] for x, y, z in np.eye(3)]).reshape(3, 9)
 
@@ -99,10 +100,16 @@ class Forest:
         J_dot = self._cut(self._J_dot @ self._to_tip + self._J @ self._to_tip_dot)
         return motion, J.mT, J_dot.mT
 
-    def turns(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rotations of the tips, (n, 3, 3), and their angular Jacobians, where `tips` was asked last."""
+    def poses(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Positions and velocities of tips, (2, n, 3), their rotations, (n, 3, 3), J and J', (n, 6, nv).
+
+        The Jacobians are those of the linear velocity, then of the angular one, in world axes.
+        """
+        motion, J, J_dot = self.tips(q, v)
         R = np.concatenate(self._rotations).reshape(-1, 3, 3)
-        return R, self._cut(self._J[..., 3:]).mT.copy(), self._cut(self._J_dot[..., 3:]).mT.copy()
+        turning, turning_dot = (self._cut(part[..., 3:]).mT for part in (self._J, self._J_dot))
+        twists = np.concatenate((J, turning), axis=1)
+        return motion, R, twists, np.concatenate((J_dot, turning_dot), axis=1)
 
     # -- internals ----------------------------------------------------------------------------------------
 

@@ -80,19 +80,19 @@ class BoundPoseSpace(BoundTipSpace):
 
     def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
         (q, v), (xd, xd_dot, xd_ddot) = motion, desired
-        (position, _), J_p, J_p_dot = self._tips.positions(q, v)
-        R, J_w, J_w_dot = self._tips.rotations()
+        (position, _), R, J_t, J_t_dot = self._tips.poses(q, v)
+        J_w, J_w_dot = J_t[:, 3:], J_t_dot[:, 3:]
         e_o, phi = rotations.log(np.stack((rotations.exp(xd[:, 3:]) @ np.swapaxes(R, 1, 2), R)))
         left = rotations.left_jacobian_inverse(e_o)
         right = np.swapaxes(left, 1, 2)
-        J = np.concatenate((J_p, right @ J_w), axis=1)
+        J = np.concatenate((J_t[:, :3], right @ J_w), axis=1)
         x_dot = np.matvec(J, v)
         wd, wd_dot = xd_dot[:, 3:], xd_ddot[:, 3:]
         turning = np.matvec(left, wd)
         left_dot = rotations.left_jacobian_inverse_dot(e_o, turning - x_dot[:, 3:])
         turning_dot = np.matvec(left_dot, wd) + np.matvec(left, wd_dot)
         J_o_dot = np.swapaxes(left_dot, 1, 2) @ J_w + right @ J_w_dot
-        J_dot = np.concatenate((J_p_dot, J_o_dot), axis=1)
+        J_dot = np.concatenate((J_t_dot[:, :3], J_o_dot), axis=1)
         inversion = self._inverse.invert(J, J_dot, q, v)
         x = np.concatenate((position, phi), axis=1)
         e = np.concatenate((xd[:, :3] - position, e_o), axis=1)

@@ -16,7 +16,6 @@ class Tips:
 
     def __init__(self, robots: Sequence[Robot]):
         self._robots = robots
-        self._shape = len(robots), 3, max(robot.nv for robot in robots)
 
     @cached_property
     def _forests(self) -> list[tuple[slice, Forest]]:
@@ -40,20 +39,29 @@ class Tips:
         """
         if self._only is not None:
             return self._only.tips(q, v)
-        motion, (J, J_dot) = np.empty((2, len(q), 3)), np.zeros((2, *self._shape))
+        n, nv = q.shape
+        motion, (J, J_dot) = np.empty((2, n, 3)), np.zeros((2, n, 3, nv))
         for rows, forest in self._forests:
             k = forest.nv
             motion[:, rows], J[rows, :, :k], J_dot[rows, :, :k] = forest.tips(q[rows, :k], v[rows, :k])
         return motion, J, J_dot
 
-    def rotations(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rotation matrices of the tips, (n, 3, 3), and the same of their angular velocities.
+    def poses(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """The same with rotation matrices, (n, 3, 3), and with Jacobians of linear and angular velocities.
 
-        They belong to the joint positions and velocities that `positions` was asked for last.
+        Args:
+            q, v: joint positions and velocities, (n, nv).
+
+        Returns:
+            (2, n, 3), m and m/s; (n, 3, 3); then (n, 6, nv), twice.
         """
         if self._only is not None:
-            return self._only.turns()
-        R, (J, J_dot) = np.empty((self._shape[0], 3, 3)), np.zeros((2, *self._shape))
+            return self._only.poses(q, v)
+        n, nv = q.shape
+        motion, R, (J, J_dot) = np.empty((2, n, 3)), np.empty((n, 3, 3)), np.zeros((2, n, 6, nv))
         for rows, forest in self._forests:
-            R[rows], J[rows, :, : forest.nv], J_dot[rows, :, : forest.nv] = forest.turns()
-        return R, J, J_dot
+            k = forest.nv
+            motion[:, rows], R[rows], J[rows, :, :k], J_dot[rows, :, :k] = forest.poses(
+                q[rows, :k], v[rows, :k]
+            )
+        return motion, R, J, J_dot
