@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..checks import choice, instance
-from ..robots.regressors import Y, regressors
+from ..robots.regressors import RegressorBlocks, regressors
 from ..tasks.cell import Cell, Reference
 from ..tasks.spaces import Measurement
 from . import law
@@ -31,7 +31,7 @@ class Signals:
     v_ref: np.ndarray
     a_ref: np.ndarray
     s_q: np.ndarray
-    regressor: Y
+    regressor: RegressorBlocks
     tau: np.ndarray
     theta_hat_dot: np.ndarray
 
@@ -91,7 +91,7 @@ class Controller:
             self._command = MovingWeights(cell, self.Lambda, self.beta, self.K_eps, reference_acceleration)
 
     @cached_property
-    def _regressor(self) -> Callable[..., Y]:
+    def _regressor(self) -> Callable[..., RegressorBlocks]:
         """q, v, v_ref and a_ref, (n, nv), -> the regressors."""
         return regressors(self.cell.parameters, [robot.nv for robot in self.cell.robots])
 

@@ -32,28 +32,28 @@ class FoldedCommand:
 
     def __init__(self, law: FoldedWeights, z: np.ndarray):
         self._law, self._z, n = law, z, law.n
-        rows = law.acting.dot(z).reshape(-1, law.m)
+        rows = law.stage_rows.dot(z).reshape(-1, law.m)
         self.xref = rows[:n], rows[n : 2 * n]
         self.force, self.epsilon = rows[2 * n : 3 * n], rows[3 * n :]
 
     @property
     def e_star(self) -> np.ndarray:
-        return self._told("e_star", self._law.n)
+        return self._part("e_star", self._law.n)
 
     @property
     def epsilon_dot(self) -> np.ndarray:
-        return self._told("epsilon_dot", self._law.p)
+        return self._part("epsilon_dot", self._law.p)
 
     @property
     def shares(self) -> np.ndarray:
-        return self._told("shares", 3, self._law.n)
+        return self._part("shares", 3, self._law.n)
 
     @property
     def u(self) -> np.ndarray:
-        return self._told("u", 2, self._law.n)
+        return self._part("u", 2, self._law.n)
 
-    def _told(self, name: str, *shape: int) -> np.ndarray:
-        return self._law.telling(name).dot(self._z).reshape(*shape, self._law.m)
+    def _part(self, name: str, *shape: int) -> np.ndarray:
+        return self._law.rows(name).dot(self._z).reshape(*shape, self._law.m)
 
 
 class FoldedWeights:
@@ -72,11 +72,11 @@ class FoldedWeights:
         return FoldedCommand(self, np.concatenate((task.error.ravel(), task.rates.ravel(), integral.ravel())))
 
     @cached_property
-    def acting(self) -> np.ndarray:
+    def stage_rows(self) -> np.ndarray:
         """The rows of xref, force and epsilon, which every step needs."""
-        return np.concatenate([self.telling(name) for name in ("xref", "force", "epsilon")])
+        return np.concatenate([self.rows(name) for name in ("xref", "force", "epsilon")])
 
-    def telling(self, name: str) -> np.ndarray:
+    def rows(self, name: str) -> np.ndarray:
         """The rows of a part of `Command`."""
         return self._matrices[name]
 

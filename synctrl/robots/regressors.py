@@ -17,7 +17,7 @@ from .parameters import FullParameters, LinearParameters, Parameters
 #: what is linear in the regressor of all inertial parameters, and so can share a forest
 _RIGID = (FullParameters.regressor, LinearParameters.regressor)
 
-Y = Blocks | BlockProduct | Beside | Padded
+RegressorBlocks = Blocks | BlockProduct | Beside | Padded
 """Regressors of all robots, with the products that the law needs."""
 Regressor = Callable[..., Any]
 """q, v, v_ref and a_ref of some robots, (k, nv), -> their regressors."""
@@ -38,7 +38,7 @@ class Group(NamedTuple):
     regressor: Regressor
 
 
-def regressors(parameters: Sequence[Parameters], joints: Sequence[int]) -> Callable[..., Y]:
+def regressors(parameters: Sequence[Parameters], joints: Sequence[int]) -> Callable[..., RegressorBlocks]:
     """A function of q, v, v_ref and a_ref, (n, nv), that gives the regressors of all robots.
 
     Rows and columns of robots with fewer joints or parameters than the largest are padded with zeros.

@@ -53,8 +53,10 @@ def power_of_ten(value: float, _: object = None) -> str:
     """A tick of a logarithmic axis as plain text, 10⁻³, which is drawn much faster than a formula."""
     if value == 0:
         return "0"
-    sign, size = ("−" if value < 0 else ""), f"{abs(value):e}"
-    return f"{sign}10{str(int(size.split('e')[1])).translate(_SUPERSCRIPT)}"
+    mantissa, exponent = f"{abs(value):.6e}".split("e")
+    if float(mantissa) != 1:
+        return f"{value:g}"
+    return f"{'−' if value < 0 else ''}10{str(int(exponent)).translate(_SUPERSCRIPT)}"
 
 
 def _place_labels(panel: Axes, height: float) -> None:

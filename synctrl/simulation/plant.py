@@ -111,6 +111,10 @@ class Plant:
         """v', (n, nv), under joint torques tau, (n, nv), and friction; the plant's own state as at t = 0."""
         return self.move(q, v, tau, self.hidden0)[0].copy()
 
+    def prepare(self) -> Dynamics:
+        """What moves the robots now, made if it was not: a library that refuses one of them says so here."""
+        return self._dynamics
+
     def move(
         self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, hidden: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:

@@ -175,6 +175,7 @@ class Run(NamedTuple):
             CouplingError: a weight loses its inverse on the way.
         """
         cell = self.experiment.cell
+        self.loop.plant.prepare()
         check_reachable(cell, self.clock.logged)
         cell.coupling.check_weights(self.clock.logged, cell.m)
 

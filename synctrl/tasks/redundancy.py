@@ -235,10 +235,8 @@ def inverse_map(
 def inverse(A: np.ndarray) -> np.ndarray:
     """A^-1 row by row; nothing finite where there is none, so that the run's guard can name the robot."""
     if A.shape[-1] == 2:
-        across = A[:, ::-1, ::-1]
-        products = A * across
         with np.errstate(divide="ignore", invalid="ignore"):
-            return _CHECKERED * across.mT / (products[:, 0, :1] - products[:, 0, 1:])[:, None]
+            return _CHECKERED * A[:, ::-1, ::-1].mT / determinant(A)[:, None, None]
     try:
         return np.linalg.inv(A)
     except np.linalg.LinAlgError:
