@@ -15,6 +15,7 @@ from synctrl import (
     Experiment,
     Friction,
     Gains,
+    Hold,
     Member,
     Robot,
     load_robot,
@@ -133,6 +134,14 @@ def test_a_robot_without_a_urdf_is_refused() -> None:
     other = robot.with_parameters(1.1 * robot.inertial_parameters)
     with pytest.raises(InputError, match=r"robot 'a460' has none that describes it"):
         MujocoArm(other)
+
+
+def test_a_robot_that_mujoco_cannot_read_is_refused_before_anything_runs() -> None:
+    other = load_robot("planar2r").with_parameters(load_robot("planar2r").inertial_parameters)
+    cell = Cell([Member(other, Hold(np.zeros(2)))] * 2, Coupling.pair())
+    run = Experiment(cell, Gains(1, 1, 1, 1, 1), 0.1).plan(None, 1e-3, plant="mujoco")
+    with pytest.raises(InputError, match="'planar2r' has none that describes it"):
+        run.check()
 
 
 def test_without_mujoco_the_message_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:

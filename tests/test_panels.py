@@ -109,3 +109,8 @@ def test_a_figure_can_be_saved_again_with_the_same_bytes(disturbed, tmp_path):
     figure = tracking_errors(disturbed)
     first = [path.read_bytes() for path in save(figure, tmp_path / "figure")]
     assert [path.read_bytes() for path in save(figure, tmp_path / "figure")] == first
+
+
+@pytest.mark.parametrize("value", [3e-3, -20.0, 1.5])
+def test_what_is_no_power_of_ten_is_not_shown_as_one(value):
+    assert float(power_of_ten(value)) == value

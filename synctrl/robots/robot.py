@@ -205,10 +205,6 @@ class Robot:
         Y -= _regressor(self._weightless, self._weightless_data, q, v - mean, self._zero)
         return Y if self.nv > 1 else Y.reshape(1, -1)
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """`forward_dynamics` of arrays that are known to fit; scratch memory, valid until the next call."""
-        return pin.aba(self.model, self._data, self._stored(q), v, tau)
-
     # -- kinematics ---------------------------------------------------------------------------------------
 
     def tip_pose(self, q: ArrayLike) -> pin.SE3:

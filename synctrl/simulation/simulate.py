@@ -173,6 +173,7 @@ class Run(NamedTuple):
         Raises:
             UnreachableError: a robot cannot reach its desired positions.
             CouplingError: a weight loses its inverse on the way.
+            MissingDependencyError, InputError: a library cannot compute the plant, or refuses a robot.
         """
         cell = self.experiment.cell
         self.loop.plant.prepare()

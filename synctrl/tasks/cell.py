@@ -16,7 +16,6 @@ from ..robots.parameters import Parameters
 from ..robots.robot import Robot
 from .coupling import Coupling
 from .member_checks import check_friction, check_names, check_parameters, check_space, check_trajectory
-from .rows import joint_rows
 from .spaces import JointSpace, Space
 from .trajectories import Trajectory
 from .weights import Weights
@@ -80,9 +79,6 @@ class Cell:
         space: where the task is given; joint space by default.
         name: for titles.
 
-    Attributes:
-        rows: goes through the rows of an array, (n, ..., nv), each cut to the joints that its robot has.
-
     Raises:
         InputError: sizes that do not fit together; the message names the member.
         CouplingError: a coupling for another number of robots.
@@ -105,7 +101,6 @@ class Cell:
                 f"coupling: made for {coupling.robots} robots, but the cell has {len(self.members)}"
             )
         self.robots = tuple(member.robot for member in self.members)
-        self.rows = joint_rows(self.robots)
         self.names = tuple(m.name or f"robot {i}" for i, m in enumerate(self.members, start=1))
         check_names(name, self.names)
         check_space(self.space)
