@@ -1,5 +1,6 @@
 # make reproduce: the experiments of the paper, out/index.html
 # make test:      all tests
+# make stress:    the long ones
 #
 # Everything is installed into .venv, in the versions of constraints.txt. What was installed is remembered in
 # .venv/.installed-*; only a change of pyproject.toml or constraints.txt installs again.
@@ -12,13 +13,14 @@ export MPLBACKEND := Agg
 # One thread per process: the matrices are small, and the workers use the cores already.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help reproduce test lint clean
+.PHONY: help reproduce test stress lint clean
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 
 help:
 	@echo "make reproduce   run every experiment of the paper and write out/index.html"
 	@echo "make test        run all tests (WORKERS=$(WORKERS) at a time)"
+	@echo "make stress      run the long versions of tests, and print what they found (docs/reliability.md)"
 	@echo "make lint        check style (ruff) and types (mypy)"
 	@echo "make clean       remove out/, built packages and caches; .venv stays"
 	@echo "PYTHON=...       the Python 3.11 or newer that .venv is made with"
@@ -28,6 +30,9 @@ reproduce: $(VENV)/.installed-core
 
 test: $(VENV)/.installed-test
 	@$(PY) -m pytest -q -n $(WORKERS) --dist loadfile
+
+stress: $(VENV)/.installed-test
+	@$(PY) -m pytest -q -n $(WORKERS) -m stress tests/stress
 
 lint: $(VENV)/.installed-dev
 	$(PY) -m ruff check .
