@@ -1,6 +1,7 @@
 """Adaptive synchronized control of multi-robot cells, after Sun and Mills (2002)."""
 
 from .control.controller import Controller
+from .control.discrete import DiscreteController
 from .control.gains import Gains
 from .errors import SynctrlError
 from .robots.base_parameters import BaseParameters
@@ -9,6 +10,7 @@ from .robots.friction_parameters import FrictionParameters
 from .robots.parameters import FullParameters, LinearParameters
 from .robots.robot import Robot, load_robot
 from .simulation.disturbances import Disturbance
+from .simulation.mujoco_model import mujoco_model
 from .simulation.payloads import Payload
 from .simulation.result import Result
 from .simulation.simulate import Experiment, simulate
@@ -33,6 +35,7 @@ __all__ = [
     "Coupling",
     "Cubic",
     "Damping",
+    "DiscreteController",
     "Disturbance",
     "Experiment",
     "ExponentialApproach",
@@ -56,5 +59,6 @@ __all__ = [
     "SynctrlError",
     "inverse_kinematics",
     "load_robot",
+    "mujoco_model",
     "simulate",
 ]

@@ -66,16 +66,26 @@ def require_mujoco() -> Any:
     return mujoco
 
 
-def _model(mujoco: Any, robot: Robot) -> Any:
+def describe_arm(robot: Robot) -> str:
+    """The robot's URDF as MuJoCo gets it.
+
+    Raises:
+        InputError: the robot has none.
+    """
     if robot.document is None:
         raise InputError(
-            f"plant='mujoco' reads a robot's URDF, and robot '{robot.name}' has none that describes it; use "
+            f"MuJoCo reads a robot's URDF, and robot '{robot.name}' has none that describes it; use "
             "load_robot, or plant='pinocchio'"
         )
     text = dynamics_xml(_named(robot.document, "world", "root link"))
     start = text.index(">", text.index("<robot")) + 1
+    return text[:start] + COMPILER + text[start:]
+
+
+def _model(mujoco: Any, robot: Robot) -> Any:
+    text = describe_arm(robot)
     try:
-        return mujoco.MjModel.from_xml_string(text[:start] + COMPILER + text[start:])
+        return mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
         raise InputError(f"MuJoCo refuses the URDF of robot '{robot.name}': {error}") from error
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..checks import boolean, choice, instance, positive_number
 from ..control.controller import Controller
+from ..control.discrete import DiscreteController
 from ..control.gains import Gains
 from ..errors import InputError, SimulationError
 from ..tasks.cell import Cell
@@ -134,6 +135,27 @@ class Experiment:
         if engine == "compiled":
             return run_compiled(run, progress)
         return run_reference(run, progress)
+
+    def controller(
+        self, period: float, *, include_gravity: bool = True, faults: str = "error"
+    ) -> DiscreteController:
+        """This experiment's controller for a loop of one's own, see `DiscreteController`.
+
+        Torque is cut off at the limits of the robots' descriptions if the experiment saturates.
+
+        Args:
+            period: time between two calls of its `step`, s.
+            include_gravity: False for robots that add the torque of gravity by themselves.
+            faults: "error" or "hold".
+
+        Raises:
+            InputError: a period that is not positive, or an unknown word.
+        """
+        loop = self.closed_loop()
+        limits = loop.plant.torque_limits if self.saturate else None
+        return DiscreteController(
+            loop.controller, period, torque_limits=limits, include_gravity=include_gravity, faults=faults
+        )
 
     def plan(
         self, duration: float | None, dt: float, control_period: float | None = None, plant: str = "pinocchio"
