@@ -88,3 +88,11 @@ def spread(name: str, gain: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         expected = " or ".join(str(tuple(shape[k:])) for k in range(len(shape), -1, -1))
         raise InputError(f"{name}: expected a shape of {expected}, found {gain.shape}")
     return np.broadcast_to(gain, shape).copy()
+
+
+def adaptation_gain(Gamma: ArrayLike) -> np.ndarray:
+    """An adaptation rate as an array of finite numbers that are not below 0."""
+    array = finite_array("Gamma", Gamma)
+    if array.size and array.min() < 0:
+        raise InputError(f"Gamma: expected entries of at least 0, found {array.min():g}")
+    return array

@@ -1,0 +1,72 @@
+"""The paper's adaptation: theta_hat' = Gamma Y^T s_q, eq. (14)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...tasks.cell import Cell
+from .. import law
+from ..gains import adaptation_gain, spread
+from .protocol import Seen
+
+
+class Gradient:
+    """theta_hat' = Gamma Y^T s_q, eq. (14), with a diagonal Gamma.
+
+    Its storage is 1/2 tilde^T Gamma^-1 tilde over the entries that are adapted. The error of those that are
+    not (Gamma = 0) is the power "model error", s_q^T Y tilde.
+
+    Args:
+        Gamma: rate, a number, (P,) or (n, P), not below 0; 0 switches the adaptation off.
+
+    Raises:
+        InputError: not numbers, not finite, or below 0.
+    """
+
+    def __init__(self, Gamma: ArrayLike):
+        self.Gamma = adaptation_gain(Gamma)
+
+    def bind(self, cell: Cell) -> BoundGradient:
+        """This adaptation for a cell.
+
+        Raises:
+            InputError: Gamma of another size.
+        """
+        return BoundGradient(cell, spread("Gamma", self.Gamma, cell.theta.shape))
+
+    def as_dict(self) -> dict[str, Any]:
+        return {"name": "Gradient", "Gamma": self.Gamma.tolist()}
+
+
+class BoundGradient:
+    """`Gradient` for the robots of a cell: z is theta_hat itself."""
+
+    def __init__(self, cell: Cell, Gamma: np.ndarray):
+        self.Gamma, self._theta_hat0 = Gamma, cell.theta_hat0
+        self._per_gamma = np.divide(1.0, Gamma, out=np.zeros_like(Gamma), where=Gamma > 0)
+
+    def start(self) -> np.ndarray:
+        return self._theta_hat0.copy()
+
+    def estimate(self, z: np.ndarray) -> np.ndarray:
+        return z
+
+    def rate(self, z: np.ndarray, seen: Seen) -> np.ndarray:
+        return law.adaptation(seen.gradient, self.Gamma)
+
+    def settle(self, z: np.ndarray) -> np.ndarray:
+        return z
+
+    def storage(self, z: np.ndarray, theta: np.ndarray) -> float:
+        return float(0.5 * np.sum(self._per_gamma * (theta - z) ** 2))
+
+    def storage_rate(self, z: np.ndarray, z_dot: np.ndarray, theta: np.ndarray) -> float:
+        return float(-np.sum(self._per_gamma * (theta - z) * z_dot))
+
+    def powers(self, z: np.ndarray, theta: np.ndarray, seen: Seen) -> Mapping[str, float]:
+        frozen = np.where(self.Gamma > 0, 0.0, theta - z)
+        return {"model error": float(np.sum(seen.s_q * seen.regressor.times(frozen)))}

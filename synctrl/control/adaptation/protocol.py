@@ -1,0 +1,86 @@
+"""Adaptation: what a controller believes of its robots' parameters, and how it learns.
+
+The proof needs of it nothing but a storage V_th >= 0 with
+
+    V_th' = -s_q^T Y tilde + named powers,   tilde = theta - theta_hat,
+
+so that V' is what it is with (14), plus the named powers. An adaptation of one's own is a class with a `bind`
+that returns an object with the methods of `BoundAdaptation`; nothing else has to be touched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from ...tasks.cell import Cell
+
+
+@dataclass(slots=True)
+class Seen:
+    """What an adaptation sees at one instant, one row per robot.
+
+    Attributes:
+        q, v: joint positions and velocities, (n, nv).
+        v_ref, a_ref: reference velocity and acceleration, (n, nv).
+        s_q: v_ref - v, (n, nv).
+        gradient: Y^T s_q, (n, P).
+        regressor: Y, with products `times(x)` and `transposed_times(x)`; not in generated code.
+    """
+
+    q: np.ndarray
+    v: np.ndarray
+    v_ref: np.ndarray
+    a_ref: np.ndarray
+    s_q: np.ndarray
+    gradient: np.ndarray
+    regressor: Any
+
+
+class BoundAdaptation(Protocol):
+    """An adaptation for the robots of one cell. Its state z has one row per robot, (n, Z).
+
+    `estimate` and `rate` use plain array arithmetic where they are to be traced for generated code.
+    """
+
+    def start(self) -> np.ndarray:
+        """z at t = 0, (n, Z), which stands for the cell's theta_hat0.
+
+        Raises:
+            InputError: a first estimate that this adaptation cannot start from.
+        """
+
+    def estimate(self, z: np.ndarray) -> np.ndarray:
+        """theta_hat, (n, P)."""
+
+    def rate(self, z: np.ndarray, seen: Seen) -> np.ndarray:
+        """z', (n, Z)."""
+
+    def settle(self, z: np.ndarray) -> np.ndarray:
+        """z after a step, for example projected; usually z itself."""
+
+    def storage(self, z: np.ndarray, theta: np.ndarray) -> float:
+        """V_th for the true theta, (n, P)."""
+
+    def storage_rate(self, z: np.ndarray, z_dot: np.ndarray, theta: np.ndarray) -> float:
+        """d V_th/dt for a given z', by the chain rule."""
+
+    def powers(self, z: np.ndarray, theta: np.ndarray, seen: Seen) -> Mapping[str, float]:
+        """What V_th' has beside -s_q^T Y tilde, by name, N·m/s; always the same names."""
+
+
+class Adaptation(Protocol):
+    """A way to learn, before it knows the cell."""
+
+    def bind(self, cell: Cell) -> BoundAdaptation:
+        """This adaptation for a cell.
+
+        Raises:
+            InputError: gains or parameters that do not fit, named.
+        """
+
+    def as_dict(self) -> dict[str, Any]:
+        """Name and settings as plain data."""

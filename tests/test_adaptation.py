@@ -1,0 +1,163 @@
+"""Adaptations: each has the storage that the proof asks of it, and says what its rate of change is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from machines import rate
+
+from synctrl import load_robot
+from synctrl.control.adaptation import Gradient, Natural, Seen
+from synctrl.errors import InputError
+from synctrl.experiments import a460_pair, planar_four
+from synctrl.robots import pseudo_inertia as pi
+
+SEEDS = st.integers(0, 2**32 - 1)
+CELL = a460_pair().cell
+ADAPTATIONS = {
+    "gradient": Gradient(0.3),
+    "gradient of some entries": Gradient(np.where(np.arange(30) % 3, 0.4, 0.0)),
+    "natural": Natural(0.1),
+}
+
+
+class Products:
+    """A regressor of random numbers."""
+
+    def __init__(self, Y: np.ndarray):
+        self.Y = Y
+
+    def times(self, x: np.ndarray) -> np.ndarray:
+        return np.matvec(self.Y, x)
+
+
+def seen(rng: np.random.Generator) -> Seen:
+    """Random signals with a gradient that belongs to them."""
+    q, v, v_ref, a_ref, s_q = rng.standard_normal((5, 2, 3))
+    Y = rng.standard_normal((2, 3, 30))
+    return Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Products(Y))
+
+
+def some_state(bound, rng: np.random.Generator) -> np.ndarray:
+    z = bound.start()
+    return z + 0.1 * rng.standard_normal(z.shape) * np.abs(z)
+
+
+# -- pseudo-inertia ---------------------------------------------------------------------------------------
+
+
+@given(SEEDS)
+def test_inertial_parameters_and_pseudo_inertia_are_each_others_inverse(seed):
+    theta, g = np.random.default_rng(seed).standard_normal((2, 3, 10))
+    P = pi.pseudo_inertia(theta)
+    np.testing.assert_allclose(pi.inertial_parameters(P), theta, atol=1e-13)
+    np.testing.assert_allclose(np.trace(pi.dual(g) @ P, axis1=-2, axis2=-1), (g * theta).sum(-1), atol=1e-12)
+
+
+@given(SEEDS)
+def test_pseudo_inertia_is_the_second_moment_of_the_mass(seed):
+    """Of point masses at homogeneous places (r, 1) it is sum m (r, 1)(r, 1)^T."""
+    rng = np.random.default_rng(seed)
+    mass, places = rng.uniform(0.1, 2, 6), rng.standard_normal((6, 3))
+    homogeneous = np.column_stack((places, np.ones(6)))
+    inertia = sum(m * (r @ r * np.eye(3) - np.outer(r, r)) for m, r in zip(mass, places, strict=True))
+    order = [inertia[i, j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))]
+    theta = np.array([mass.sum(), *(mass @ places), *order])
+    np.testing.assert_allclose(pi.pseudo_inertia(theta), (homogeneous.T * mass) @ homogeneous, atol=1e-12)
+
+
+def test_bodies_of_real_robots_lie_inside_the_cone():
+    for name in ("planar2r", "a460", "ur5", "panda"):
+        assert (pi.smallest_eigenvalues(load_robot(name).inertial_parameters) > 0).all()
+
+
+# -- what the proof asks ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ADAPTATIONS)
+@given(seed=SEEDS)
+def test_the_storage_changes_by_minus_s_y_tilde_and_the_named_powers(name, seed):
+    rng = np.random.default_rng(seed)
+    bound, now, theta = ADAPTATIONS[name].bind(CELL), seen(rng), CELL.theta
+    z = some_state(bound, rng)
+    model = float(np.sum(now.gradient * (theta - bound.estimate(z))))
+    expected = -model + sum(bound.powers(z, theta, now).values())
+    found = bound.storage_rate(z, bound.rate(z, now), theta)
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-9 * np.abs(now.gradient).max())
+
+
+@pytest.mark.parametrize("name", ADAPTATIONS)
+@given(seed=SEEDS)
+def test_the_rate_of_the_storage_is_its_derivative(name, seed):
+    rng = np.random.default_rng(seed)
+    bound, theta = ADAPTATIONS[name].bind(CELL), CELL.theta
+    z = some_state(bound, rng)
+    z_dot = 0.1 * rng.standard_normal(z.shape) * np.abs(z)
+    by_differences = rate(lambda s: np.array(bound.storage(z + s * z_dot, theta)))
+    assert bound.storage_rate(z, z_dot, theta) == pytest.approx(float(by_differences), rel=1e-6, abs=1e-8)
+
+
+@pytest.mark.parametrize("name", ADAPTATIONS)
+def test_the_storage_is_zero_at_the_truth_and_positive_elsewhere(name):
+    knowing = replace_estimates(1.0)
+    bound = ADAPTATIONS[name].bind(knowing)
+    truth = bound.start()
+    np.testing.assert_allclose(bound.estimate(truth), CELL.theta, atol=1e-12)
+    assert bound.storage(truth, CELL.theta) == pytest.approx(0.0, abs=1e-9)
+    rng = np.random.default_rng(3)
+    assert all(bound.storage(some_state(bound, rng), CELL.theta) > 0 for _ in range(20))
+
+
+def replace_estimates(share: float):
+    """The A460 cell with another first estimate."""
+    from synctrl import Cell
+
+    members = [replace(m, theta_hat0=share * m.robot.inertial_parameters) for m in CELL.members]
+    return Cell(members, CELL.coupling, CELL.space, CELL.name)
+
+
+# -- natural adaptation -----------------------------------------------------------------------------------
+
+
+@given(seed=SEEDS, step=st.floats(1e-6, 1e3))
+def test_natural_estimates_stay_in_the_cone_whatever_the_step(seed, step):
+    rng = np.random.default_rng(seed)
+    bound = Natural(0.1).bind(CELL)
+    z = bound.start()
+    z = z + np.clip(step * bound.rate(z, seen(rng)), -20, 20)
+    eigenvalues = np.linalg.eigvalsh(pi.pseudo_inertia(bound.estimate(z).reshape(2, 3, 10)))
+    assert (eigenvalues[..., 0] >= -1e-13 * eigenvalues[..., -1]).all()
+
+
+@given(SEEDS)
+def test_natural_adaptation_does_not_depend_on_the_unit_of_length(seed):
+    """P in other units is A P A with A = diag(k, k, k, 1); then P_hat' is that of the first units as well."""
+    rng = np.random.default_rng(seed)
+    A = np.diag([1e3, 1e3, 1e3, 1.0])
+    P = pi.pseudo_inertia(CELL.theta[0].reshape(3, 10))
+    g = rng.standard_normal((3, 10))
+    B = pi.dual(g)
+    P_mm, B_mm = A @ P @ A, np.linalg.inv(A) @ B @ np.linalg.inv(A)
+    np.testing.assert_allclose(
+        np.linalg.inv(A) @ (P_mm @ B_mm @ P_mm) @ np.linalg.inv(A), P @ B @ P, rtol=1e-9
+    )
+
+
+def test_natural_refuses_what_has_no_bodies_by_name():
+    with pytest.raises(InputError, match="LinearParameters"):
+        Natural(0.1).bind(planar_four().cell)
+
+
+def test_natural_refuses_a_first_estimate_that_no_body_can_have():
+    with pytest.raises(InputError, match="body 1"):
+        Natural(0.1).bind(replace_estimates(0.0)).start()
+
+
+@pytest.mark.parametrize("wrong", [0.0, -1.0, np.nan, "fast"])
+def test_natural_refuses_rates_that_are_not_positive(wrong):
+    with pytest.raises(InputError, match="gamma"):
+        Natural(wrong)
