@@ -44,26 +44,36 @@ def blocks(program: Program, clock: Clock) -> Iterator[Block]:
         yield Block(first, last, *_tables(cell, np.array([starts, middles, ends])))
 
 
+class Kept(NamedTuple):
+    """The blocks of a run, and what they were made for: motions and weights, and instants."""
+
+    made_for: tuple[Any, ...]
+    times: np.ndarray
+    blocks: list[Block]
+
+
 class Tables:
-    """What is desired in a run that fits into one block, kept for the next run with the same motions."""
+    """What is desired in a run that fits into one block, kept for the next run with the same motions.
+
+    What is kept is looked up and replaced as a whole, so threads may share it.
+    """
 
     def __init__(self) -> None:
-        self._made_for: tuple[Any, ...] = ()
-        self._times = np.zeros(0)
-        self._blocks: list[Block] = []
+        self._kept = Kept((), np.zeros(0), [])
 
     def blocks(self, program: Program, clock: Clock) -> Iterable[Block]:
         """The steps of a run, made anew if the run before had other motions, weights or instants."""
-        cell = program.loop.cell
+        cell, kept = program.loop.cell, self._kept
         wanted = (cell.coupling, *(member.trajectory for member in cell.members))
-        same = len(wanted) == len(self._made_for) and all(map(operator.is_, wanted, self._made_for))
-        if not (same and np.array_equal(self._times, clock.times)):
-            fresh = blocks(program, clock)
-            first = next(fresh)
-            if first.last < len(clock.times) - 1:
-                return chain([first], fresh)
-            self._made_for, self._times, self._blocks = wanted, clock.times, [first]
-        return self._blocks
+        same = len(wanted) == len(kept.made_for) and all(map(operator.is_, wanted, kept.made_for))
+        if same and np.array_equal(kept.times, clock.times):
+            return kept.blocks
+        fresh = blocks(program, clock)
+        first = next(fresh)
+        if first.last < len(clock.times) - 1:
+            return chain([first], fresh)
+        self._kept = Kept(wanted, clock.times, [first])
+        return [first]
 
 
 def advance(
