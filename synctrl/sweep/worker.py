@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -132,13 +131,13 @@ class Runner:
 
 def run_batch(payload: bytes, tasks: Sequence[Task]) -> list[Outcome]:
     """Make some runs of a pickled job; what a worker process is asked to do."""
-    runner = _runner(payload, threading.get_ident())
+    runner = _runner(payload)
     return [runner.outcome(task) for task in tasks]
 
 
 @lru_cache(maxsize=8)
-def _runner(payload: bytes, thread: int) -> Runner:
-    """The runner of a job, made once per thread: robots must not be shared between threads."""
+def _runner(payload: bytes) -> Runner:
+    """The runner of a job, which the threads of a process share."""
     import pickle
 
     return Runner(pickle.loads(payload))
