@@ -54,7 +54,7 @@ class Recorder:
         seen = (arrays[name] for name in ("t", "q", "v", "tau"))
         described["limits"] = limit_report(self._loop.cell, *seen)
         described.update(self._loop.plant.report(self._hidden[: self.count]))
-        return Result(**arrays, info=described, experiment=experiment)
+        return Result(**arrays, info=described, outputs={}, experiment=experiment)
 
 
 class SampleRecorder(Recorder):
