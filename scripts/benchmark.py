@@ -34,7 +34,7 @@ from synctrl.errors import SimulationError
 from synctrl.experiments import (
     a460_pair, mixed_four, mobile_robot, panda_four, planar_four, rigid_object, ur5_payload,
 )  # fmt: skip
-from synctrl.simulation.simulate import run_compiled, run_reference
+from synctrl.simulation.run import run_compiled, run_reference
 
 DT = 1e-3
 MOST_STEPS = 10_000

@@ -12,7 +12,13 @@ from typing import Any
 
 
 class SynctrlError(Exception):
-    """Base of all errors raised by synctrl."""
+    """Base of all errors raised by synctrl.
+
+    Attributes:
+        result: a `Result` with what a run had computed until then; None if the error did not stop a run.
+    """
+
+    result: Any = None
 
 
 class InputError(SynctrlError, ValueError):
@@ -101,6 +107,23 @@ class OrientationError(SimulationError):
     """An orientation error close to half a turn, where its direction is not defined."""
 
 
+class RunInterrupted(KeyboardInterrupt):
+    """A run that was interrupted, for example by Ctrl-C.
+
+    Attributes:
+        result: a `Result` with everything computed until then.
+        time: simulated time of the last instant reached, s.
+    """
+
+    def __init__(self, message: str, *, time: float | None = None, result: Any = None):
+        self.time, self.result = time, result
+        super().__init__(message)
+
+
+class SaturationWarning(UserWarning):
+    """Torque was cut off at its limits, while the controller adapted and integrated as if it were not."""
+
+
 class ResultError(SynctrlError):
     """A result file that is missing, damaged, or of another kind."""
 
@@ -115,6 +138,20 @@ class CompilationError(SynctrlError):
 
 class MissingDependencyError(SynctrlError, ImportError):
     """An optional package is needed for what was asked."""
+
+
+def failed(what: str, t: float, error: Exception, robot: int | None = None) -> SimulationError:
+    """The error of a run in which a function of the user's raised an exception.
+
+    Args:
+        what: whose function it is, for example "the desired motion of robot 2".
+        t: simulated time, s.
+        error: what it raised.
+        robot: index of the robot concerned, counted from 0, or None.
+    """
+    return SimulationError(
+        f"{what} failed at t = {t:g} s with {type(error).__name__}: {error}", time=t, robot=robot
+    )
 
 
 def near(name: str, known: Iterable[str]) -> str:

@@ -15,7 +15,9 @@ import numpy as np
 from ..checks import instance
 from ..errors import InputError, ResultError
 
-FORMAT = "synctrl result 1"
+FORMAT = "synctrl result 2"
+#: what is read; files of format 1 have no outputs
+FORMATS = ("synctrl result 1", FORMAT)
 
 #: array -> (dimensions, unit); "task" stands for the unit of the task, "weighted" for that of c e
 LAYOUT: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
@@ -35,6 +37,9 @@ LAYOUT: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
         "theta_hat": (("time", "robot", "parameter"), "SI"),
     }
 )
+
+#: what the names of outputs begin with in a file
+OUTPUTS = "outputs/"
 
 
 def unit_of(array: str, task: str, weighted: str) -> str:
@@ -59,7 +64,12 @@ class Result:
         disturbance: torque from outside, (T, n, nv), N·m.
         theta_hat: estimates, (T, n, P).
         info: what the arrays mean and how they came about: names, units, gains, options, versions, `status`.
+        outputs: further arrays by name, each with time as its first axis; `info["outputs"][name]` has the
+            "unit" of each and the names of its "axes".
         experiment: the closed loop that made it, while in memory; not saved and not compared.
+
+    Raises:
+        InputError: an output without a description, or of another number of instants.
 
     Rows of robots with fewer joints or parameters than the largest are padded with zeros;
     `info["robots"]` has their numbers.
@@ -79,12 +89,20 @@ class Result:
     disturbance: np.ndarray
     theta_hat: np.ndarray
     info: Mapping[str, Any]
+    outputs: Mapping[str, np.ndarray] = field(default_factory=dict)
     experiment: Any = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        for name in LAYOUT:
-            getattr(self, name).flags.writeable = False
         object.__setattr__(self, "info", MappingProxyType(dict(self.info)))
+        object.__setattr__(self, "outputs", MappingProxyType(dict(self.outputs)))
+        _check_described(self)
+        for array in self._arrays().values():
+            array.flags.writeable = False
+
+    def _arrays(self) -> dict[str, Any]:
+        """All arrays, outputs included, under the names they have in a file."""
+        outputs = {f"{OUTPUTS}{name}": array for name, array in self.outputs.items()}
+        return {**{name: getattr(self, name) for name in LAYOUT}, **outputs}
 
     @property
     def status(self) -> str:
@@ -97,7 +115,9 @@ class Result:
         return [robot["name"] for robot in self.info["robots"]]
 
     def unit(self, array: str) -> str:
-        """Unit of one of the arrays."""
+        """Unit of one of the arrays, or of the outputs."""
+        if array in self.outputs:
+            return str(self.info["outputs"][array]["unit"])
         return unit_of(array, self.info["task_unit"], self.info["weighted_unit"])
 
     def decimated(self, every: int) -> Self:
@@ -112,7 +132,9 @@ class Result:
         last = max(len(self.t) - 1, 0)
         kept = np.union1d(np.arange(0, last, every), [last] if len(self.t) else []).astype(int)
         arrays = {name: getattr(self, name)[kept] for name in LAYOUT}
-        return type(self)(**arrays, info={**self.info, "decimated": int(every)}, experiment=self.experiment)
+        outputs = {name: array[kept] for name, array in self.outputs.items()}
+        info = {**self.info, "decimated": int(every)}
+        return type(self)(**arrays, info=info, outputs=outputs, experiment=self.experiment)
 
     def save(self, path: str | Path) -> Path:
         """Write everything to an .npz file; it appears under its name only once it is complete.
@@ -124,7 +146,7 @@ class Result:
         path = Path(path)
         if path.is_dir():
             raise ResultError(f"cannot write the result to '{path}': it is a folder")
-        content = {name: getattr(self, name) for name in LAYOUT}
+        content = self._arrays()
         info = json.dumps({"format": FORMAT, **self.info}, ensure_ascii=False)
         partial = path.with_name(path.name + ".part")
         try:
@@ -153,15 +175,22 @@ class Result:
             raise ResultError(f"'{path}' is no complete result file of synctrl: {error}") from error
         _check_content(path, info, arrays)
         info.pop("format")
-        return cls(**arrays, info=info)
+        outputs = {name.removeprefix(OUTPUTS): arrays.pop(name) for name in [*arrays] if name not in LAYOUT}
+        try:
+            return cls(**arrays, info=info, outputs=outputs)
+        except InputError as error:
+            raise ResultError(f"'{path}': {error}") from None
 
     def __eq__(self, other: object) -> bool:
         """Same arrays, bit for bit, and same info."""
         if not isinstance(other, Result):
             return NotImplemented
+        ours, theirs = self._arrays(), other._arrays()
         same_info = json.dumps(dict(self.info)) == json.dumps(dict(other.info))
-        return same_info and all(
-            np.array_equal(getattr(self, name), getattr(other, name), equal_nan=True) for name in LAYOUT
+        return (
+            same_info
+            and ours.keys() == theirs.keys()
+            and all(np.array_equal(ours[name], theirs[name], equal_nan=True) for name in ours)
         )
 
     __hash__ = None  # type: ignore[assignment]
@@ -169,6 +198,21 @@ class Result:
     def __repr__(self) -> str:
         n, m = self.x.shape[1:]
         return f"Result({self.info['title']!r}, {n} robots, {m} axes, {len(self.t)} instants, {self.status})"
+
+
+def _check_described(result: Result) -> None:
+    described = result.info.get("outputs", {})
+    for name, array in result.outputs.items():
+        about = described.get(name)
+        if not isinstance(about, Mapping) or not {"unit", "axes"} <= about.keys():
+            raise InputError(
+                f"outputs, {name}: expected its unit and axes in info['outputs'], found {about!r}"
+            )
+        if len(array) != len(result.t) or array.ndim != len(about["axes"]) or about["axes"][0] != "time":
+            raise InputError(
+                f"outputs, {name}: expected the axes {about['axes']} with {len(result.t)} instants, found an "
+                f"array of shape {array.shape}"
+            )
 
 
 #: what reading a file that is no archive, or a damaged one, may raise
@@ -181,11 +225,12 @@ def _read(path: Path) -> tuple[Any, dict[str, np.ndarray]]:
         if any(entry.compress_type != zipfile.ZIP_STORED for entry in archive.infolist()):
             raise ValueError("expected uncompressed entries")
     with np.load(path, allow_pickle=False) as content:
-        return json.loads(str(content["info"])), {name: content[name] for name in LAYOUT}
+        outputs = [name for name in content.files if name.startswith(OUTPUTS)]
+        return json.loads(str(content["info"])), {name: content[name] for name in (*LAYOUT, *outputs)}
 
 
 def _check_content(path: Path, info: Any, arrays: dict[str, np.ndarray]) -> None:
-    if not isinstance(info, dict) or info.get("format") != FORMAT:
+    if not isinstance(info, dict) or info.get("format") not in FORMATS:
         found = info.get("format") if isinstance(info, dict) else type(info).__name__
         raise ResultError(f"'{path}': expected the format '{FORMAT}', found {found!r}")
     for name in ("status", "title", "task_unit", "weighted_unit"):

@@ -126,7 +126,8 @@ class Runner:
         if self.job.keep_every is None or result is None:
             return None
         thin = result.decimated(self.job.keep_every)
-        return {name: getattr(thin, name) for name in LAYOUT}, {**thin.info, "run": task.run}
+        arrays = {name: getattr(thin, name) for name in LAYOUT}
+        return {**arrays, "outputs": dict(thin.outputs)}, {**thin.info, "run": task.run}
 
 
 def run_batch(payload: bytes, tasks: Sequence[Task]) -> list[Outcome]:
