@@ -207,17 +207,6 @@ def _needs_rk4(integrator: str, engine: str, control_period: float | None) -> No
         raise InputError(f"control_period: sampled control needs the integrator 'rk4', found {integrator!r}")
 
 
-def _needs_plain_plant(plant: Plant) -> None:
-    special = {
-        f"plant='{plant.physics}'": plant.physics != "pinocchio",
-        "saturation": plant.saturate,
-        "payloads": bool(plant.payloads),
-        type(plant).__name__: type(plant) is not Plant,
-    }
-    for name in (name for name, found in special.items() if found):
-        raise InputError(f"engine='compiled' does not have {name}; use engine='pinocchio'")
-
-
 def _collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> Result:
     """Log samples one by one."""
     recorder, guard = SampleRecorder(run.loop, len(run.clock.logged)), Guard(run.loop)
@@ -249,7 +238,6 @@ def run_compiled(
     from .compiled.engine import advance
     from .compiled.program import Program
 
-    _needs_plain_plant(run.loop.plant)
     run.info["engine"] = "compiled"
     recorder, program = Recorder(run.loop, len(run.clock.logged)), Program(run.loop, libraries)
     return _finish(
