@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from copy import deepcopy
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
@@ -38,6 +39,7 @@ LAYOUT: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
     }
 )
 
+R = TypeVar("R", bound="Result")
 #: what the names of outputs begin with in a file
 OUTPUTS = "outputs/"
 
@@ -66,7 +68,8 @@ class Result:
         info: what the arrays mean and how they came about: names, units, gains, options, versions, `status`.
         outputs: further arrays by name, each with time as its first axis; `info["outputs"][name]` has the
             "unit" of each and the names of its "axes".
-        experiment: the closed loop that made it, while in memory; not saved and not compared.
+        experiment: the closed loop that made it, while it stays in one process: copies share it, but it is
+            neither compared, nor saved, nor pickled, for it may hold functions that cannot be.
 
     Raises:
         InputError: an output without a description, or of another number of instants.
@@ -103,6 +106,22 @@ class Result:
         """All arrays, outputs included, under the names they have in a file."""
         outputs = {f"{OUTPUTS}{name}": array for name, array in self.outputs.items()}
         return {**{name: getattr(self, name) for name in LAYOUT}, **outputs}
+
+    def __reduce__(self) -> tuple:
+        return _remade, (type(self), {**self._contents(), "experiment": None})
+
+    def __copy__(self) -> Self:
+        return _remade(type(self), self._contents())
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        contents = self._contents()
+        shared = {"experiment": contents.pop("experiment")}
+        return _remade(type(self), {**deepcopy(contents, memo), **shared})
+
+    def _contents(self) -> dict[str, Any]:
+        """All fields, mappings as plain dictionaries."""
+        contents = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {**contents, "info": dict(self.info), "outputs": dict(self.outputs)}
 
     @property
     def status(self) -> str:
@@ -198,6 +217,10 @@ class Result:
     def __repr__(self) -> str:
         n, m = self.x.shape[1:]
         return f"Result({self.info['title']!r}, {n} robots, {m} axes, {len(self.t)} instants, {self.status})"
+
+
+def _remade(kind: type[R], contents: dict[str, Any]) -> R:
+    return kind(**contents)
 
 
 def _check_described(result: Result) -> None:
