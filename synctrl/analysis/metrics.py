@@ -16,6 +16,7 @@ import numpy as np
 
 from ..checks import instance, non_negative_number
 from ..errors import InputError, ResultError
+from ..files import write_whole
 from ..simulation.result import Result
 
 FORMAT = "synctrl metrics 1"
@@ -197,8 +198,7 @@ def write_metrics(path: str | Path, runs: Mapping[str, Mapping], claims: list[Ma
         raise InputError(f"metrics: expected finite numbers only ({error})") from error
     path = Path(path)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text + "\n", encoding="utf-8")
+        write_whole(path, text + "\n")
     except OSError as error:
         raise ResultError(f"cannot write the metrics to '{path}': {error.strerror or error}") from error
     return path

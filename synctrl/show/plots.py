@@ -15,6 +15,7 @@ import numpy as np
 
 from ..analysis.metrics import row_names
 from ..errors import InputError, ResultError
+from ..files import whole_file
 from ..simulation.result import Result
 from .panels import DPI, GAP, LEGEND, TITLE, WIDTH, stacked_panels
 from .style import ACCENT, DESIRED, display, line_style, robot_color
@@ -91,14 +92,13 @@ def save(figure: Figure, stem: str | Path) -> tuple[Path, Path]:
 
     png, svg = Path(f"{stem}.png"), Path(f"{stem}.svg")
     try:
-        png.parent.mkdir(parents=True, exist_ok=True)
-        with style():
+        with style(), whole_file(svg) as vectors, whole_file(png) as pixels:
             if engine := figure.get_layout_engine():
                 engine.execute(figure)
                 figure.set_layout_engine("none")  # it is arranged now, for both files
             # savefig would draw once more for each file, only to arrange again
-            FigureCanvasSVG(figure).print_svg(svg, metadata={"Date": None, "Creator": None})
-            FigureCanvasAgg(figure).print_png(png, metadata={"Software": None}, pil_kwargs=_PNG)
+            FigureCanvasSVG(figure).print_svg(vectors, metadata={"Date": None, "Creator": None})
+            FigureCanvasAgg(figure).print_png(pixels, metadata={"Software": None}, pil_kwargs=_PNG)
     except OSError as error:
         raise ResultError(f"cannot write the figure '{stem}': {error.strerror or error}") from error
     return png, svg

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..checks import instance
 from ..errors import InputError, ResultError
+from ..files import whole_file
 
 FORMAT = "synctrl result 2"
 #: what is read; files of format 1 have no outputs
@@ -163,16 +164,11 @@ class Result:
         """
         instance("path", path, (str, Path), "a path")
         path = Path(path)
-        if path.is_dir():
-            raise ResultError(f"cannot write the result to '{path}': it is a folder")
         content = self._arrays()
         info = json.dumps({"format": FORMAT, **self.info}, ensure_ascii=False)
-        partial = path.with_name(path.name + ".part")
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with partial.open("wb") as file:
+            with whole_file(path) as file:
                 np.savez(file, info=np.array(info), **content)
-            partial.replace(path)
         except (OSError, ValueError) as error:
             raise ResultError(f"cannot write the result to '{path}': {error}") from error
         return path
