@@ -79,7 +79,8 @@ def metrics(result: Result, bands: Mapping[str, float] | None = None) -> Metrics
     Raises:
         InputError: no instants, or a band that is negative or not finite.
     """
-    bands = settling_bands(result) if bands is None else bands
+    own = settling_bands(result)
+    bands = own if bands is None else bands
     tracking, sync = (error_metrics(result.t, getattr(result, kind), bands[kind]) for kind in ERRORS)
     return Metrics(tracking, sync, np.abs(result.tau).max(axis=0))
 
@@ -130,6 +131,7 @@ def settling_bands(*results: Result, fraction: float = SETTLING_FRACTION) -> dic
 
 def row_names(result: Result, kind: str) -> list[str]:
     """Names of the rows of `tracking_error` (robots) or `sync_error` (pairs of robots)."""
+    instance("result", result, Result, "a Result")
     if kind == "tracking_error":
         return result.names
     return [
@@ -142,6 +144,7 @@ def as_data(result: Result, computed: Metrics) -> dict[str, Any]:
 
     `["sync_error"]["values"][row][axis]["rms"]` is one of them; a settling time that is not reached is None.
     """
+    instance("result", result, Result, "a Result")
     info = result.info
     data: dict[str, Any] = {"title": info["title"], "status": result.status, "duration": float(result.t[-1])}
     data["duration_unit"] = "s"
