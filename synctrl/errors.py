@@ -11,8 +11,25 @@ from difflib import get_close_matches
 from typing import Any
 
 
-class SynctrlError(Exception):
-    """Base of all errors raised by synctrl."""
+class Portable(BaseException):
+    """An exception that can be copied and sent to another process, with its message and all its attributes.
+
+    Python makes an exception again by calling its class with its message, which fails where the class asks
+    for more than that. Here it is put together from its parts instead. `__cause__` stays behind.
+    """
+
+    def __reduce__(self) -> tuple:
+        return _remade, (type(self), self.args), *super().__reduce__()[2:]
+
+
+class SynctrlError(Portable, Exception):
+    """Base of all errors raised by synctrl.
+
+    Attributes:
+        result: a `Result` with what a run had computed until then; None if the error did not stop a run.
+    """
+
+    result: Any = None
 
 
 class InputError(SynctrlError, ValueError):
@@ -42,10 +59,6 @@ class FrameNotFound(RobotError):
             f"robot '{robot}' has no frame '{frame}'{near(frame, self.available)}; "
             f"its frames are: {', '.join(self.available)}"
         )
-
-    def __reduce__(self) -> tuple:
-        """Other processes make it from its parts, not from its message."""
-        return type(self), (self.robot, self.frame, self.available)
 
 
 class CouplingError(SynctrlError):
@@ -101,6 +114,23 @@ class OrientationError(SimulationError):
     """An orientation error close to half a turn, where its direction is not defined."""
 
 
+class RunInterrupted(Portable, KeyboardInterrupt):
+    """A run that was interrupted, for example by Ctrl-C.
+
+    Attributes:
+        result: a `Result` with everything computed until then.
+        time: simulated time of the last instant reached, s.
+    """
+
+    def __init__(self, message: str, *, time: float | None = None, result: Any = None):
+        self.time, self.result = time, result
+        super().__init__(message)
+
+
+class SaturationWarning(UserWarning):
+    """Torque was cut off at its limits, while the controller adapted and integrated as if it were not."""
+
+
 class ResultError(SynctrlError):
     """A result file that is missing, damaged, or of another kind."""
 
@@ -115,6 +145,28 @@ class CompilationError(SynctrlError):
 
 class MissingDependencyError(SynctrlError, ImportError):
     """An optional package is needed for what was asked."""
+
+
+def failed(what: str, t: float, error: Exception, robot: int | None = None) -> SimulationError:
+    """The error of a run in which a function of the user's raised an exception.
+
+    Args:
+        what: whose function it is, for example "the desired motion of robot 2".
+        t: simulated time, s.
+        error: what it raised.
+        robot: index of the robot concerned, counted from 0, or None.
+    """
+    return SimulationError(
+        f"{what} failed at t = {t:g} s with {type(error).__name__}: {error}", time=t, robot=robot
+    )
+
+
+def _remade(kind: type[BaseException], args: tuple) -> BaseException:
+    """An exception of a kind that is told its message only; its attributes are set afterwards."""
+    error = kind.__new__(kind, *args)
+    builtin = next(base for base in kind.__mro__ if base.__module__ == "builtins")
+    builtin.__init__(error, *args)  # type: ignore[misc]
+    return error
 
 
 def near(name: str, known: Iterable[str]) -> str:

@@ -28,4 +28,7 @@ def test_a_run_is_that_of_version_0_1(name, engine, frozen):
     for array in LAYOUT:
         expected = frozen[f"{name}/{array}"]
         scale = np.abs(expected).max() + 1e-12
+        if array == "tau" and "control_period" in run.options:
+            # version 0.1 ended with the torque of the sample before, although a new one is due at the end
+            expected, found[array] = expected[:-1], found[array][:-1]
         assert np.abs(found[array] - expected).max() <= AGREEMENT[engine] * scale, array

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -145,6 +146,52 @@ def test_places_where_nothing_can_be_written_are_named(result, tmp_path):
     with pytest.raises(SynctrlError):
         result.save(None)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file"]
+
+
+# -- outputs ----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def with_output(result):
+    """The result with one more array over time."""
+    torque = np.arange(result.tau.size, dtype=float).reshape(result.tau.shape)
+    about = {"applied_torque": {"unit": "N·m", "axes": ["time", "robot", "joint"]}}
+    info = {**result.info, "outputs": about}
+    return replace(result, outputs={"applied_torque": torque}, info=info)
+
+
+def test_outputs_have_units_are_frozen_and_survive_the_disk(result, with_output, tmp_path):
+    assert with_output.unit("applied_torque") == "N·m"
+    loaded = Result.load(with_output.save(tmp_path / "run.npz"))
+    assert loaded == with_output and loaded != result
+    np.testing.assert_array_equal(loaded.outputs["applied_torque"], with_output.outputs["applied_torque"])
+    with pytest.raises(ValueError, match="read-only"):
+        loaded.outputs["applied_torque"][0] = 1.0
+    with pytest.raises(TypeError):
+        loaded.outputs["more"] = np.zeros(21)
+
+
+def test_results_with_another_output_differ(with_output):
+    changed = {"applied_torque": with_output.outputs["applied_torque"] + 1.0}
+    assert replace(with_output, outputs=changed) != with_output
+    without = {key: entry for key, entry in with_output.info.items() if key != "outputs"}
+    assert replace(with_output, outputs={}, info=without) != with_output
+
+
+def test_outputs_are_thinned_with_the_other_arrays(with_output):
+    thin = with_output.decimated(5)
+    np.testing.assert_array_equal(
+        thin.outputs["applied_torque"], with_output.outputs["applied_torque"][[0, 5, 10, 15, 20]]
+    )
+    assert len(thin.t) == 5
+
+
+@pytest.mark.parametrize(
+    "outputs", [{"unknown": np.zeros(21)}, {"applied_torque": np.zeros((20, 2, 2))}], ids=["name", "instants"]
+)
+def test_outputs_that_do_not_fit_their_description_are_refused(with_output, outputs):
+    with pytest.raises(InputError, match="outputs"):
+        replace(with_output, outputs=outputs)
 
 
 # -- damaged and hostile files ----------------------------------------------------------------------------

@@ -1,34 +1,138 @@
-"""When to evaluate: the grid of logged instants, and the smooth intervals between jumps."""
+"""When to evaluate: the grid of a run, its logged instants, and the smooth intervals between jumps.
+
+A run of hours has millions of instants, so nothing here holds them all: they are made stretch by stretch.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ..checks import positive_number
 from ..errors import InputError
 
-MAX_STEPS = 10_000_000
+MAX_STEPS = 100_000_000
+
+
+class Stretch(NamedTuple):
+    """Some consecutive steps of a run.
+
+    Attributes:
+        first: index of the first step.
+        times: where the steps begin, and the last one ends, (k + 1,), s.
+        checked: whether a step begins at a multiple of dt, where runs are watched and samples fall, (k,).
+        logged: whether it begins at an instant that is logged, (k,).
+        number: which multiple of dt it begins at or after, (k,).
+    """
+
+    first: int
+    times: np.ndarray
+    checked: np.ndarray
+    logged: np.ndarray
+    number: np.ndarray
+
+    @property
+    def starts(self) -> np.ndarray:
+        """Where the steps begin, (k,), s."""
+        return self.times[:-1]
+
+    @property
+    def middles(self) -> np.ndarray:
+        """Halfway through the steps, (k,), s."""
+        return 0.5 * (self.times[:-1] + self.times[1:])
+
+    @property
+    def stages(self) -> np.ndarray:
+        """Where a step needs what is desired: its start, its middle, and just before its end, (3, k)."""
+        return np.array([self.starts, self.middles, np.nextafter(self.times[1:], -np.inf)])
 
 
 @dataclass(frozen=True)
 class Clock:
-    """Instants of a run.
+    """Instants of a run: multiples of dt, its end, and every jump in between.
+
+    Two clocks are equal if their steps are.
 
     Attributes:
-        logged: instants to log, (T,), s: multiples of dt, and the end.
-        times: the same with every jump in between added, s.
+        dt: step, s.
+        count: how many steps of dt there are; the last one may be shorter.
+        end: last instant, s.
+        moved: multiples of dt that give way to the break of a desired motion beside them, and that break, s.
+        between: jumps that fall between two multiples: index of the step that they end, and when, s.
         jumps: instants inside the run at which the right-hand side jumps, s.
+        every: every so many multiples of dt are logged, and the end.
     """
 
-    logged: np.ndarray
-    times: np.ndarray
-    jumps: np.ndarray
+    dt: float
+    count: int
+    end: float
+    moved: tuple[tuple[int, float], ...] = ()
+    between: tuple[tuple[int, float], ...] = ()
+    jumps: np.ndarray = field(default_factory=lambda: np.zeros(0), compare=False)
+    every: int = field(default=1, compare=False)
+
+    @property
+    def steps(self) -> int:
+        """How many steps there are, those to and from jumps included."""
+        return self.count + len(self.between)
+
+    @property
+    def rows(self) -> int:
+        """How many instants are logged."""
+        return -(-self.count // self.every) + 1
+
+    @property
+    def times(self) -> np.ndarray:
+        """All instants, (steps + 1,), s; made anew."""
+        return self.stretch(0, self.steps).times
+
+    @property
+    def logged(self) -> np.ndarray:
+        """Instants to log, (rows,), s; made anew."""
+        return self.grid(np.append(np.arange(0, self.count, self.every), self.count))
+
+    def sampled_at_end(self, every: int) -> bool:
+        """Whether a controller that acts at every so many multiples of dt acts at the end."""
+        return self.count % every == 0 and abs(self.count * self.dt - self.end) <= 2e-9 * self.dt
+
+    def spread(self, number: int) -> np.ndarray:
+        """So many multiples of dt, evenly from 0 to the end, (number,), s; whatever is logged."""
+        return self.grid(np.linspace(0, self.count, number).astype(int))
+
+    def at(self, k: int) -> float:
+        """Multiple k of dt, s."""
+        return float(self.grid(np.array([k]))[0])
+
+    def grid(self, index: np.ndarray) -> np.ndarray:
+        """Multiples of dt with indices from 0 to `count`, s."""
+        times = np.where(index < self.count, index * self.dt, self.end)
+        _put(self.moved, index, times)
+        return times
+
+    def stretch(self, first: int, last: int) -> Stretch:
+        """The steps [first, last)."""
+        steps = np.arange(first, last + 1)
+        ends = [place for place, _ in self.between]
+        number = steps - np.searchsorted(ends, steps, side="right")  # the multiple at or before each
+        times = self.grid(number)
+        checked = ~_put(self.between, steps, times)[:-1]
+        return Stretch(first, times, checked, checked & (number[:-1] % self.every == 0), number[:-1])
+
+    def stretches(self, length: int) -> Iterator[tuple[int, int]]:
+        """All steps as ranges [first, last) of at most some length."""
+        return ((k, min(k + length, self.steps)) for k in range(0, self.steps, length))
 
 
-def make_clock(duration: float, dt: float, edges: Sequence[float], breaks: Sequence[float] = ()) -> Clock:
+def make_clock(
+    duration: float,
+    dt: float,
+    edges: Sequence[float],
+    breaks: Sequence[float] = (),
+    log_dt: float | None = None,
+) -> Clock:
     """A clock that lands exactly on every jump.
 
     What is closer than 1e-9 dt to a multiple of dt counts as that multiple, so that 0.7 = 700 dt whatever the
@@ -38,26 +142,65 @@ def make_clock(duration: float, dt: float, edges: Sequence[float], breaks: Seque
 
     Args:
         duration: length of the run, s.
-        dt: distance of logged instants, s.
+        dt: step, s.
         edges: instants at which a disturbance jumps, s.
         breaks: instants at which a desired motion jumps, s.
+        log_dt: distance of logged instants, a multiple of dt, s; by default dt.
 
     Raises:
-        InputError: duration or dt not positive, dt longer than the run, or more than ten million steps.
+        InputError: a number that is not positive, dt longer than the run, a log_dt that is no multiple of dt,
+            or more than a hundred million steps.
     """
     duration, dt = positive_number("duration", duration), positive_number("dt", dt)
     if dt > duration:
         raise InputError(f"dt: expected at most the duration of {duration:g} s, found {dt:g} s")
     if duration / dt > MAX_STEPS:
         raise InputError(f"dt: {duration:g} s in steps of {dt:g} s are more than {MAX_STEPS} steps")
-    count = int(np.ceil(duration / dt - 1e-9))
-    logged = np.append(np.arange(count) * dt, duration)
-    for instant in breaks:
-        near = 1 + np.abs(logged[1:] - instant).argmin()
-        logged[near] = _snap(logged[near], instant, dt)
-    snapped = [_snap(edge, logged[np.abs(logged - edge).argmin()], dt) for edge in edges]
-    jumps = np.unique([jump for jump in (*breaks, *snapped) if 0 < jump < logged[-1]])
-    return Clock(logged, np.union1d(logged, jumps), jumps)
+    every = 1 if log_dt is None else multiple("log_dt", log_dt, dt)
+    bare = Clock(dt, int(np.ceil(duration / dt - 1e-9)), duration, every=every)
+    near = [(_nearest(bare, instant, least=1), float(instant)) for instant in breaks]
+    moved = {k: instant for k, instant in near if _close(bare.at(k), instant, dt)}
+    end = moved.get(bare.count, duration)
+    return _with_jumps(replace(bare, end=end, moved=tuple(sorted(moved.items()))), edges, breaks)
+
+
+def _with_jumps(clock: Clock, edges: Sequence[float], breaks: Sequence[float]) -> Clock:
+    """The clock with what jumps inside the run."""
+    on_grid = [(edge, clock.at(_nearest(clock, edge))) for edge in edges]
+    snapped = [multiple if _close(multiple, edge, clock.dt) else edge for edge, multiple in on_grid]
+    jumps = np.unique([float(jump) for jump in (*breaks, *snapped) if 0 < jump < clock.end])
+    off_grid = [jump for jump in jumps.tolist() if clock.at(_nearest(clock, jump)) != jump]
+    between = tuple((_before(clock, jump) + 1 + k, jump) for k, jump in enumerate(off_grid))
+    return replace(clock, between=between, jumps=jumps)
+
+
+def _put(marks: tuple[tuple[int, float], ...], index: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Write marked instants over the times that have their index; which these are."""
+    if not marks:
+        return np.zeros(len(index), dtype=bool)
+    places, instants = np.array([place for place, _ in marks]), np.array([instant for _, instant in marks])
+    found = np.searchsorted(places, index).clip(max=len(places) - 1)
+    hit = places[found] == index
+    times[hit] = instants[found[hit]]
+    return hit
+
+
+def _nearest(clock: Clock, instant: float, least: int = 0) -> int:
+    """The multiple of dt that is closest to an instant; of two that are, the first."""
+    guess = round(min(max(instant / clock.dt, 0.0), clock.count))
+    around = {guess - 1, guess, guess + 1, clock.count - 1, clock.count}
+    known = sorted(k for k in around if least <= k <= clock.count)
+    return min(known, key=lambda k: abs(clock.at(k) - instant))
+
+
+def _before(clock: Clock, instant: float) -> int:
+    """The last multiple of dt before an instant that is none."""
+    near = _nearest(clock, instant)
+    return near if clock.at(near) < instant else near - 1
+
+
+def _close(t: float, to: float, dt: float) -> bool:
+    return abs(t - to) <= 1e-9 * dt
 
 
 def before(t: float) -> float:
@@ -65,5 +208,14 @@ def before(t: float) -> float:
     return float(np.nextafter(t, -np.inf))
 
 
-def _snap(t: float, to: float, dt: float) -> float:
-    return to if abs(t - to) <= 1e-9 * dt else t
+def multiple(name: str, interval: float, dt: float) -> int:
+    """How many steps an interval lasts.
+
+    Raises:
+        InputError: the interval is not positive, or no multiple of dt.
+    """
+    interval = positive_number(name, interval)
+    count = round(interval / dt)
+    if count < 1 or abs(count * dt - interval) > 1e-9 * interval:
+        raise InputError(f"{name}: expected a multiple of dt = {dt:g} s, found {interval:g} s")
+    return count

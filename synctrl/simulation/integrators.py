@@ -9,16 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from itertools import pairwise
+from math import isfinite
+from threading import current_thread, main_thread
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..control.controller import Signals
-from ..errors import NonFiniteError, SynctrlError
+from ..errors import InputError, NonFiniteError, SynctrlError
 from ..tasks.cell import Reference
-from .clock import Clock, before
+from .clock import Clock, Stretch, before
 from .closed_loop import ClosedLoop
 from .disturbances import DisturbanceSchedule
+from .handover import up_to_a_failure, user_failure
 
 ADAPTIVE = ("RK45", "RK23", "DOP853", "Radau", "BDF", "LSODA")
 #: weights of the four stages, times 6
@@ -30,12 +33,34 @@ MAX_TRIES = 10_000
 
 
 class Sample(NamedTuple):
-    """State and signals at one instant."""
+    """State and signals at one instant, and whether it belongs into the log."""
 
     t: float
     y: np.ndarray
     disturbance: np.ndarray
     signals: Signals
+    logged: bool = True
+
+
+class Step(NamedTuple):
+    """One step of a run.
+
+    Attributes:
+        t, t_next: its start and end, s.
+        stages: what is desired at its start, in its middle, and just before its end.
+        window: which torque of the schedule acts.
+        number: which multiple of dt it begins at or after.
+        checked: whether it begins at that multiple.
+        logged: whether it begins at an instant that is logged.
+    """
+
+    t: float
+    t_next: float
+    stages: tuple[Reference, Reference, Reference]
+    window: int
+    number: int
+    checked: bool
+    logged: bool
 
 
 def rk4(loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule) -> Iterator[Sample]:
@@ -43,24 +68,18 @@ def rk4(loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule) -> Iterat
     rates = np.empty((4, loop.size))
     k1, k2, k3, k4 = map(loop.state, rates)
     y, following, stage = loop.state(loop.initial_state()), loop.state(), loop.state()
-    logged = np.isin(clock.times, clock.logged).tolist()
-    windows, pushes = _windows(schedule, clock), [tau if tau.any() else None for tau in schedule.torques]
-    for k, (t, t_next, (start, middle, end)) in enumerate(steps(loop, clock.times)):
-        push = pushes[windows[k]]
+    pushes = [tau if tau.any() else None for tau in schedule.torques]
+    for t, t_next, (start, middle, end), window, _, checked, logged in steps(loop, clock, schedule):
+        push = pushes[window]
         h, now = t_next - t, loop.at(0.5 * (t + t_next))
         signals = now.derive(start, y, push, k1)
-        if logged[k]:
-            yield Sample(t, y.flat, schedule.torques[windows[k]], signals)
+        if checked:
+            yield Sample(t, y.flat, schedule.torques[window], signals, logged)
         now.derive(middle, stage.ahead(y, 0.5 * h, k1.flat), push, k2)
         now.derive(middle, stage.ahead(y, 0.5 * h, k2.flat), push, k3)
         now.derive(end, stage.ahead(y, h, k3.flat), push, k4)
         y, following = following.ahead(y, h / 6, _SIMPSON.dot(rates)), y
-    yield final(loop, clock, y.flat, schedule.torques[windows[-1]])
-
-
-def _windows(schedule: DisturbanceSchedule, clock: Clock) -> list[int]:
-    """Which torque of the schedule acts in each step of the clock."""
-    return schedule.windows(0.5 * (clock.times[:-1] + clock.times[1:])).tolist()
+    yield final(loop, clock, y.flat, schedule.torques[window])
 
 
 def adaptive(
@@ -71,15 +90,21 @@ def adaptive(
     rtol: float,
     atol: float,
 ) -> Iterator[Sample]:
-    """One of SciPy's methods with error control, restarted at every jump."""
+    """One of SciPy's methods with error control, restarted at every jump.
+
+    Raises:
+        InputError: LSODA outside the main thread, of a SciPy that has memory for one problem only.
+    """
     import scipy.integrate
 
+    _check_thread(method, scipy.__version__)
     y = loop.initial_state()
-    borders = np.concatenate(([clock.logged[0]], clock.jumps, [clock.logged[-1]]))
+    logged = clock.logged
+    borders = np.concatenate(([0.0], clock.jumps, [clock.end]))
     for t0, t1 in pairwise(borders):
         disturbance = schedule.torque(0.5 * (t0 + t1))
         rhs = _right_hand_side(loop.at(0.5 * (t0 + t1)), disturbance, t1)
-        instants = clock.logged[(clock.logged >= t0) & (clock.logged < t1)]
+        instants = logged[(logged >= t0) & (logged < t1)]
         solver = getattr(scipy.integrate, method)(rhs, t0, y, t1, rtol=rtol, atol=atol)
         for t, state in _states(solver, instants):
             yield _sample(loop, t, state, disturbance)
@@ -87,6 +112,16 @@ def adaptive(
             raise _stuck(loop, method, solver.t, rhs(solver.t, solver.y))
         y = solver.y.copy()
     yield final(loop, clock, y, disturbance)
+
+
+def _check_thread(method: str, version: str) -> None:
+    """Before version 1.17 SciPy's LSODA kept its state in one place, where runs would spoil each other."""
+    old = tuple(map(int, version.split(".")[:2])) < (1, 17)
+    if method == "LSODA" and old and current_thread() is not main_thread():
+        raise InputError(
+            f"integrator: LSODA of SciPy {version} solves one problem at a time, so it runs in the main "
+            f"thread only, found thread '{current_thread().name}'; use another method, or SciPy 1.17 or newer"
+        )
 
 
 def _states(solver: Any, instants: np.ndarray) -> Iterator[tuple[float, np.ndarray]]:
@@ -127,16 +162,34 @@ def _stuck(loop: ClosedLoop, method: str, t: float, y_dot: np.ndarray) -> NonFin
     )
 
 
-def steps(
-    loop: ClosedLoop, times: np.ndarray
-) -> Iterator[tuple[float, float, tuple[Reference, Reference, Reference]]]:
-    """Every step of the clock with what is desired at its start, in its middle, and just before its end."""
-    for k in range(0, len(times) - 1, BLOCK):
-        starts, ends = times[k : k + BLOCK + 1][:-1], times[k : k + BLOCK + 1][1:]
-        instants = starts, 0.5 * (starts + ends), np.nextafter(ends, -np.inf)
-        table, n = loop.cell.reference_table(np.concatenate(instants)), len(starts)
-        stages = (loop.cell.instants(table, slice(i * n, (i + 1) * n)) for i in range(3))
-        yield from zip(starts.tolist(), ends.tolist(), zip(*stages, strict=True), strict=True)
+def steps(loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule) -> Iterator[Step]:
+    """Every step of the clock; all that come before an instant whose references cannot be had, and its error.
+
+    Raises:
+        SynctrlError: a desired motion or weight fails.
+    """
+
+    def make(first: int, last: int) -> list[Step]:
+        return list(_tabulated(loop, clock.stretch(first, last), schedule))
+
+    for first, last in clock.stretches(BLOCK):
+        for made in up_to_a_failure(make, first, last):
+            yield from made
+
+
+def _tabulated(loop: ClosedLoop, stretch: Stretch, schedule: DisturbanceSchedule) -> Iterator[Step]:
+    """The steps of a stretch, their references evaluated together."""
+    table, n = loop.cell.reference_table(stretch.stages.ravel()), len(stretch.starts)
+    stages = (loop.cell.instants(table, slice(i * n, (i + 1) * n)) for i in range(3))
+    columns = stretch.number, stretch.checked, stretch.logged
+    return map(
+        Step,
+        stretch.starts.tolist(),
+        stretch.times[1:].tolist(),
+        zip(*stages, strict=True),
+        schedule.windows(stretch.middles).tolist(),
+        *(column.tolist() for column in columns),
+    )
 
 
 def _right_hand_side(
@@ -145,8 +198,15 @@ def _right_hand_side(
     """t, y -> y' on a smooth interval, with values from the left at its end."""
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
+        if not isfinite(t):  # the solver is lost, and nothing is desired then
+            return np.full(loop.size, np.nan)
         reference = loop.cell.references(np.array([min(t, before(end))]))[0]
-        return loop.evaluate(reference, y, disturbance)[0]
+        try:
+            return loop.evaluate(reference, y, disturbance)[0]
+        except SynctrlError:
+            raise
+        except Exception as error:  # solvers have a meaning of their own for some
+            raise user_failure(error, t) from error
 
     return rhs
 
@@ -158,4 +218,4 @@ def _sample(loop: ClosedLoop, t: float, y: np.ndarray, disturbance: np.ndarray) 
 
 def final(loop: ClosedLoop, clock: Clock, y: np.ndarray, disturbance: np.ndarray) -> Sample:
     """The sample at the end of the run."""
-    return _sample(loop, float(clock.times[-1]), y, disturbance)
+    return _sample(loop, clock.end, y, disturbance)

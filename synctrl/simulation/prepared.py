@@ -8,7 +8,8 @@ from typing import Any
 
 from ..checks import choice
 from .result import Result
-from .simulate import Experiment, run_compiled, run_reference
+from .run import Run, run_compiled, run_reference
+from .simulate import Experiment
 
 
 class Prepared:
@@ -22,6 +23,7 @@ class Prepared:
         duration: s; by default the experiment's.
         dt: step, s.
         engine: "pinocchio" or "compiled".
+        log_dt: interval of the logs, a multiple of dt, s; by default dt.
 
     Raises:
         InputError: see `Experiment.simulate`.
@@ -35,10 +37,12 @@ class Prepared:
         duration: float | None = None,
         dt: float = 1e-3,
         engine: str = "compiled",
+        log_dt: float | None = None,
     ):
         self.engine = choice("engine", engine, ("pinocchio", "compiled"))
         self.duration, self.dt = experiment.duration if duration is None else duration, dt
-        run = experiment.plan(self.duration, dt)
+        self.log_dt = log_dt
+        run = self._plan(experiment, None)
         run.check()
         self._known = list(_paths(experiment))
         if engine == "compiled":
@@ -57,13 +61,16 @@ class Prepared:
         Raises:
             see `Experiment.simulate`
         """
-        run = experiment.plan(self.duration, self.dt, control_period)
+        run = self._plan(experiment, control_period)
         paths = list(_paths(experiment))
         if not _same(paths, self._known):
             run.check()
         if self.engine == "compiled":
             return run_compiled(run, None, self._libraries, self._tables)
         return run_reference(run)
+
+    def _plan(self, experiment: Experiment, control_period: float | None) -> Run:
+        return experiment.plan(self.duration, self.dt, control_period, log_dt=self.log_dt)
 
 
 def _paths(experiment: Experiment) -> Iterator[Any]:

@@ -9,25 +9,46 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import printable
+from .clock import Clock
 from .closed_loop import ClosedLoop
 from .damping import DampingLog
 from .integrators import Sample
 from .limits import limit_report, torque_limits
+from .memory import check_fits
 from .result import LAYOUT, Result, unit_of
+from .saturation import applied_output, saturation_report
 
 
 class Recorder:
-    """Preallocated arrays for all logged instants of a run."""
+    """Arrays for all logged instants of a run; the system gives memory to those that are filled.
 
-    def __init__(self, loop: ClosedLoop, instants: int):
-        self._loop = loop
+    Args:
+        loop: the closed loop.
+        clock: its instants.
+
+    Attributes:
+        count: how many instants are logged.
+        reached: the last instant at which all was well, s.
+
+    Raises:
+        InputError: the log does not fit into memory.
+    """
+
+    #: how often the numbers of an instant are in memory at the end of a run
+    copies = 1
+
+    def __init__(self, loop: ClosedLoop, clock: Clock):
+        self._loop, instants = loop, clock.rows
         lengths = {"time": instants, **sizes(loop)}
         shapes = {name: [lengths[d] for d in dimensions] for name, (dimensions, _) in LAYOUT.items()}
+        numbers = sum(int(np.prod(shape[1:])) for shape in shapes.values()) + loop.plant.hidden0.size
+        check_fits(clock, 8 * self.copies * numbers)
         self._hidden = np.zeros((instants, loop.plant.hidden0.size))
         self._arrays = self._allocate(shapes)
         self._rows = tuple(self._arrays.values())
         self._damping = DampingLog(instants, loop.cell.n)
-        self.count = 0
+        self.count, self.reached = 0, 0.0
 
     def _allocate(self, shapes: Mapping[str, list[int]]) -> dict[str, np.ndarray]:
         return {name: np.zeros(shape) for name, shape in shapes.items()}
@@ -49,16 +70,21 @@ class Recorder:
     def result(self, status: str, info: Mapping[str, Any], experiment: Any) -> Result:
         """What was logged until now."""
         arrays = {name: _taken(array, self.count) for name, array in self._arrays.items()}
-        described = {"status": status, **describe(self._loop), **info}
+        described = {"status": printable(status), **describe(self._loop), **info}
         described["damping"] = self._damping.report(arrays["t"])
         seen = (arrays[name] for name in ("t", "q", "v", "tau"))
         described["limits"] = limit_report(self._loop.cell, *seen)
         described.update(self._loop.plant.report(self._hidden[: self.count]))
-        return Result(**arrays, info=described, experiment=experiment)
+        described["saturation"] = saturation_report(self._loop.plant, arrays)
+        outputs, about = applied_output(self._loop.plant, arrays["tau"])
+        described["outputs"] = about
+        return Result(**arrays, info=described, outputs=outputs, experiment=experiment)
 
 
 class SampleRecorder(Recorder):
     """A recorder that is told one sample at a time, and writes each as one row of numbers."""
+
+    copies = 2  # the rows, and the arrays that are made of them at the end
 
     def _allocate(self, shapes: Mapping[str, list[int]]) -> dict[str, np.ndarray]:
         shapes = {name: shapes[name] for name in (*_SIGNALS, *_STATE)}

@@ -3,43 +3,25 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from copy import deepcopy
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
 from ..checks import instance
 from ..errors import InputError, ResultError
+from .result_file import read_result, write_result
+from .result_schema import FORMAT, LAYOUT, check_shape, shapes, unit_of
 
-FORMAT = "synctrl result 1"
+__all__ = ["FORMAT", "LAYOUT", "Result", "unit_of"]
 
-#: array -> (dimensions, unit); "task" stands for the unit of the task, "weighted" for that of c e
-LAYOUT: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
-    {
-        "t": (("time",), "s"),
-        "x": (("time", "robot", "axis"), "task"),
-        "x_desired": (("time", "robot", "axis"), "task"),
-        "tracking_error": (("time", "robot", "axis"), "task"),
-        "sync_error": (("time", "pair", "axis"), "weighted"),
-        "sync_integral": (("time", "pair", "axis"), "weighted·s"),
-        "coupled_error": (("time", "robot", "axis"), "weighted"),
-        "q": (("time", "robot", "joint"), "rad"),
-        "v": (("time", "robot", "joint"), "rad/s"),
-        "v_error": (("time", "robot", "joint"), "rad/s"),
-        "tau": (("time", "robot", "joint"), "N·m"),
-        "disturbance": (("time", "robot", "joint"), "N·m"),
-        "theta_hat": (("time", "robot", "parameter"), "SI"),
-    }
-)
-
-
-def unit_of(array: str, task: str, weighted: str) -> str:
-    """Unit of an array of `LAYOUT`, given those of the task and of c e."""
-    return LAYOUT[array][1].replace("task", task).replace("weighted", weighted)
+R = TypeVar("R", bound="Result")
+#: what the names of outputs begin with in a file
+OUTPUTS = "outputs/"
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +41,13 @@ class Result:
         disturbance: torque from outside, (T, n, nv), N·m.
         theta_hat: estimates, (T, n, P).
         info: what the arrays mean and how they came about: names, units, gains, options, versions, `status`.
-        experiment: the closed loop that made it, while in memory; not saved and not compared.
+        outputs: further arrays by name, each with time as its first axis; `info["outputs"][name]` has the
+            "unit" of each and the names of its "axes".
+        experiment: the closed loop that made it, while it stays in one process: copies share it, but it is
+            neither compared, nor saved, nor pickled, for it may hold functions that cannot be.
+
+    Raises:
+        InputError: outputs that are not those that `info["outputs"]` speaks of, or of another shape.
 
     Rows of robots with fewer joints or parameters than the largest are padded with zeros;
     `info["robots"]` has their numbers.
@@ -79,12 +67,36 @@ class Result:
     disturbance: np.ndarray
     theta_hat: np.ndarray
     info: Mapping[str, Any]
+    outputs: Mapping[str, np.ndarray] = field(default_factory=dict)
     experiment: Any = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        for name in LAYOUT:
-            getattr(self, name).flags.writeable = False
         object.__setattr__(self, "info", MappingProxyType(dict(self.info)))
+        object.__setattr__(self, "outputs", MappingProxyType(dict(self.outputs)))
+        _check_outputs(self)
+        for array in self._arrays().values():
+            array.flags.writeable = False
+
+    def _arrays(self) -> dict[str, Any]:
+        """All arrays, outputs included, under the names they have in a file."""
+        outputs = {f"{OUTPUTS}{name}": array for name, array in self.outputs.items()}
+        return {**{name: getattr(self, name) for name in LAYOUT}, **outputs}
+
+    def __reduce__(self) -> tuple:
+        return _remade, (type(self), {**self._contents(), "experiment": None})
+
+    def __copy__(self) -> Self:
+        return _remade(type(self), self._contents())
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        contents = self._contents()
+        shared = {"experiment": contents.pop("experiment")}
+        return _remade(type(self), {**deepcopy(contents, memo), **shared})
+
+    def _contents(self) -> dict[str, Any]:
+        """All fields, mappings as plain dictionaries."""
+        contents = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {**contents, "info": dict(self.info), "outputs": dict(self.outputs)}
 
     @property
     def status(self) -> str:
@@ -97,7 +109,9 @@ class Result:
         return [robot["name"] for robot in self.info["robots"]]
 
     def unit(self, array: str) -> str:
-        """Unit of one of the arrays."""
+        """Unit of one of the arrays, or of the outputs."""
+        if array in self.outputs:
+            return str(self.info["outputs"][array]["unit"])
         return unit_of(array, self.info["task_unit"], self.info["weighted_unit"])
 
     def decimated(self, every: int) -> Self:
@@ -112,29 +126,21 @@ class Result:
         last = max(len(self.t) - 1, 0)
         kept = np.union1d(np.arange(0, last, every), [last] if len(self.t) else []).astype(int)
         arrays = {name: getattr(self, name)[kept] for name in LAYOUT}
-        return type(self)(**arrays, info={**self.info, "decimated": int(every)}, experiment=self.experiment)
+        outputs = {name: array[kept] for name, array in self.outputs.items()}
+        info = {**self.info, "decimated": int(every)}
+        return type(self)(**arrays, info=info, outputs=outputs, experiment=self.experiment)
 
     def save(self, path: str | Path) -> Path:
-        """Write everything to an .npz file; it appears under its name only once it is complete.
+        """Write everything to an .npz file, which appears under its name only once it is complete.
+
+        Any number of processes may save to one path; the last one to finish wins.
 
         Raises:
-            ResultError: the file cannot be written.
+            ResultError: the file cannot be written, or `load` would refuse what is in it.
         """
         instance("path", path, (str, Path), "a path")
-        path = Path(path)
-        if path.is_dir():
-            raise ResultError(f"cannot write the result to '{path}': it is a folder")
-        content = {name: getattr(self, name) for name in LAYOUT}
-        info = json.dumps({"format": FORMAT, **self.info}, ensure_ascii=False)
-        partial = path.with_name(path.name + ".part")
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with partial.open("wb") as file:
-                np.savez(file, info=np.array(info), **content)
-            partial.replace(path)
-        except (OSError, ValueError) as error:
-            raise ResultError(f"cannot write the result to '{path}': {error}") from error
-        return path
+        write_result(Path(path), {"format": FORMAT, **self.info}, self._arrays())
+        return Path(path)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -144,24 +150,21 @@ class Result:
             ResultError: the file is missing, damaged, or no result.
         """
         instance("path", path, (str, Path), "a path")
-        path = Path(path)
-        if not path.is_file():
-            raise ResultError(f"no result file at '{path}'")
-        try:
-            info, arrays = _read(path)
-        except _DAMAGE as error:
-            raise ResultError(f"'{path}' is no complete result file of synctrl: {error}") from error
-        _check_content(path, info, arrays)
+        info, arrays = read_result(Path(path))
         info.pop("format")
-        return cls(**arrays, info=info)
+        outputs = {name.removeprefix(OUTPUTS): arrays.pop(name) for name in [*arrays] if name not in LAYOUT}
+        return cls(**arrays, info=info, outputs=outputs)
 
     def __eq__(self, other: object) -> bool:
         """Same arrays, bit for bit, and same info."""
         if not isinstance(other, Result):
             return NotImplemented
+        ours, theirs = self._arrays(), other._arrays()
         same_info = json.dumps(dict(self.info)) == json.dumps(dict(other.info))
-        return same_info and all(
-            np.array_equal(getattr(self, name), getattr(other, name), equal_nan=True) for name in LAYOUT
+        return (
+            same_info
+            and ours.keys() == theirs.keys()
+            and all(np.array_equal(ours[name], theirs[name], equal_nan=True) for name in ours)
         )
 
     __hash__ = None  # type: ignore[assignment]
@@ -171,41 +174,20 @@ class Result:
         return f"Result({self.info['title']!r}, {n} robots, {m} axes, {len(self.t)} instants, {self.status})"
 
 
-#: what reading a file that is no archive, or a damaged one, may raise
-_DAMAGE = (OSError, ValueError, KeyError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile)
+def _remade(kind: type[R], contents: dict[str, Any]) -> R:
+    return kind(**contents)
 
 
-def _read(path: Path) -> tuple[Any, dict[str, np.ndarray]]:
-    """Content of an archive as `save` writes it: uncompressed, so no larger in memory than on disk."""
-    with zipfile.ZipFile(path) as archive:
-        if any(entry.compress_type != zipfile.ZIP_STORED for entry in archive.infolist()):
-            raise ValueError("expected uncompressed entries")
-    with np.load(path, allow_pickle=False) as content:
-        return json.loads(str(content["info"])), {name: content[name] for name in LAYOUT}
-
-
-def _check_content(path: Path, info: Any, arrays: dict[str, np.ndarray]) -> None:
-    if not isinstance(info, dict) or info.get("format") != FORMAT:
-        found = info.get("format") if isinstance(info, dict) else type(info).__name__
-        raise ResultError(f"'{path}': expected the format '{FORMAT}', found {found!r}")
-    for name in ("status", "title", "task_unit", "weighted_unit"):
-        if not isinstance(info.get(name), str):
-            raise ResultError(f"'{path}': info, {name}: expected a text, found {info.get(name)!r}")
-    sizes, robots = info.get("sizes"), info.get("robots")
-    if not isinstance(sizes, dict):
-        raise ResultError(f"'{path}': info, sizes: expected lengths by name, found {sizes!r}")
-    if not isinstance(robots, list) or not all(
-        isinstance(robot, dict) and isinstance(robot.get("name"), str) for robot in robots
-    ):
-        raise ResultError(f"'{path}': info, robots: expected one entry with a name per robot")
-    _check_shapes(path, {**sizes, "time": arrays["t"].size}, arrays)
-
-
-def _check_shapes(path: Path, sizes: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:
-    for name, (dimensions, _) in LAYOUT.items():
-        expected = tuple(sizes.get(d) for d in dimensions)
-        if arrays[name].shape != expected or arrays[name].dtype != np.float64:
-            raise ResultError(
-                f"'{path}': array '{name}': expected float64 of shape {expected}, "
-                f"found {arrays[name].dtype} of shape {arrays[name].shape}"
-            )
+def _check_outputs(result: Result) -> None:
+    """Refuse outputs that are not those that info speaks of."""
+    described = result.info.get("outputs", {})
+    if described.keys() != result.outputs.keys():
+        raise InputError(
+            f"outputs: expected those of info['outputs'], {[*described]}, found {[*result.outputs]}"
+        )
+    expected = shapes(result.info, len(result.t)) if described else {}
+    for name, array in result.outputs.items():
+        try:
+            check_shape(name, array.dtype, array.shape, expected[f"{OUTPUTS}{name}"])
+        except ResultError as error:
+            raise InputError(f"outputs: {error}") from None

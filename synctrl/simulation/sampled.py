@@ -11,9 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..checks import positive_number
-from ..errors import InputError
-from .clock import Clock
+from .clock import Clock, multiple
 from .closed_loop import ClosedLoop
 from .disturbances import DisturbanceSchedule
 from .integrators import Sample, final, steps
@@ -25,37 +23,31 @@ def steps_per_sample(period: float, dt: float) -> int:
     Raises:
         InputError: the period is not positive, or no multiple of dt.
     """
-    period = positive_number("control_period", period)
-    count = round(period / dt)
-    if count < 1 or abs(count * dt - period) > 1e-9 * period:
-        raise InputError(f"control_period: expected a multiple of dt = {dt:g} s, found {period:g} s")
-    return count
+    return multiple("control_period", period, dt)
 
 
 def sampled_rk4(
     loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule, every: int
 ) -> Iterator[Sample]:
-    """The plant by the classical Runge-Kutta method, under a controller that acts once in so many instants.
+    """The plant by the classical Runge-Kutta method, under a controller that acts once in so many steps.
 
     Within a period torque, theta_hat' and the integrands of the synchronization errors keep their values, so
-    the estimates and integrals advance as in x_{k+1} = x_k + period x'_k.
+    the estimates and integrals advance as in x_{k+1} = x_k + period x'_k. The torque of an instant is the one
+    that acts from it on; at the end of the run that of a new sample, if one is due.
     """
     y = loop.initial_state()
-    logged = np.isin(clock.times, clock.logged)
-    count = 0
     held, tau = np.zeros(loop.size), np.zeros((loop.cell.n, loop.cell.nv))
-    for k, (t, t_next, (start, _, _)) in enumerate(steps(loop, clock.times)):
-        middle = 0.5 * (t + t_next)
-        disturbance, plant = schedule.torque(middle), loop.at(middle)
-        if logged[k]:
-            y_dot, signals = loop.evaluate(start, y, disturbance)
-            if count % every == 0:
+    for step in steps(loop, clock, schedule):
+        disturbance = schedule.torques[step.window]
+        if step.checked:
+            y_dot, signals = loop.evaluate(step.stages[0], y, disturbance)
+            if step.number % every == 0:
                 held, tau = y_dot, signals.tau
-            count += 1
-            yield Sample(t, y, disturbance, replace(signals, tau=tau))
-        y = _rk4_step(plant, y, t_next - t, held, tau, disturbance)
+            yield Sample(step.t, y, disturbance, replace(signals, tau=tau), step.logged)
+        plant = loop.at(0.5 * (step.t + step.t_next))
+        y = _rk4_step(plant, y, step.t_next - step.t, held, tau, disturbance)
     last = final(loop, clock, y, disturbance)
-    yield last._replace(signals=replace(last.signals, tau=tau))
+    yield last if clock.sampled_at_end(every) else last._replace(signals=replace(last.signals, tau=tau))
 
 
 def _rk4_step(

@@ -2,37 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from types import NoneType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
-import numpy as np
-
-from ..checks import boolean, choice, instance, positive_number
+from ..checks import boolean, choice, instance, label, positive_number
 from ..control.controller import Controller
 from ..control.discrete import DiscreteController
 from ..control.gains import Gains
-from ..errors import InputError, SimulationError
+from ..errors import InputError
 from ..tasks.cell import Cell
-from ..tasks.reachability import check_reachable
-from .clock import Clock, make_clock
+from .clock import make_clock
 from .closed_loop import ClosedLoop
 from .disturbances import Disturbance, DisturbanceSchedule
-from .guard import Guard
-from .integrators import ADAPTIVE, Sample, adaptive, rk4
+from .handover import Progress
+from .integrators import ADAPTIVE
 from .payloads import Payload
 from .plant import PHYSICS, Plant
-from .recorder import Recorder, SampleRecorder
 from .result import Result
-from .sampled import sampled_rk4, steps_per_sample
-
-if TYPE_CHECKING:
-    from ctypes import CDLL
-
-    from .compiled.engine import Tables
-
-Progress = Callable[[float], Any]
+from .run import Run, run_adaptive, run_compiled, run_reference
+from .sampled import steps_per_sample
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +55,8 @@ class Experiment:
     def __post_init__(self) -> None:
         instance("cell", self.cell, Cell, "a Cell")
         instance("gains", self.gains, Gains, "Gains")
-        instance("title", self.title, (str, NoneType), "a text")
+        if self.title is not None:
+            label("title", self.title)
         positive_number("duration", self.duration)
         boolean("saturate", self.saturate)
         self.closed_loop()
@@ -92,6 +82,7 @@ class Experiment:
         engine: str = "pinocchio",
         plant: str = "pinocchio",
         control_period: float | None = None,
+        log_dt: float | None = None,
         rtol: float = 1e-9,
         atol: float = 1e-11,
         progress: Progress | None = None,
@@ -100,23 +91,32 @@ class Experiment:
 
         Args:
             duration: s; by default the experiment's.
-            dt: step of "rk4" and interval of the log, s.
+            dt: step of "rk4", s.
             integrator: "rk4", or a method of SciPy's solve_ivp: "RK45", "RK23", "DOP853", "Radau", "BDF",
-                "LSODA".
+                "LSODA". The last bits of "Radau" and "BDF", which solve linear systems, depend on the number
+                of threads of the BLAS library.
             engine: "pinocchio", the reference, or "compiled": the same closed loop as generated C, for "rk4".
             plant: library that computes the plant: "pinocchio", or "mujoco", which reads the robots' URDF by
                 itself and is an independent judge of the physics.
             control_period: None for continuous control; otherwise torque and adaptation are held for this
                 long, a multiple of dt, s. Only with "rk4".
+            log_dt: interval of the log, a multiple of dt, s; by default dt. What is computed does not depend
+                on it, and every dt is watched.
             rtol, atol: tolerances of SciPy's methods.
             progress: called now and then with the time reached, s.
 
         Raises:
-            InputError: a duration, step, period or tolerance that is not positive, an unknown integrator or
-                engine, or a combination that does not exist.
+            InputError: a duration, step, period, interval or tolerance that is not positive, an unknown
+                integrator or engine, a combination that does not exist, or a log that does not fit into
+                memory.
             UnreachableError: a robot cannot reach its desired positions; raised before anything runs.
             MissingDependencyError, CompilationError: the compiled engine cannot be had, and why.
-            SimulationError: the run had to stop; its kinds say why, and it carries what was computed.
+            SimulationError: the run had to stop; its kinds say why. This and whatever else of our errors ends
+                a run that has begun carries what was computed as `.result`.
+            RunInterrupted: by Ctrl-C, or another KeyboardInterrupt; it carries the same.
+
+        Warns:
+            SaturationWarning: torque was cut off while the controller went on adapting.
         """
         choice("integrator", integrator, ("rk4", *ADAPTIVE))
         choice("engine", engine, ("pinocchio", "compiled"))
@@ -124,17 +124,13 @@ class Experiment:
             raise InputError(f"progress: expected a function of the time reached, found {progress!r}")
         choice("plant", plant, tuple(PHYSICS))
         tolerances = positive_number("rtol", rtol), positive_number("atol", atol)
-        run = self.plan(duration, dt, control_period, plant)
-        run.check()
+        run = self.plan(duration, dt, control_period, plant, log_dt)
         if integrator != "rk4":
             _needs_rk4(integrator, engine, control_period)
-            run.info.update(integrator=integrator, rtol=tolerances[0], atol=tolerances[1])
-            return _collect(
-                run, adaptive(run.loop, run.clock, run.schedule, integrator, *tolerances), progress
-            )
-        if engine == "compiled":
-            return run_compiled(run, progress)
-        return run_reference(run, progress)
+        run.check()
+        if integrator != "rk4":
+            return run_adaptive(run, integrator, *tolerances, progress)
+        return run_compiled(run, progress) if engine == "compiled" else run_reference(run, progress)
 
     def controller(
         self, period: float, *, include_gravity: bool = True, faults: str = "error"
@@ -158,15 +154,22 @@ class Experiment:
         )
 
     def plan(
-        self, duration: float | None, dt: float, control_period: float | None = None, plant: str = "pinocchio"
+        self,
+        duration: float | None,
+        dt: float,
+        control_period: float | None = None,
+        plant: str = "pinocchio",
+        log_dt: float | None = None,
     ) -> Run:
         """Everything that a run needs; arguments as in `simulate`."""
         duration = self.duration if duration is None else duration
         loop = self.closed_loop(plant)
         schedule = DisturbanceSchedule(self.cell, self.disturbances)
-        clock = make_clock(duration, dt, (*schedule.edges, *loop.plant.schedule.edges), self.cell.breaks)
+        edges = (*schedule.edges, *loop.plant.schedule.edges)
+        clock = make_clock(duration, dt, edges, self.cell.breaks, log_dt)
         every = None if control_period is None else steps_per_sample(control_period, dt)
         info: dict[str, Any] = {"integrator": "rk4", "dt": float(dt), "duration": float(duration)}
+        info["log_dt"] = float(dt if log_dt is None else log_dt)
         info["engine"] = "pinocchio"
         info["plant"], info["saturate"] = plant, bool(self.saturate)
         info["title"] = self.title or self.cell.name
@@ -174,33 +177,6 @@ class Experiment:
         info["disturbances"] = [_describe(d) for d in self.disturbances]
         info["payloads"] = [payload.as_dict() for payload in self.payloads]
         return Run(self, loop, clock, schedule, every, info)
-
-
-class Run(NamedTuple):
-    """A run that is about to start.
-
-    `every` is how many logged instants a sample of sampled control lasts, or None.
-    """
-
-    experiment: Experiment
-    loop: ClosedLoop
-    clock: Clock
-    schedule: DisturbanceSchedule
-    every: int | None
-    info: dict[str, Any]
-
-    def check(self) -> None:
-        """Look ahead, before anything runs.
-
-        Raises:
-            UnreachableError: a robot cannot reach its desired positions.
-            CouplingError: a weight loses its inverse on the way.
-            MissingDependencyError, InputError: a library cannot compute the plant, or refuses a robot.
-        """
-        cell = self.experiment.cell
-        self.loop.plant.prepare()
-        check_reachable(cell, self.clock.logged)
-        cell.coupling.check_weights(self.clock.logged, cell.m)
 
 
 def simulate(
@@ -213,13 +189,54 @@ def simulate(
     disturbances: Sequence[Disturbance] = (),
     reference_acceleration: str = "exact",
     k_r_space: str = "joint",
+    title: str | None = None,
+    payloads: Sequence[Payload] = (),
+    saturate: bool = False,
+    plant_type: Callable[..., Plant] = Plant,
     engine: str = "pinocchio",
     plant: str = "pinocchio",
+    control_period: float | None = None,
+    log_dt: float | None = None,
+    rtol: float = 1e-9,
+    atol: float = 1e-11,
     progress: Progress | None = None,
 ) -> Result:
-    """Run a cell under adaptive synchronized control: `Experiment(...).simulate(...)` in one call."""
-    experiment = Experiment(cell, gains, duration, disturbances, reference_acceleration, k_r_space)
-    return experiment.simulate(dt=dt, integrator=integrator, engine=engine, plant=plant, progress=progress)
+    """Run a cell under adaptive synchronized control: `Experiment(...).simulate(...)` in one call.
+
+    Args:
+        cell, gains, duration: as in `Experiment`.
+        disturbances, reference_acceleration, k_r_space, title: as in `Experiment`.
+        payloads, saturate, plant_type: as in `Experiment`.
+        dt, integrator, engine, plant, control_period, log_dt: as in `Experiment.simulate`.
+        rtol, atol, progress: as in `Experiment.simulate`.
+
+    Raises:
+        SynctrlError: see `Experiment` and `Experiment.simulate`.
+        RunInterrupted: by Ctrl-C.
+    """
+    experiment = Experiment(
+        cell,
+        gains,
+        duration,
+        disturbances,
+        reference_acceleration,
+        k_r_space,
+        title,
+        payloads,
+        saturate,
+        plant_type,
+    )
+    return experiment.simulate(
+        dt=dt,
+        integrator=integrator,
+        engine=engine,
+        plant=plant,
+        control_period=control_period,
+        log_dt=log_dt,
+        rtol=rtol,
+        atol=atol,
+        progress=progress,
+    )
 
 
 def _needs_rk4(integrator: str, engine: str, control_period: float | None) -> None:
@@ -227,69 +244,6 @@ def _needs_rk4(integrator: str, engine: str, control_period: float | None) -> No
         raise InputError(f"engine='compiled' has the integrator 'rk4' only, found {integrator!r}")
     if control_period is not None:
         raise InputError(f"control_period: sampled control needs the integrator 'rk4', found {integrator!r}")
-
-
-def _needs_plain_plant(plant: Plant) -> None:
-    special = {
-        f"plant='{plant.physics}'": plant.physics != "pinocchio",
-        "saturation": plant.saturate,
-        "payloads": bool(plant.payloads),
-        type(plant).__name__: type(plant) is not Plant,
-    }
-    for name in (name for name, found in special.items() if found):
-        raise InputError(f"engine='compiled' does not have {name}; use engine='pinocchio'")
-
-
-def _collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> Result:
-    """Log samples one by one."""
-    recorder, guard = SampleRecorder(run.loop, len(run.clock.logged)), Guard(run.loop)
-
-    def log() -> None:
-        for sample in samples:
-            guard.check(sample)
-            recorder.add(sample)
-            if progress is not None:
-                progress(sample.t)
-
-    return _finish(run, recorder, log)
-
-
-def run_reference(run: Run, progress: Progress | None = None) -> Result:
-    """A planned run by the reference engine and the fixed-step integrator."""
-    if run.every is not None:
-        return _collect(run, sampled_rk4(run.loop, run.clock, run.schedule, run.every), progress)
-    return _collect(run, rk4(run.loop, run.clock, run.schedule), progress)
-
-
-def run_compiled(
-    run: Run,
-    progress: Progress | None = None,
-    libraries: dict[str, CDLL] | None = None,
-    tables: Tables | None = None,
-) -> Result:
-    """A planned run by generated code; `libraries` and `tables` are what earlier runs have left."""
-    from .compiled.engine import advance
-    from .compiled.program import Program
-
-    _needs_plain_plant(run.loop.plant)
-    run.info["engine"] = "compiled"
-    recorder, program = Recorder(run.loop, len(run.clock.logged)), Program(run.loop, libraries)
-    return _finish(
-        run,
-        recorder,
-        lambda: advance(program, run.clock, run.schedule, recorder, run.every, progress, tables),
-    )
-
-
-def _finish(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:
-    """Let a run log itself; a failure takes along what was logged."""
-    with np.errstate(all="ignore"):  # overflow is found and named by the guard
-        try:
-            log()
-        except SimulationError as error:
-            error.result = recorder.result(f"stopped: {error}", run.info, run.experiment)
-            raise
-    return recorder.result("completed", run.info, run.experiment)
 
 
 def _describe(disturbance: Disturbance) -> dict[str, Any]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 from ..errors import SimulationError, SweepError, SynctrlError
 from ..simulation.prepared import Prepared
-from ..simulation.result import LAYOUT, Result
+from ..simulation.result import Result
 from .distributions import Value
 from .factors import Factor, Setup
 from .journal import Row
@@ -26,14 +26,10 @@ class Task(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """A run that was made: its row and, if it is to be kept, arrays and info of its decimated result."""
+    """A run that was made: its row and, if it is to be kept, its decimated result."""
 
     row: Row
-    kept: tuple[dict[str, Any], dict[str, Any]] | None = None
-
-    def result(self) -> Result | None:
-        """The decimated result."""
-        return None if self.kept is None else Result(**self.kept[0], info=self.kept[1])
+    kept: Result | None = None
 
 
 class Job(NamedTuple):
@@ -123,22 +119,22 @@ class Runner:
         row = [task.run, *task.values, status, cause, None if time is None else float(time), *values]
         return Outcome(row, self._keep(task, result))
 
-    def _keep(self, task: Task, result: Result | None) -> tuple[dict[str, Any], dict[str, Any]] | None:
+    def _keep(self, task: Task, result: Result | None) -> Result | None:
         if self.job.keep_every is None or result is None:
             return None
         thin = result.decimated(self.job.keep_every)
-        return {name: getattr(thin, name) for name in LAYOUT}, {**thin.info, "run": task.run}
+        return replace(thin, info={**thin.info, "run": task.run}, experiment=None)
 
 
 def run_batch(payload: bytes, tasks: Sequence[Task]) -> list[Outcome]:
     """Make some runs of a pickled job; what a worker process is asked to do."""
-    runner = _runner(payload, threading.get_ident())
+    runner = _runner(payload)
     return [runner.outcome(task) for task in tasks]
 
 
 @lru_cache(maxsize=8)
-def _runner(payload: bytes, thread: int) -> Runner:
-    """The runner of a job, made once per thread: robots must not be shared between threads."""
+def _runner(payload: bytes) -> Runner:
+    """The runner of a job, which the threads of a process share."""
     import pickle
 
     return Runner(pickle.loads(payload))

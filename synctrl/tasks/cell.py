@@ -15,9 +15,17 @@ from ..robots.friction import Friction
 from ..robots.parameters import Parameters
 from ..robots.robot import Robot
 from .coupling import Coupling
-from .member_checks import check_friction, check_names, check_parameters, check_space, check_trajectory
+from .desired import desired_motion, desired_weights
+from .member_checks import (
+    check_friction,
+    check_labels,
+    check_names,
+    check_parameters,
+    check_space,
+    check_trajectory,
+)
 from .spaces import JointSpace, Space
-from .trajectories import Trajectory
+from .trajectories import Motion, Trajectory
 from .weights import Weights
 
 
@@ -109,6 +117,7 @@ class Cell:
         self._check_members()
         self._set_parameters()
         self._set_initial_state()
+        check_labels(self)
 
     # -- sizes --------------------------------------------------------------------------------------------
 
@@ -142,8 +151,16 @@ class Cell:
 
     def reference_table(self, times: np.ndarray) -> Reference:
         """What is desired at all of the times, (T,), with time as the first axis."""
-        motions = np.stack([member.trajectory(times) for member in self.members])  # (n, 3, T, m)
-        return Reference(motions.transpose(2, 1, 0, 3), self.coupling.weights(times, self.m))
+        motions = np.stack([self.motion(i, times) for i in range(self.n)])  # (n, 3, T, m)
+        return Reference(motions.transpose(2, 1, 0, 3), self.weights(times))
+
+    def motion(self, robot: int, times: np.ndarray) -> Motion:
+        """What is desired of one robot at the times, (T,); see `desired_motion`."""
+        return desired_motion(self.names[robot], robot, self.members[robot].trajectory, times)
+
+    def weights(self, times: np.ndarray) -> Weights:
+        """Weights of the coupling at the times, (T,); see `desired_weights`."""
+        return desired_weights(self.coupling, times, self.m)
 
     def references(self, times: np.ndarray) -> list[Reference]:
         """What is desired at each of the times, (T,)."""

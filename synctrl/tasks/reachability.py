@@ -28,10 +28,9 @@ def check_reachable(cell: Cell, times: np.ndarray) -> None:
     if not isinstance(cell.space, TipSpace):
         return
     times = np.unique(times[np.linspace(0, len(times) - 1, SAMPLES).astype(int)])
-    for name, member, q in zip(cell.names, cell.members, cell.q0, strict=True):
-        robot = member.robot
+    for i, (name, robot, q) in enumerate(zip(cell.names, cell.robots, cell.q0, strict=True)):
         q = q[: robot.nv]
-        for t, target in zip(times, member.trajectory(times).x, strict=True):
+        for t, target in zip(times, cell.motion(i, times).x, strict=True):
             found = inverse_kinematics(robot, target, q, cell.space)
             if found is None:
                 raise _unreachable(name, robot, t, target, cell)

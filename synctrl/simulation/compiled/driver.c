@@ -32,6 +32,7 @@ typedef struct { /* what is desired in one block of steps; stage 0: start, 1: mi
     const double *desired; /* (3, steps, n, 3 m) */
     const double *weights; /* (3, steps, n, 4 m m), or (n, 4 m m) if constant */
     int steps, constant;
+    int first, count;      /* the steps of the block to be made */
 } Reference;
 
 typedef struct { /* one row per logged instant */
@@ -58,7 +59,10 @@ typedef struct {
 
 enum { FINE = 0, NOT_FINITE = 1, SINGULAR = 2, CROSSED = 3, TURNED = 4 };
 
-typedef struct { int status, step, robot; double value; } Report;
+/* what happens at the start of a step */
+enum { CHECKED = 1, LOGGED = 2, SAMPLED = 4 };
+
+typedef struct { int status, step, robot; double value; long rows; } Report; /* rows: how many were logged */
 
 static int state_size(const Cell *c) { return c->n * (2 * c->nv + c->P) + c->p * c->m; }
 static int J_size(const Cell *c) { return 3 * c->m * c->nv + c->m * c->m; }
@@ -66,11 +70,11 @@ static int J_size(const Cell *c) { return 3 * c->m * c->nv + c->m * c->m; }
 static const double *weights_of(const Cell *c, const Reference *r, int stage, int step, int i) {
     int size = 4 * c->m * c->m;
     if (r->constant) return r->weights + (size_t)i * size;
-    return r->weights + (((size_t)stage * r->steps + step) * c->n + i) * size;
+    return r->weights + (((size_t)stage * r->steps + r->first + step) * c->n + i) * size;
 }
 
 static const double *desired_of(const Cell *c, const Reference *r, int stage, int step, int i) {
-    return r->desired + (((size_t)stage * r->steps + step) * c->n + i) * 3 * c->m;
+    return r->desired + (((size_t)stage * r->steps + r->first + step) * c->n + i) * 3 * c->m;
 }
 
 static void measure(const Cell *c, const Reference *r, int stage, int step, const double *y, Work *k) {
@@ -279,20 +283,17 @@ static void finish(double *y, double h, double *const *s, int size) {
     for (int j = 0; j < size; j++) y[j] += h / 6 * (s[0][j] + 2 * (s[1][j] + s[2][j]) + s[3][j]);
 }
 
-/* Advance y through a block of steps; continuous control. Returns the number of rows logged. */
-long advance(const Cell *c, const Reference *r, const double *t, const char *logged, const int *window,
+/* Advance y through some steps of a block; continuous control. Rows are counted in the report. */
+void advance(const Cell *c, const Reference *r, const double *t, const char *marks, const int *window,
              const double *disturbances, double *y, Log *log, Work *k, Report *report) {
     int size = state_size(c);
-    long rows = 0;
-    for (int step = 0; step < r->steps; step++) {
+    for (int step = 0; step < r->count; step++) {
         double h = t[step + 1] - t[step];
         const double *d = disturbances + (size_t)window[step] * c->n * c->nv;
         report->step = step;
         evaluate(c, r, 0, step, y, d, k->k[0], k);
-        if (logged[step]) {
-            if (check(c, y, k, report)) return rows;
-            record(c, r, step, rows++, y, k->tau, d, log, k);
-        }
+        if (marks[step] & CHECKED && check(c, y, k, report)) return;
+        if (marks[step] & LOGGED) record(c, r, step, report->rows++, y, k->tau, d, log, k);
         combine(k->stage, y, 0.5 * h, k->k[0], size);
         evaluate(c, r, 1, step, k->stage, d, k->k[1], k);
         combine(k->stage, y, 0.5 * h, k->k[1], size);
@@ -301,28 +302,25 @@ long advance(const Cell *c, const Reference *r, const double *t, const char *log
         evaluate(c, r, 2, step, k->stage, d, k->k[3], k);
         finish(y, h, k->k, size);
     }
-    return rows;
 }
 
-/* The same with torque and adaptation held between samples. */
-long advance_sampled(const Cell *c, const Reference *r, const double *t, const char *logged, const char *due,
-                     const int *window, const double *disturbances, double *y, Log *log, Work *k,
-                     Report *report) {
+/* The same with torque and adaptation held between samples. A logged torque acts from its instant on. */
+void advance_sampled(const Cell *c, const Reference *r, const double *t, const char *marks, const int *window,
+                     const double *disturbances, double *y, Log *log, Work *k, Report *report) {
     int size = state_size(c);
-    long rows = 0;
-    for (int step = 0; step < r->steps; step++) {
+    for (int step = 0; step < r->count; step++) {
         double h = t[step + 1] - t[step];
         const double *d = disturbances + (size_t)window[step] * c->n * c->nv;
         report->step = step;
-        if (logged[step]) {
+        if (marks[step] & CHECKED) {
             evaluate(c, r, 0, step, y, d, k->k[0], k);
-            if (check(c, y, k, report)) return rows;
-            if (due[step]) {
-                memcpy(k->held, k->k[0], sizeof(double) * size);
-                memcpy(k->held_tau, k->tau, sizeof(double) * c->n * c->nv);
-            }
-            record(c, r, step, rows++, y, k->held_tau, d, log, k);
+            if (check(c, y, k, report)) return;
         }
+        if (marks[step] & SAMPLED) {
+            memcpy(k->held, k->k[0], sizeof(double) * size);
+            memcpy(k->held_tau, k->tau, sizeof(double) * c->n * c->nv);
+        }
+        if (marks[step] & LOGGED) record(c, r, step, report->rows++, y, k->held_tau, d, log, k);
         for (int stage = 0; stage < 4; stage++) {
             double ahead = stage == 0 ? 0 : stage == 3 ? h : 0.5 * h;
             combine(k->stage, y, ahead, k->k[stage ? stage - 1 : 0], size);
@@ -330,7 +328,6 @@ long advance_sampled(const Cell *c, const Reference *r, const double *t, const c
         }
         finish(y, h, k->k, size);
     }
-    return rows;
 }
 
 /* y' at one instant */

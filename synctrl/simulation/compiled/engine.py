@@ -5,65 +5,113 @@ from __future__ import annotations
 import ctypes
 import operator
 from collections.abc import Callable, Iterable, Iterator
-from itertools import chain
+from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...errors import OrientationError, SimulationError
 from ...tasks.cell import Cell
-from ..clock import Clock
+from ..clock import Clock, Stretch
 from ..disturbances import DisturbanceSchedule
 from ..guard import fastest, not_finite, run_away, singular
+from ..handover import tell, up_to_a_failure
 from ..recorder import Recorder
 from .program import Program
 from .structs import LogStruct, ReferenceStruct, ReportStruct
 
 #: bytes of references that one block of steps may need
 BLOCK_BYTES = 32_000_000
+#: steps of a block at most
+BLOCK_STEPS = 1024
+#: how long the library may be away, s: Ctrl-C is seen when it comes back
+AWAY = 0.05
 
 
 class Block(NamedTuple):
-    """Consecutive steps, [first, last) of the clock, with what is desired at their start, middle and end."""
+    """Consecutive steps with what is desired at their start, middle and end."""
 
-    first: int
-    last: int
+    steps: Stretch
     desired: np.ndarray
     weights: np.ndarray
 
 
 def blocks(program: Program, clock: Clock) -> Iterator[Block]:
-    """The steps of a run, in blocks that fit into memory."""
-    cell, count = program.loop.cell, len(clock.times) - 1
+    """The steps of a run, in blocks that fit into memory; all before an instant whose references fail."""
+    cell = program.loop.cell
+
+    def make(first: int, last: int) -> Block:
+        stretch = clock.stretch(first, last)
+        return Block(stretch, *_tables(cell, stretch.stages))
+
+    for first, last in clock.stretches(_length(cell)):
+        yield from up_to_a_failure(make, first, last)
+
+
+def _length(cell: Cell) -> int:
+    """Steps of a block."""
+    return min(BLOCK_STEPS, max(1, BLOCK_BYTES // _step_bytes(cell)))
+
+
+def _step_bytes(cell: Cell) -> int:
+    """Bytes of what is desired in one step."""
     weights = 0 if cell.coupling.is_constant else 4 * cell.m**2
-    length = max(1, BLOCK_BYTES // (3 * 8 * cell.n * (3 * cell.m + weights)))
-    for first in range(0, count, length):
-        last = min(first + length, count)
-        starts, ends = clock.times[first:last], clock.times[first + 1 : last + 1]
-        middles, ends = 0.5 * (starts + ends), np.nextafter(ends, -np.inf)
-        yield Block(first, last, *_tables(cell, np.array([starts, middles, ends])))
+    return 3 * 8 * cell.n * (3 * cell.m + weights)
+
+
+class Kept(NamedTuple):
+    """The blocks of a run, and what they were made for: motions and weights, the clock, and its log."""
+
+    made_for: tuple[Any, ...]
+    instants: tuple[Clock, int] | None
+    blocks: list[Block]
 
 
 class Tables:
-    """What is desired in a run that fits into one block, kept for the next run with the same motions."""
+    """What is desired in a run, kept for the next one with the same motions if it fits into memory.
+
+    What is kept is looked up and replaced as a whole, so threads may share it.
+    """
 
     def __init__(self) -> None:
-        self._made_for: tuple[Any, ...] = ()
-        self._times = np.zeros(0)
-        self._blocks: list[Block] = []
+        self._kept = Kept((), None, [])
 
     def blocks(self, program: Program, clock: Clock) -> Iterable[Block]:
         """The steps of a run, made anew if the run before had other motions, weights or instants."""
-        cell = program.loop.cell
+        cell, kept = program.loop.cell, self._kept
+        if clock.steps * _step_bytes(cell) > BLOCK_BYTES:
+            return blocks(program, clock)
         wanted = (cell.coupling, *(member.trajectory for member in cell.members))
-        same = len(wanted) == len(self._made_for) and all(map(operator.is_, wanted, self._made_for))
-        if not (same and np.array_equal(self._times, clock.times)):
-            fresh = blocks(program, clock)
-            first = next(fresh)
-            if first.last < len(clock.times) - 1:
-                return chain([first], fresh)
-            self._made_for, self._times, self._blocks = wanted, clock.times, [first]
-        return self._blocks
+        same = len(wanted) == len(kept.made_for) and all(map(operator.is_, wanted, kept.made_for))
+        if same and kept.instants == (clock, clock.every):
+            return kept.blocks
+        return self._keep(blocks(program, clock), wanted, clock)
+
+    def _keep(self, fresh: Iterable[Block], wanted: tuple[Any, ...], clock: Clock) -> Iterator[Block]:
+        """Fresh blocks, which are known from when the last of them has been made."""
+        found = []
+        for block in fresh:
+            found.append(block)
+            yield block
+        self._kept = Kept(wanted, (clock, clock.every), found)
+
+
+class Pace:
+    """How many steps the library makes at a time, so that it is back before `AWAY`; measured on the way."""
+
+    def __init__(self) -> None:
+        self._steps = 1
+
+    def parts(self, count: int) -> Iterator[tuple[int, int]]:
+        """Steps 0 to `count` as ranges [first, last), each to be made before the next is asked for."""
+        first = 0
+        while first < count:
+            last = min(first + self._steps, count)
+            start = perf_counter()
+            yield first, last
+            took = max(perf_counter() - start, 1e-6)
+            self._steps = max(1, min(8 * self._steps, int(0.5 * AWAY / took * (last - first))))
+            first = last
 
 
 def advance(
@@ -82,79 +130,102 @@ def advance(
         clock: its instants.
         schedule: disturbances.
         recorder: where logged instants go; after a failure it has those before it.
-        every: with sampled control, how many logged instants one sample lasts.
-        progress: called with the time reached, s, after every block.
+        every: with sampled control, how many steps of dt one sample lasts.
+        progress: called with the time reached, s, several times a second.
         tables: those of earlier runs.
 
     Raises:
         NonFiniteError, SingularJacobianError, OrientationError: as the reference engine.
+        SynctrlError: a desired motion or weight fails.
     """
-    y = program.loop.initial_state()
-    steps = _Steps(program, clock, schedule, every)
+    y, pace = program.loop.initial_state(), Pace()
+    steps = _Steps(program, clock, schedule, recorder, every)
     for block in blocks(program, clock) if tables is None else tables.blocks(program, clock):
-        steps.advance(block, y, recorder)
-        if progress is not None:
-            progress(float(clock.times[block.last]))
-    steps.finish(y, recorder)
+        for first, last in pace.parts(len(block.steps.starts)):
+            steps.advance(block, first, last, y)
+            recorder.reached = float(block.steps.times[last])
+            tell(progress, recorder.reached)
+    steps.finish(y)
 
 
 class _Steps:
     """The library's `advance` with everything it needs for one run."""
 
-    def __init__(self, program: Program, clock: Clock, schedule: DisturbanceSchedule, every: int | None):
+    def __init__(
+        self,
+        program: Program,
+        clock: Clock,
+        schedule: DisturbanceSchedule,
+        recorder: Recorder,
+        every: int | None,
+    ):
         self._program, self._clock, self._every = program, clock, every
-        self._middles = 0.5 * (clock.times[:-1] + clock.times[1:])
-        self._window = schedule.windows(self._middles).astype(np.intc)
+        self._schedule, self._recorder = schedule, recorder
         self._torques = np.ascontiguousarray(schedule.torques)
-        self._logged = np.isin(clock.times, clock.logged)
-        index = np.cumsum(self._logged) - 1
-        self._due = self._logged & (index % (every or 1) == 0)
         ctypes.memset(program.work.sign, 0, 8 * program.loop.cell.n)
 
-    def advance(self, block: Block, y: np.ndarray, recorder: Recorder) -> None:
-        """Move y through a block, in place."""
-        steps = slice(block.first, block.last)
-        times = np.ascontiguousarray(self._clock.times[block.first : block.last + 1])
-        self._call(block, times, self._logged[steps], self._due[steps], self._window[steps], y, recorder)
+    def advance(self, block: Block, first: int, last: int, y: np.ndarray) -> None:
+        """Move y through some steps of a block, in place."""
+        steps = block.steps
+        part = slice(first, last)
+        marks = _marks(steps.checked[part], steps.logged[part], self._due(steps.number[part]))
+        window = self._schedule.windows(steps.middles[part])
+        self._call(block, first, steps.times[first : last + 1], marks, window, y)
 
-    def finish(self, y: np.ndarray, recorder: Recorder) -> None:
+    def finish(self, y: np.ndarray) -> None:
         """Log the end of the run: one step of no length."""
-        end = self._clock.times[-1:]
-        tables = _tables(self._program.loop.cell, np.array([end] * 3))
-        times, yes, no = np.repeat(end, 2), np.array([True]), np.array([False])
-        self._call(Block(0, 1, *tables), times, yes, no, self._window[-1:], y, recorder)
+        end, clock = np.array([self._clock.end]), self._clock
+        at = np.array([clock.count])
+        nothing = Stretch(clock.steps, np.repeat(end, 2), at > 0, at > 0, at)
+        block = Block(nothing, *_tables(self._program.loop.cell, np.array([end] * 3)))
+        due = np.array([self._every is not None and clock.sampled_at_end(self._every)])
+        window = self._schedule.windows(clock.stretch(clock.steps - 1, clock.steps).middles)
+        self._call(block, 0, nothing.times, _marks(at > 0, at > 0, due), window, y)
+
+    def _due(self, number: np.ndarray) -> np.ndarray:
+        return number % (self._every or 1) == 0
 
     def _call(
         self,
         block: Block,
+        first: int,
         times: np.ndarray,
-        logged: np.ndarray,
-        due: np.ndarray,
+        marks: np.ndarray,
         window: np.ndarray,
         y: np.ndarray,
-        recorder: Recorder,
     ) -> None:
-        program, library = self._program, self._program.library
+        program, library, recorder = self._program, self._program.library, self._recorder
         constant = program.loop.cell.coupling.is_constant
         table = ReferenceStruct(
-            block.desired.ctypes.data, block.weights.ctypes.data, len(times) - 1, int(constant)
-        )
+            block.desired.ctypes.data, block.weights.ctypes.data, len(block.steps.starts), int(constant),
+            first, len(marks),
+        )  # fmt: skip
         rows = recorder.rows_ahead()
         log, report = LogStruct(*(row.ctypes.data for row in rows[1:])), ReportStruct()
-        arrays = [times, logged, due, np.ascontiguousarray(window), self._torques, y]
-        if self._every is None:
-            del arrays[2]
+        arrays = [np.ascontiguousarray(times), marks, window.astype(np.intc), self._torques, y]
         call = library.advance if self._every is None else library.advance_sampled
-        call.restype = ctypes.c_long
-        count = call(
-            ctypes.byref(program.cell),
-            ctypes.byref(table),
-            *(array.ctypes.data_as(ctypes.c_void_p) for array in arrays),
-            *(ctypes.byref(struct) for struct in (log, program.work, report)),
-        )
-        recorder.advance(times[:-1][logged][:count])
+        call.restype = None
+        try:
+            call(
+                ctypes.byref(program.cell),
+                ctypes.byref(table),
+                *(array.ctypes.data_as(ctypes.c_void_p) for array in arrays),
+                *(ctypes.byref(struct) for struct in (log, program.work, report)),
+            )
+        finally:  # an interrupt that came meanwhile is raised before the call has returned
+            recorder.advance(times[:-1][marks & LOGGED > 0][: report.rows])
         if report.status:
             raise _failure(program, float(times[report.step]), report, y, recorder.last("v"))
+
+
+#: what happens at the start of a step, as in driver.c
+CHECKED, LOGGED, SAMPLED = 1, 2, 4
+
+
+def _marks(checked: np.ndarray, logged: np.ndarray, due: np.ndarray) -> np.ndarray:
+    """What happens at the start of each step, as one number; samples fall on multiples of dt."""
+    marks = CHECKED * checked + LOGGED * logged + SAMPLED * (checked & due)
+    return marks.astype(np.int8)
 
 
 def _tables(cell: Cell, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -164,10 +235,10 @@ def _tables(cell: Cell, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     flat = instants.ravel()
     desired = np.empty((flat.size, cell.n, 3, cell.m))
-    for i, member in enumerate(cell.members):
-        for k, part in enumerate(member.trajectory(flat)):
+    for i in range(cell.n):
+        for k, part in enumerate(cell.motion(i, flat)):
             desired[:, i, k] = part
-    parts = cell.coupling.weights(flat[:1] if cell.coupling.is_constant else flat, cell.m)
+    parts = cell.weights(flat[:1] if cell.coupling.is_constant else flat)
     return desired, np.stack(parts, axis=2)  # as one row of instants after the other
 
 

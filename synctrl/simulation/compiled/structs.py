@@ -33,6 +33,8 @@ class ReferenceStruct(ctypes.Structure):
         ("weights", ctypes.c_void_p),
         ("steps", ctypes.c_int),
         ("constant", ctypes.c_int),
+        ("first", ctypes.c_int),
+        ("count", ctypes.c_int),
     ]
 
 
@@ -71,4 +73,5 @@ class ReportStruct(ctypes.Structure):
         ("step", ctypes.c_int),
         ("robot", ctypes.c_int),
         ("value", ctypes.c_double),
+        ("rows", ctypes.c_long),
     ]

@@ -1,0 +1,148 @@
+"""A planned run, and the three ways to make it; whatever ends it hands over what was computed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..errors import RunInterrupted, SynctrlError
+from ..tasks.reachability import SAMPLES, check_reachable
+from .clock import Clock
+from .closed_loop import ClosedLoop
+from .disturbances import DisturbanceSchedule
+from .guard import Guard
+from .handover import Progress, tell, user_failure
+from .integrators import Sample, adaptive, rk4
+from .recorder import Recorder, SampleRecorder
+from .result import Result
+from .sampled import sampled_rk4
+from .saturation import warn_of_saturation
+
+if TYPE_CHECKING:
+    from ctypes import CDLL
+
+    from .compiled.engine import Tables
+
+#: instants at which weights are looked at before a run, at most
+WEIGHT_SAMPLES = 2000
+
+
+class Run(NamedTuple):
+    """A run that is about to start.
+
+    `every` is how many steps of dt a sample of sampled control lasts, or None; `experiment` is what the
+    result will know as its own.
+    """
+
+    experiment: Any
+    loop: ClosedLoop
+    clock: Clock
+    schedule: DisturbanceSchedule
+    every: int | None
+    info: dict[str, Any]
+
+    def check(self) -> None:
+        """Look ahead, before anything runs.
+
+        Raises:
+            UnreachableError: a robot cannot reach its desired positions.
+            CouplingError: a weight loses its inverse on the way.
+            MissingDependencyError, InputError: a library cannot compute the plant, or refuses a robot.
+            SimulationError: a function of the user's fails.
+            RunInterrupted: by Ctrl-C.
+        """
+        cell = self.loop.cell
+        with _before_the_start(self):
+            self.loop.plant.prepare()
+            check_reachable(cell, self.clock.spread(SAMPLES))
+            cell.coupling.check_weights(self.clock.spread(WEIGHT_SAMPLES), cell.m)
+
+
+def run_reference(run: Run, progress: Progress | None = None) -> Result:
+    """A planned run by the reference engine and the fixed-step integrator."""
+    if run.every is not None:
+        return _collect(run, sampled_rk4(run.loop, run.clock, run.schedule, run.every), progress)
+    return _collect(run, rk4(run.loop, run.clock, run.schedule), progress)
+
+
+def run_adaptive(run: Run, method: str, rtol: float, atol: float, progress: Progress | None = None) -> Result:
+    """A planned run by one of SciPy's methods."""
+    run.info.update(integrator=method, rtol=rtol, atol=atol)
+    return _collect(run, adaptive(run.loop, run.clock, run.schedule, method, rtol, atol), progress)
+
+
+def run_compiled(
+    run: Run,
+    progress: Progress | None = None,
+    libraries: dict[str, CDLL] | None = None,
+    tables: Tables | None = None,
+) -> Result:
+    """A planned run by generated code; `libraries` and `tables` are what earlier runs have left."""
+    from .compiled.engine import advance
+    from .compiled.program import Program
+
+    run.info["engine"] = "compiled"
+    recorder = Recorder(run.loop, run.clock)
+    with _before_the_start(run):
+        program = Program(run.loop, libraries)
+    return _finish(
+        run,
+        recorder,
+        lambda: advance(program, run.clock, run.schedule, recorder, run.every, progress, tables),
+    )
+
+
+def _collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> Result:
+    """Watch samples one by one, and log those that belong into the log."""
+    recorder, guard = SampleRecorder(run.loop, run.clock), Guard(run.loop)
+
+    def log() -> None:
+        for sample in samples:
+            guard.check(sample)
+            recorder.reached = sample.t
+            if sample.logged:
+                recorder.add(sample)
+                tell(progress, sample.t)
+
+    return _finish(run, recorder, log)
+
+
+def _finish(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:
+    """Let a run log itself; whatever ends it takes along what was logged."""
+
+    def logged(status: str) -> Result:
+        return recorder.result(status, run.info, run.experiment)
+
+    with np.errstate(all="ignore"):  # overflow is found and named by the guard
+        try:
+            log()
+        except KeyboardInterrupt:
+            raise _interrupted(recorder.reached, logged) from None
+        except SynctrlError as error:
+            error.result = logged(f"stopped: {error}")
+            raise
+        except Exception as error:
+            failure = user_failure(error, recorder.reached)
+            failure.result = logged(f"stopped: {failure}")
+            raise failure from error
+        result = logged("completed")
+    warn_of_saturation(result)
+    return result
+
+
+@contextmanager
+def _before_the_start(run: Run) -> Iterator[None]:
+    """Hand over an empty result if Ctrl-C comes while a run is being prepared."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        nothing = Recorder(run.loop, run.clock)
+        raise _interrupted(0.0, lambda s: nothing.result(s, run.info, run.experiment)) from None
+
+
+def _interrupted(t: float, logged: Callable[[str], Result]) -> RunInterrupted:
+    message = f"interrupted at t = {t:g} s"
+    return RunInterrupted(message, time=t, result=logged(f"stopped: {message}"))

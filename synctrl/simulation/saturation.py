@@ -1,0 +1,81 @@
+"""How much of the torque that a controller asked for was cut off, and what it learned meanwhile."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import SaturationWarning
+from .limits import torque_limits
+from .plant import Plant
+
+if TYPE_CHECKING:
+    from .result import Result
+
+#: the output that has what was left of the torque
+APPLIED = "applied_torque"
+
+
+def saturation_report(plant: Plant, arrays: Mapping[str, np.ndarray]) -> list[dict[str, Any]]:
+    """Joints whose torque was cut off, in order of robots and joints.
+
+    Args:
+        plant: the plant.
+        arrays: `tau`, (T, n, nv), N·m, and `theta_hat`, (T, n, P), at the logged instants.
+
+    Returns:
+        One entry per joint: `robot` and `joint`, counted from 0; `limit`, N·m; `share` of the logged instants
+        at which the controller asked for more; `largest`, the largest torque that it asked for, N·m; and
+        `theta_hat`, the largest magnitude of the robot's estimates at the start and over the run.
+    """
+    if not plant.saturate:
+        return []
+    size, limits = np.abs(arrays["tau"]), torque_limits(plant.cell)
+    share = (size > limits).mean(axis=0) if len(size) else np.zeros(limits.shape)
+    return [
+        {
+            "robot": int(i),
+            "joint": int(joint),
+            "limit": float(limits[i, joint]),
+            "share": float(share[i, joint]),
+            "largest": float(size[:, i, joint].max()),
+            "theta_hat": _growth(arrays["theta_hat"][:, i]),
+        }
+        for i, joint in np.argwhere(share > 0)
+    ]
+
+
+def _growth(theta_hat: np.ndarray) -> list[float]:
+    """Largest magnitude of estimates, (T, P), at the start and over the run."""
+    size = np.abs(theta_hat)
+    return [float(size[0].max()), float(size.max())]
+
+
+def applied_output(plant: Plant, tau: np.ndarray) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """What reached the joints of torques tau, (T, n, nv), N·m, as an output, and its description."""
+    if not plant.saturate:
+        return {}, {}
+    return {APPLIED: plant.applied(tau)}, {APPLIED: {"unit": "N·m", "axes": ["time", "robot", "joint"]}}
+
+
+def warn_of_saturation(result: Result) -> None:
+    """Warn if torque was cut off: the controller does not know, and goes on adapting and integrating."""
+    found = result.info["saturation"]
+    if not found:
+        return
+    worst = max(found, key=lambda entry: entry["largest"] / entry["limit"])
+    start, largest = max((entry["theta_hat"] for entry in found), key=lambda pair: pair[1])
+    grown = f", {largest / start:.3g} times as much" if start > 0 else ""
+    warnings.warn(
+        f"{result.info['title']}: torque was cut off at {len(found)} joints, for up to "
+        f"{max(entry['share'] for entry in found):.0%} of the time; {result.names[worst['robot']]}, joint "
+        f"{worst['joint'] + 1} asked for {worst['largest']:.3g} N·m of its {worst['limit']:.3g}. Estimates "
+        "and integrals of the synchronization errors went on meanwhile as if it had got it: the largest "
+        f"entry of theta_hat went from {start:.3g} to {largest:.3g}{grown}. See info['saturation'] and "
+        f"outputs['{APPLIED}']; lower the gains, or ask for a slower motion",
+        SaturationWarning,
+        stacklevel=2,
+    )
