@@ -6,15 +6,14 @@ passes the rigid-body algorithms once; its trees do not act on each other. Array
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from functools import partial
-from itertools import groupby
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pinocchio as pin
 
-from .blocks import Blocks
+from .blocks import Blocks, Rows
 from .per_thread import PerThread
 from .robot import Robot
 
@@ -26,6 +25,7 @@ SMALL = 24
 _WORLD = pin.Convention.WORLD
 #: p @ _CROSS are the entries of the matrix P with a @ P = a x p
 _CROSS = np.array([[[0, -z, y], [z, 0, -x], [-y, x, 0]] for x, y, z in np.eye(3)]).reshape(3, 9)
+K = TypeVar("K", bound=Hashable)
 
 
 class Forest:
@@ -160,24 +160,43 @@ class _Scratch:
         self.arms, self.arms_dot = (A.reshape(n, 18)[:, 9:] for A in (self.to_tip, self.to_tip_dot))
 
 
-def forests(robots: Sequence[Robot], joints: int = LARGE) -> list[tuple[slice, Forest]]:
-    """Forests that together have all robots, each with the rows it stands for.
+def forests(robots: Sequence[Robot], joints: int = LARGE) -> list[tuple[Rows, Forest]]:
+    """Forests that together have all robots, each with the rows it stands for, which ascend.
+
+    Robots share a forest wherever they stand: how many forests there are does not depend on their order.
 
     Args:
         robots: the robots.
         joints: joints of a forest at most.
     """
-    found = []
-    for size, group in groupby(range(len(robots)), lambda i: _size(robots[i])):
-        rows, step = list(group), max(1, joints // size[0])
-        for first in range(rows[0], rows[-1] + 1, step):
-            part = slice(first, min(first + step, rows[-1] + 1))
-            found.append((part, Forest(robots[part])))
+    return [(as_rows(part), Forest([robots[i] for i in part])) for part in shares(robots, joints)]
+
+
+def shares(robots: Sequence[Robot], joints: int) -> Iterator[list[int]]:
+    """Which robots have a forest of at most so many joints in common."""
+    for (nv, *_), rows in alike(map(_size, robots)).items():
+        step = max(1, joints // nv)
+        yield from (rows[first : first + step] for first in range(0, len(rows), step))
+
+
+def alike(kinds: Iterable[K]) -> dict[K, list[int]]:
+    """Where each kind is found."""
+    found: dict[K, list[int]] = {}
+    for i, kind in enumerate(kinds):
+        found.setdefault(kind, []).append(i)
     return found
 
 
+def as_rows(indices: Sequence[int]) -> Rows:
+    """Ascending indices of rows; as a slice, which copies nothing, where they are evenly spaced."""
+    first, *others = indices
+    step = others[0] - first if others else 1
+    even = range(first, indices[-1] + 1, step)
+    return slice(even.start, even.stop, step) if list(even) == list(indices) else np.array(indices)
+
+
 def _size(robot: Robot) -> tuple[Any, ...]:
-    """What robots of one forest have in common."""
+    """What robots of one forest have in common, first of all their number of joints."""
     return robot.nv, robot.model.nq, robot.body_count, tuple(robot.gravity_vector.tolist())
 
 
