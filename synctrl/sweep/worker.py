@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -128,13 +129,13 @@ class Runner:
 
 def run_batch(payload: bytes, tasks: Sequence[Task]) -> list[Outcome]:
     """Make some runs of a pickled job; what a worker process is asked to do."""
-    runner = _runner(payload)
+    runner = _runner(payload, threading.get_ident())
     return [runner.outcome(task) for task in tasks]
 
 
 @lru_cache(maxsize=8)
-def _runner(payload: bytes) -> Runner:
-    """The runner of a job, which the threads of a process share."""
+def _runner(payload: bytes, thread: int) -> Runner:
+    """The runner of a job, made once per thread: a user's functions need not be safe to share."""
     import pickle
 
     return Runner(pickle.loads(payload))
