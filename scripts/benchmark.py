@@ -34,6 +34,7 @@ from synctrl.errors import SimulationError
 from synctrl.experiments import (
     a460_pair, mixed_four, mobile_robot, panda_four, planar_four, rigid_object, ur5_payload,
 )  # fmt: skip
+from synctrl.files import write_whole
 from synctrl.simulation.run import run_compiled, run_reference
 
 DT = 1e-3
@@ -263,11 +264,10 @@ def main(folder: Path, effort: Effort) -> Path:
             tables.append(measure(effort))
             print(markdown({}, tables[-1:]).split("\n", 3)[3], flush=True)
     about = machine()
-    folder.mkdir(parents=True, exist_ok=True)
     content = {"machine": about, "tables": [table._asdict() for table in tables]}
-    (folder / "benchmark.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    write_whole(folder / "benchmark.json", json.dumps(content, indent=1) + "\n")
     report = folder / "benchmark.md"
-    report.write_text(markdown(about, tables), encoding="utf-8")
+    write_whole(report, markdown(about, tables))
     return report
 
 

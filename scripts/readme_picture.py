@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 from synctrl.experiments import planar_four
+from synctrl.files import whole_file
 from synctrl.show.plots import common_limits, new_figure, style
 from synctrl.show.style import ACCENT, display, line_style, robot_color
 
@@ -35,7 +36,8 @@ def main() -> None:
         for i in range(4):
             panels[0, 0].plot([], [], color=robot_color(i), linewidth=2.4, label=f"robot {i + 1}")
         figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=4)
-        figure.savefig(path, metadata={"Software": None})
+        with whole_file(path) as file:
+            figure.savefig(file, metadata={"Software": None})
     print(path)
 
 

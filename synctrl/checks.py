@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from unicodedata import category
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .errors import InputError
+
+#: characters of a name or a unit
+LONGEST_LABEL = 1000
 
 
 def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | None = None) -> np.ndarray:
@@ -75,6 +80,29 @@ def choice(name: str, value: object, known: tuple[str, ...]) -> str:
     if not isinstance(value, str) or value not in known:
         raise InputError(f"{name}: expected one of {', '.join(map(repr, known))}, found {value!r}")
     return str(value)
+
+
+def label(name: str, value: object) -> str:
+    """`value` if it is a text of one line, which files, pages and figures can hold."""
+    instance(name, value, str, "a text")
+    line = str(value)
+    if len(line) > LONGEST_LABEL or unprintable(line):
+        raise InputError(
+            f"{name}: expected a text of one line, up to {LONGEST_LABEL} characters, found {line!a:.80}"
+        )
+    return line
+
+
+def unprintable(text: str) -> str | None:
+    """The first control character or half of a surrogate pair in a text; None if there is none."""
+    if text.isprintable():  # which refuses some more, but is quick
+        return None
+    return next((c for c in text if category(c) in ("Cc", "Cs")), None)
+
+
+def printable(text: str) -> str:
+    """A text of one or more lines with everything that cannot be shown replaced."""
+    return "".join(c if c in "\n\t" or unprintable(c) is None else "\ufffd" for c in text)
 
 
 def _fits(found: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:

@@ -11,7 +11,18 @@ from difflib import get_close_matches
 from typing import Any
 
 
-class SynctrlError(Exception):
+class Portable(BaseException):
+    """An exception that can be copied and sent to another process, with its message and all its attributes.
+
+    Python makes an exception again by calling its class with its message, which fails where the class asks
+    for more than that. Here it is put together from its parts instead. `__cause__` stays behind.
+    """
+
+    def __reduce__(self) -> tuple:
+        return _remade, (type(self), self.args), *super().__reduce__()[2:]
+
+
+class SynctrlError(Portable, Exception):
     """Base of all errors raised by synctrl.
 
     Attributes:
@@ -48,10 +59,6 @@ class FrameNotFound(RobotError):
             f"robot '{robot}' has no frame '{frame}'{near(frame, self.available)}; "
             f"its frames are: {', '.join(self.available)}"
         )
-
-    def __reduce__(self) -> tuple:
-        """Other processes make it from its parts, not from its message."""
-        return type(self), (self.robot, self.frame, self.available)
 
 
 class CouplingError(SynctrlError):
@@ -107,7 +114,7 @@ class OrientationError(SimulationError):
     """An orientation error close to half a turn, where its direction is not defined."""
 
 
-class RunInterrupted(KeyboardInterrupt):
+class RunInterrupted(Portable, KeyboardInterrupt):
     """A run that was interrupted, for example by Ctrl-C.
 
     Attributes:
@@ -138,6 +145,14 @@ class CompilationError(SynctrlError):
 
 class MissingDependencyError(SynctrlError, ImportError):
     """An optional package is needed for what was asked."""
+
+
+def _remade(kind: type[BaseException], args: tuple) -> BaseException:
+    """An exception of a kind that is told its message only; its attributes are set afterwards."""
+    error = kind.__new__(kind, *args)
+    builtin = next(base for base in kind.__mro__ if base.__module__ == "builtins")
+    builtin.__init__(error, *args)  # type: ignore[misc]
+    return error
 
 
 def failed(what: str, t: float, error: Exception, robot: int | None = None) -> SimulationError:

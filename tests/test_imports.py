@@ -22,6 +22,7 @@ PACKAGE = ROOT / "synctrl"
 ROOMS = (
     "errors",
     "checks",
+    "files",
     "robots",
     "tasks",
     "control",

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import instance
 from ..errors import InputError
 from ..simulation.result import Result
 
@@ -41,6 +42,10 @@ def compare_runs(ours: Result, theirs: Result) -> Comparison:
     Raises:
         InputError: other instants, or another cell.
     """
+    for run in (ours, theirs):
+        instance("runs", run, Result, "a Result")
+    if not len(ours.t):
+        raise InputError(f"run '{ours.info['title']}': expected at least one logged instant, found none")
     if not np.array_equal(ours.t, theirs.t) or ours.x.shape != theirs.x.shape:
         raise InputError(f"runs: expected the same instants of the same cell, found {ours!r} and {theirs!r}")
     tracking, sync = (

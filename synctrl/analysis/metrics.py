@@ -16,6 +16,7 @@ import numpy as np
 
 from ..checks import instance, non_negative_number
 from ..errors import InputError, ResultError
+from ..files import write_whole
 from ..simulation.result import Result
 
 FORMAT = "synctrl metrics 1"
@@ -78,7 +79,8 @@ def metrics(result: Result, bands: Mapping[str, float] | None = None) -> Metrics
     Raises:
         InputError: no instants, or a band that is negative or not finite.
     """
-    bands = settling_bands(result) if bands is None else bands
+    own = settling_bands(result)
+    bands = own if bands is None else bands
     tracking, sync = (error_metrics(result.t, getattr(result, kind), bands[kind]) for kind in ERRORS)
     return Metrics(tracking, sync, np.abs(result.tau).max(axis=0))
 
@@ -129,6 +131,7 @@ def settling_bands(*results: Result, fraction: float = SETTLING_FRACTION) -> dic
 
 def row_names(result: Result, kind: str) -> list[str]:
     """Names of the rows of `tracking_error` (robots) or `sync_error` (pairs of robots)."""
+    instance("result", result, Result, "a Result")
     if kind == "tracking_error":
         return result.names
     return [
@@ -141,6 +144,7 @@ def as_data(result: Result, computed: Metrics) -> dict[str, Any]:
 
     `["sync_error"]["values"][row][axis]["rms"]` is one of them; a settling time that is not reached is None.
     """
+    instance("result", result, Result, "a Result")
     info = result.info
     data: dict[str, Any] = {"title": info["title"], "status": result.status, "duration": float(result.t[-1])}
     data["duration_unit"] = "s"
@@ -197,8 +201,7 @@ def write_metrics(path: str | Path, runs: Mapping[str, Mapping], claims: list[Ma
         raise InputError(f"metrics: expected finite numbers only ({error})") from error
     path = Path(path)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text + "\n", encoding="utf-8")
+        write_whole(path, text + "\n")
     except OSError as error:
         raise ResultError(f"cannot write the metrics to '{path}': {error.strerror or error}") from error
     return path

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any, Self
 
 from ..errors import ResultError, SimulationError
@@ -141,8 +142,7 @@ def _check_writable(folder: Path) -> None:
     """Fail before anything runs where nothing could be saved."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / ".writable"
-        probe.touch()
-        probe.unlink()
+        with TemporaryFile(dir=folder):
+            pass
     except OSError as error:
         raise ResultError(f"cannot write into the folder '{folder}': {error.strerror or error}") from error

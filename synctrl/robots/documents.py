@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, positive_number
 from ..errors import FrameNotFound, InputError, RobotError
+from ..files import write_whole
 from .catalog import load_description
 from .urdf import Description, lock_joints
 from .urdf_checks import check_bodies, check_tree, inertial_fault
@@ -131,7 +132,8 @@ def write_urdf(document: Document, path: str | Path) -> Path:
     check_bodies(document)
     _check_meshes(document, file)
     try:
-        file.write_text(to_xml(document), encoding="utf-8")
+        file.parent.stat()  # a folder of a mistyped name is not made
+        write_whole(file, to_xml(document))
     except OSError as error:
         raise InputError(f"{file}: expected a file that can be written, found: {error.strerror}") from error
     return file

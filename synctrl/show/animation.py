@@ -9,6 +9,7 @@ from ..errors import InputError
 from ..robots.robot import Robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
+from .runs import check_run, frame_indices, shown_experiment
 from .scene import Scene
 from .style import DESIRED, robot_color
 
@@ -21,6 +22,8 @@ BALL, PUSH = 0.016, 0.075  # m, radius of a tip and of the mark of a disturbance
 PAYLOAD = (0.5, 0.08, 0.05)  # m
 PLANAR_TIMES, PAIR_TIMES = 10.0, 20.0  # how much larger tracking errors are drawn
 FPS = 30.0
+#: arrays of a run that its scene is made of
+DRAWN = "x", "x_desired", "sync_error", "q", "disturbance"
 
 
 def planar_scene(
@@ -41,6 +44,7 @@ def planar_scene(
     Raises:
         InputError: a run in another space, or one without its experiment.
     """
+    check_run(result, *DRAWN)
     if result.info["axes"] != ["x", "y"]:
         raise InputError(f"result: expected tips along x and y, found {', '.join(result.info['axes'])}")
     share, limit = _share(result, limit)
@@ -48,7 +52,7 @@ def planar_scene(
         f"Bars between neighbours: synchronization error, thick and red from {_shown(result, limit)}. "
         f"Thin bars at the tips: tracking error, {PLANAR_TIMES:g} times as large. Dark lines: desired paths."
     )
-    frames = _frames(result, fps)
+    frames = frame_indices(result, fps)
     scene, robots = _robots(result, experiment, frames, fps, caption, colored=True)
     height = float(robots[0].tip_position(result.q[0, 0, : robots[0].nv])[2])
     tips, desired = (_with_height(x[frames], height) for x in (result.x, result.x_desired))
@@ -78,6 +82,7 @@ def payload_pair_scene(
     Raises:
         InputError: a run of other robots or in another space, or one without its experiment.
     """
+    check_run(result, *DRAWN)
     if result.x.shape[1] != 2 or result.info["task_unit"] != "rad":
         raise InputError(
             "result: expected two robots in joint space, found "
@@ -89,7 +94,7 @@ def payload_pair_scene(
         f"error. Thin bars at the wrists: tracking error, {PAIR_TIMES:g} times as large. "
         "Dark lines: desired paths."
     )
-    frames = _frames(result, fps)
+    frames = frame_indices(result, fps)
     scene, robots = _robots(result, experiment, frames, fps, caption, colored=False)
     wrists, desired = (_tips(robots, q[frames]) for q in (result.q, result.x_desired))
     color, _ = _mark(share[frames].max(axis=1))
@@ -110,9 +115,7 @@ def _robots(
     colored: bool,
 ) -> tuple[Scene, tuple[Robot, ...]]:
     """A scene with the robots, in their own colours or in those of the figures."""
-    experiment = experiment or result.experiment
-    if experiment is None:
-        raise InputError("experiment: expected the one that made this result, which was loaded from a file")
+    experiment = shown_experiment(result, experiment)
     title = str(result.info["title"])
     scene = Scene(fps=fps, title=title[:1].upper() + title[1:], caption=caption)
     for i, robot in enumerate(experiment.cell.robots):
@@ -149,12 +152,6 @@ def _tips(robots: tuple[Robot, ...], q: np.ndarray) -> np.ndarray:
     return np.array(
         [[robot.tip_position(row[: robot.nv]) for robot, row in zip(robots, qs, strict=True)] for qs in q]
     )
-
-
-def _frames(result: Result, fps: float) -> np.ndarray:
-    """Indices of the instants that are shown."""
-    times = np.arange(0.0, result.t[-1], 1 / positive_number("fps", fps))
-    return np.clip(np.searchsorted(result.t, times), 0, len(result.t) - 1)
 
 
 def _share(result: Result, limit: float | None) -> tuple[np.ndarray, float]:

@@ -11,6 +11,7 @@ from ..robots.robot import Robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .plots import new_figure, plain, style
+from .runs import check_run, shown_experiment
 from .style import DESIRED, robot_color
 
 if TYPE_CHECKING:
@@ -34,9 +35,10 @@ def cell_layout(result: Result, experiment: Experiment | None = None) -> Figure:
     Raises:
         InputError: a run in another space, or one without its experiment.
     """
-    experiment = experiment or result.experiment
-    if experiment is None or result.info["axes"] != ["x", "y"]:
-        raise InputError("result: expected a run along x and y with its experiment, found another or none")
+    check_run(result, "x", "x_desired", "q")
+    if result.info["axes"] != ["x", "y"]:
+        raise InputError(f"result: expected a run along x and y, found {', '.join(result.info['axes'])}")
+    experiment = shown_experiment(result, experiment)
     with style():
         figure, panels = new_figure(5.4, columns=2, width=8.8, gridspec_kw={"width_ratios": (0.4, 1.0)})
         _draw_surroundings(panels[0, 0], result)

@@ -13,10 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analysis.metrics import row_names
+from ..analysis.metrics import ERRORS, row_names
+from ..checks import choice, finite_array, printable
 from ..errors import InputError, ResultError
+from ..files import whole_file
 from ..simulation.result import Result
 from .panels import DPI, GAP, LEGEND, TITLE, WIDTH, stacked_panels
+from .runs import check_run
 from .style import ACCENT, DESIRED, display, line_style, robot_color
 
 if TYPE_CHECKING:
@@ -91,14 +94,13 @@ def save(figure: Figure, stem: str | Path) -> tuple[Path, Path]:
 
     png, svg = Path(f"{stem}.png"), Path(f"{stem}.svg")
     try:
-        png.parent.mkdir(parents=True, exist_ok=True)
-        with style():
+        with style(), whole_file(svg) as vectors, whole_file(png) as pixels:
             if engine := figure.get_layout_engine():
                 engine.execute(figure)
                 figure.set_layout_engine("none")  # it is arranged now, for both files
             # savefig would draw once more for each file, only to arrange again
-            FigureCanvasSVG(figure).print_svg(svg, metadata={"Date": None, "Creator": None})
-            FigureCanvasAgg(figure).print_png(png, metadata={"Software": None}, pil_kwargs=_PNG)
+            FigureCanvasSVG(figure).print_svg(vectors, metadata={"Date": None, "Creator": None})
+            FigureCanvasAgg(figure).print_png(pixels, metadata={"Software": None}, pil_kwargs=_PNG)
     except OSError as error:
         raise ResultError(f"cannot write the figure '{stem}': {error.strerror or error}") from error
     return png, svg
@@ -117,6 +119,7 @@ def joint_trajectories(result: Result, robot: int) -> Figure:
     Raises:
         InputError: there is no such robot.
     """
+    check_run(result, "x", "x_desired")
     _check_robot(result, robot)
     unit, factor = display(result.unit("x"))
     axes_names = result.info["axes"]
@@ -158,7 +161,10 @@ def sync_errors(result: Result, limits: tuple[float, float] | None = None) -> Fi
 
 def common_limits(kind: str, *results: Result) -> tuple[float, float]:
     """Limits that figures of an error share when their runs are compared: all that the runs need."""
+    choice("kind", kind, ERRORS)
     own = [_needed(result, kind) for result in results]
+    if not own:
+        raise InputError("results: expected at least one run, found none")
     return min(low for low, _ in own), max(high for _, high in own)
 
 
@@ -175,8 +181,8 @@ _INDEX = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 def _errors(result: Result, kind: str, what: str, limits: tuple[float, float] | None) -> Figure:
     own = _needed(result, kind)
-    shown = [limits or own]
-    if limits and own[1] - own[0] < SMALL * (limits[1] - limits[0]):
+    shown = [own if limits is None else _read_limits(limits)]
+    if limits is not None and own[1] - own[0] < SMALL * (shown[0][1] - shown[0][0]):
         shown.append(own)
     unit, factor = display(result.unit(kind))
     with style():
@@ -232,8 +238,8 @@ def _row_handles(result: Result, kind: str) -> list[Any]:
 
 
 def plain(name: str) -> str:
-    """A name with nothing in it that matplotlib would read as a formula."""
-    return name.replace("$", r"\$")
+    """A name with nothing in it that matplotlib would read as a formula, or could not write."""
+    return printable(name).replace("\n", " ").replace("$", r"\$")
 
 
 def _axis_handles(result: Result) -> list[Any]:
@@ -262,13 +268,18 @@ def _mark_disturbances(panel: Axes, result: Result) -> list[Any]:
     """Shade the windows in which torques act from outside; returns what the legend needs."""
     marks = []
     for window in result.info.get("disturbances", ()):
-        name = plain(result.names[window["robot"]])
-        label = f"torque on {name}"
-        mark = panel.axvspan(
-            window["start"], window["stop"], color=ACCENT, alpha=0.12, linewidth=0, label=label
-        )
-        marks.append(mark)
+        start, stop = np.clip((window["start"], window["stop"]), result.t[0], result.t[-1])
+        if start < stop:
+            label = f"torque on {plain(result.names[window['robot']])}"
+            marks.append(panel.axvspan(start, stop, color=ACCENT, alpha=0.12, linewidth=0, label=label))
     return marks
+
+
+def _read_limits(limits: tuple[float, float]) -> tuple[float, float]:
+    low, high = finite_array("limits", limits, (2,))
+    if not low < high:
+        raise InputError(f"limits: expected the lower one first, found {low:g} and {high:g}")
+    return float(low), float(high)
 
 
 def _check_robot(result: Result, robot: int) -> None:
@@ -279,9 +290,8 @@ def _check_robot(result: Result, robot: int) -> None:
 
 def _needed(result: Result, kind: str) -> tuple[float, float]:
     """Lowest and highest value of an error, zero among them, with some room."""
+    check_run(result, kind)
     e = getattr(result, kind)
-    if not e.size:
-        raise InputError(f"run '{result.info['title']}': nothing was logged, so there is nothing to draw")
     low, high = min(float(e.min()), 0.0), max(float(e.max()), 0.0)
     room = 0.06 * (high - low) or 1.0
     return low - room, high + room

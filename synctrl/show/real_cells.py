@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, positive_number
+from ..checks import finite_array
 from ..errors import InputError
 from ..simulation.result import Result
 from ..tasks import rotations
 from ..tasks.poses import Attached
+from .runs import check_run, frame_indices, shown_experiment
 from .scene import Scene
 from .style import DESIRED, robot_color
 
@@ -17,6 +18,8 @@ GOOD, BAD = np.array([0.10, 0.62, 0.35]), np.array([0.80, 0.10, 0.10])
 #: synchronization error that is shown fully red, as a share of the largest of the run
 RED = 0.3
 LINE, BAR, BALL = 0.005, 0.008, 0.018  # m
+#: arrays of a run that its scene is made of
+DRAWN = "x", "x_desired", "sync_error", "q"
 
 
 def formation_scene(result: Result, fps: float = 25) -> Scene:
@@ -31,10 +34,11 @@ def formation_scene(result: Result, fps: float = 25) -> Scene:
     Raises:
         InputError: a run in another space, or one without its experiment.
     """
+    check_run(result, *DRAWN)
     if list(result.info["axes"]) != ["x", "y", "z"]:
         found = ", ".join(result.info["axes"])
         raise InputError(f"result: expected tips along x, y and z, found the coordinates {found}")
-    frames = _frames(result, fps)
+    frames = frame_indices(result, fps)
     scene = _robots(
         result, frames, fps, "Bars between compared tips turn red with the synchronization error."
     )
@@ -62,7 +66,8 @@ def payload_scene(result: Result, size: ArrayLike, fps: float = 25) -> Scene:
     Raises:
         InputError: a run of other desired motions, or one without its experiment.
     """
-    frames = _frames(result, fps)
+    check_run(result, *DRAWN)
+    frames = frame_indices(result, fps)
     scene = _robots(
         result, frames, fps, "The payload turns red with the synchronization error; it has no mass."
     )
@@ -86,21 +91,14 @@ def error_colors(result: Result) -> np.ndarray:
 
 
 def _robots(result: Result, frames: np.ndarray, fps: float, caption: str) -> Scene:
-    if result.experiment is None:
-        raise InputError("result: expected a run that still has its experiment, found one loaded from a file")
+    experiment = shown_experiment(result, None)
     scene = Scene(fps=fps, title=str(result.info["title"]), caption=caption)
-    for i, robot in enumerate(result.experiment.cell.robots):
+    for i, robot in enumerate(experiment.cell.robots):
         q = np.array([robot.configuration(row) for row in result.q[frames, i, : robot.nv]])
         if robot.visual is None:
             raise InputError(f"robot '{robot.name}' has no shapes to show")
         scene.add_robot(result.names[i], robot.model, robot.visual, q)
     return scene
-
-
-def _frames(result: Result, fps: float) -> np.ndarray:
-    """Indices of the instants that are shown."""
-    times = np.arange(0.0, result.t[-1], 1 / positive_number("fps", fps))
-    return np.clip(np.searchsorted(result.t, times), 0, len(result.t) - 1)
 
 
 def _held(x: np.ndarray, hands: list[Attached]) -> tuple[np.ndarray, np.ndarray]:

@@ -16,6 +16,7 @@ from typing import Protocol
 
 from ..analysis.claims import Claim, Quantity
 from ..errors import InputError, ResultError
+from ..files import write_whole
 from .formulas import formula_svg
 from .style import display
 
@@ -172,8 +173,7 @@ def write_page(path: str | Path, title: str, sections: Sequence[Section]) -> Pat
         f"<main>{''.join(_section(k, s) for k, s in enumerate(sections))}</main></body></html>\n"
     )
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(page, encoding="utf-8")
+        write_whole(path, page.encode("utf-8", "replace"))
     except OSError as error:
         raise ResultError(f"cannot write the page '{path}': {error.strerror or error}") from error
     return path

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance, positive_number
 from ..errors import InputError
+from ..files import write_whole
 from ..robots.kinematics import joint_poses
 from . import shapes
 from .colors import ColorLike, hex_color, read_color, within_unit
@@ -193,8 +194,7 @@ class Scene:
         """
         path = Path(path)
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(self.page().encode("utf-8", "replace"))
+            write_whole(path, self.page().encode("utf-8", "replace"))
         except OSError as error:
             raise InputError(f"animation '{path}' cannot be written: {error.strerror}") from error
         return path

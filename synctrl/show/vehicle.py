@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, positive_number
 from ..errors import InputError
 from ..simulation.result import Result
+from .runs import check_run, frame_times
 from .scene import Scene
 
 BODY, WHEEL, SPOKE, NOSE = "#c9d3de", "#26282b", "#ee8730", "#2f6fb3"
@@ -49,12 +50,13 @@ def vehicle_animation(result: Result, wheel_radius: float, track: float, fps: fl
     Raises:
         InputError: a run of other robots.
     """
+    check_run(result, "x", "x_desired")
     if result.x.shape[1:] != (2, 1):
         raise InputError(
             f"result: expected two wheels with one angle each, found {result.x.shape[1]} robots with "
             f"{result.x.shape[2]} coordinates"
         )
-    times = np.arange(0, result.t[-1], 1 / positive_number("fps", fps))
+    times = frame_times(result, fps)
     frames = np.searchsorted(0.5 * (result.t[1:] + result.t[:-1]), times)  # the nearest logged instants
     driven = vehicle_path(result.x[:, :, 0], wheel_radius, track)
     desired = vehicle_path(result.x_desired[:, :, 0], wheel_radius, track)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import printable
 from .clock import Clock
 from .closed_loop import ClosedLoop
 from .damping import DampingLog
@@ -69,7 +70,7 @@ class Recorder:
     def result(self, status: str, info: Mapping[str, Any], experiment: Any) -> Result:
         """What was logged until now."""
         arrays = {name: _taken(array, self.count) for name, array in self._arrays.items()}
-        described = {"status": status, **describe(self._loop), **info}
+        described = {"status": printable(status), **describe(self._loop), **info}
         described["damping"] = self._damping.report(arrays["t"])
         seen = (arrays[name] for name in ("t", "q", "v", "tau"))
         described["limits"] = limit_report(self._loop.cell, *seen)

@@ -3,48 +3,25 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from copy import deepcopy
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
 from ..checks import instance
 from ..errors import InputError, ResultError
+from .result_file import read_result, write_result
+from .result_schema import FORMAT, LAYOUT, check_shape, shapes, unit_of
 
-FORMAT = "synctrl result 2"
-#: what is read; files of format 1 have no outputs
-FORMATS = ("synctrl result 1", FORMAT)
+__all__ = ["FORMAT", "LAYOUT", "Result", "unit_of"]
 
-#: array -> (dimensions, unit); "task" stands for the unit of the task, "weighted" for that of c e
-LAYOUT: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
-    {
-        "t": (("time",), "s"),
-        "x": (("time", "robot", "axis"), "task"),
-        "x_desired": (("time", "robot", "axis"), "task"),
-        "tracking_error": (("time", "robot", "axis"), "task"),
-        "sync_error": (("time", "pair", "axis"), "weighted"),
-        "sync_integral": (("time", "pair", "axis"), "weighted·s"),
-        "coupled_error": (("time", "robot", "axis"), "weighted"),
-        "q": (("time", "robot", "joint"), "rad"),
-        "v": (("time", "robot", "joint"), "rad/s"),
-        "v_error": (("time", "robot", "joint"), "rad/s"),
-        "tau": (("time", "robot", "joint"), "N·m"),
-        "disturbance": (("time", "robot", "joint"), "N·m"),
-        "theta_hat": (("time", "robot", "parameter"), "SI"),
-    }
-)
-
+R = TypeVar("R", bound="Result")
 #: what the names of outputs begin with in a file
 OUTPUTS = "outputs/"
-
-
-def unit_of(array: str, task: str, weighted: str) -> str:
-    """Unit of an array of `LAYOUT`, given those of the task and of c e."""
-    return LAYOUT[array][1].replace("task", task).replace("weighted", weighted)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +43,11 @@ class Result:
         info: what the arrays mean and how they came about: names, units, gains, options, versions, `status`.
         outputs: further arrays by name, each with time as its first axis; `info["outputs"][name]` has the
             "unit" of each and the names of its "axes".
-        experiment: the closed loop that made it, while in memory; not saved and not compared.
+        experiment: the closed loop that made it, while it stays in one process: copies share it, but it is
+            neither compared, nor saved, nor pickled, for it may hold functions that cannot be.
 
     Raises:
-        InputError: an output without a description, or of another number of instants.
+        InputError: outputs that are not those that `info["outputs"]` speaks of, or of another shape.
 
     Rows of robots with fewer joints or parameters than the largest are padded with zeros;
     `info["robots"]` has their numbers.
@@ -95,7 +73,7 @@ class Result:
     def __post_init__(self) -> None:
         object.__setattr__(self, "info", MappingProxyType(dict(self.info)))
         object.__setattr__(self, "outputs", MappingProxyType(dict(self.outputs)))
-        _check_described(self)
+        _check_outputs(self)
         for array in self._arrays().values():
             array.flags.writeable = False
 
@@ -103,6 +81,22 @@ class Result:
         """All arrays, outputs included, under the names they have in a file."""
         outputs = {f"{OUTPUTS}{name}": array for name, array in self.outputs.items()}
         return {**{name: getattr(self, name) for name in LAYOUT}, **outputs}
+
+    def __reduce__(self) -> tuple:
+        return _remade, (type(self), {**self._contents(), "experiment": None})
+
+    def __copy__(self) -> Self:
+        return _remade(type(self), self._contents())
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        contents = self._contents()
+        shared = {"experiment": contents.pop("experiment")}
+        return _remade(type(self), {**deepcopy(contents, memo), **shared})
+
+    def _contents(self) -> dict[str, Any]:
+        """All fields, mappings as plain dictionaries."""
+        contents = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {**contents, "info": dict(self.info), "outputs": dict(self.outputs)}
 
     @property
     def status(self) -> str:
@@ -137,26 +131,16 @@ class Result:
         return type(self)(**arrays, info=info, outputs=outputs, experiment=self.experiment)
 
     def save(self, path: str | Path) -> Path:
-        """Write everything to an .npz file; it appears under its name only once it is complete.
+        """Write everything to an .npz file, which appears under its name only once it is complete.
+
+        Any number of processes may save to one path; the last one to finish wins.
 
         Raises:
-            ResultError: the file cannot be written.
+            ResultError: the file cannot be written, or `load` would refuse what is in it.
         """
         instance("path", path, (str, Path), "a path")
-        path = Path(path)
-        if path.is_dir():
-            raise ResultError(f"cannot write the result to '{path}': it is a folder")
-        content = self._arrays()
-        info = json.dumps({"format": FORMAT, **self.info}, ensure_ascii=False)
-        partial = path.with_name(path.name + ".part")
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with partial.open("wb") as file:
-                np.savez(file, info=np.array(info), **content)
-            partial.replace(path)
-        except (OSError, ValueError) as error:
-            raise ResultError(f"cannot write the result to '{path}': {error}") from error
-        return path
+        write_result(Path(path), {"format": FORMAT, **self.info}, self._arrays())
+        return Path(path)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -166,20 +150,10 @@ class Result:
             ResultError: the file is missing, damaged, or no result.
         """
         instance("path", path, (str, Path), "a path")
-        path = Path(path)
-        if not path.is_file():
-            raise ResultError(f"no result file at '{path}'")
-        try:
-            info, arrays = _read(path)
-        except _DAMAGE as error:
-            raise ResultError(f"'{path}' is no complete result file of synctrl: {error}") from error
-        _check_content(path, info, arrays)
+        info, arrays = read_result(Path(path))
         info.pop("format")
         outputs = {name.removeprefix(OUTPUTS): arrays.pop(name) for name in [*arrays] if name not in LAYOUT}
-        try:
-            return cls(**arrays, info=info, outputs=outputs)
-        except InputError as error:
-            raise ResultError(f"'{path}': {error}") from None
+        return cls(**arrays, info=info, outputs=outputs)
 
     def __eq__(self, other: object) -> bool:
         """Same arrays, bit for bit, and same info."""
@@ -200,57 +174,20 @@ class Result:
         return f"Result({self.info['title']!r}, {n} robots, {m} axes, {len(self.t)} instants, {self.status})"
 
 
-def _check_described(result: Result) -> None:
+def _remade(kind: type[R], contents: dict[str, Any]) -> R:
+    return kind(**contents)
+
+
+def _check_outputs(result: Result) -> None:
+    """Refuse outputs that are not those that info speaks of."""
     described = result.info.get("outputs", {})
+    if described.keys() != result.outputs.keys():
+        raise InputError(
+            f"outputs: expected those of info['outputs'], {[*described]}, found {[*result.outputs]}"
+        )
+    expected = shapes(result.info, len(result.t)) if described else {}
     for name, array in result.outputs.items():
-        about = described.get(name)
-        if not isinstance(about, Mapping) or not {"unit", "axes"} <= about.keys():
-            raise InputError(
-                f"outputs, {name}: expected its unit and axes in info['outputs'], found {about!r}"
-            )
-        if len(array) != len(result.t) or array.ndim != len(about["axes"]) or about["axes"][0] != "time":
-            raise InputError(
-                f"outputs, {name}: expected the axes {about['axes']} with {len(result.t)} instants, found an "
-                f"array of shape {array.shape}"
-            )
-
-
-#: what reading a file that is no archive, or a damaged one, may raise
-_DAMAGE = (OSError, ValueError, KeyError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile)
-
-
-def _read(path: Path) -> tuple[Any, dict[str, np.ndarray]]:
-    """Content of an archive as `save` writes it: uncompressed, so no larger in memory than on disk."""
-    with zipfile.ZipFile(path) as archive:
-        if any(entry.compress_type != zipfile.ZIP_STORED for entry in archive.infolist()):
-            raise ValueError("expected uncompressed entries")
-    with np.load(path, allow_pickle=False) as content:
-        outputs = [name for name in content.files if name.startswith(OUTPUTS)]
-        return json.loads(str(content["info"])), {name: content[name] for name in (*LAYOUT, *outputs)}
-
-
-def _check_content(path: Path, info: Any, arrays: dict[str, np.ndarray]) -> None:
-    if not isinstance(info, dict) or info.get("format") not in FORMATS:
-        found = info.get("format") if isinstance(info, dict) else type(info).__name__
-        raise ResultError(f"'{path}': expected the format '{FORMAT}', found {found!r}")
-    for name in ("status", "title", "task_unit", "weighted_unit"):
-        if not isinstance(info.get(name), str):
-            raise ResultError(f"'{path}': info, {name}: expected a text, found {info.get(name)!r}")
-    sizes, robots = info.get("sizes"), info.get("robots")
-    if not isinstance(sizes, dict):
-        raise ResultError(f"'{path}': info, sizes: expected lengths by name, found {sizes!r}")
-    if not isinstance(robots, list) or not all(
-        isinstance(robot, dict) and isinstance(robot.get("name"), str) for robot in robots
-    ):
-        raise ResultError(f"'{path}': info, robots: expected one entry with a name per robot")
-    _check_shapes(path, {**sizes, "time": arrays["t"].size}, arrays)
-
-
-def _check_shapes(path: Path, sizes: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:
-    for name, (dimensions, _) in LAYOUT.items():
-        expected = tuple(sizes.get(d) for d in dimensions)
-        if arrays[name].shape != expected or arrays[name].dtype != np.float64:
-            raise ResultError(
-                f"'{path}': array '{name}': expected float64 of shape {expected}, "
-                f"found {arrays[name].dtype} of shape {arrays[name].shape}"
-            )
+        try:
+            check_shape(name, array.dtype, array.shape, expected[f"{OUTPUTS}{name}"])
+        except ResultError as error:
+            raise InputError(f"outputs: {error}") from None

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from types import NoneType
 from typing import Any
 
-from ..checks import boolean, choice, instance, positive_number
+from ..checks import boolean, choice, instance, label, positive_number
 from ..control.controller import Controller
 from ..control.gains import Gains
 from ..errors import InputError
@@ -55,7 +54,8 @@ class Experiment:
     def __post_init__(self) -> None:
         instance("cell", self.cell, Cell, "a Cell")
         instance("gains", self.gains, Gains, "Gains")
-        instance("title", self.title, (str, NoneType), "a text")
+        if self.title is not None:
+            label("title", self.title)
         positive_number("duration", self.duration)
         boolean("saturate", self.saturate)
         self.closed_loop()

@@ -102,9 +102,8 @@ class Evaluation:
             self.rows.update({row[0]: row for row in rows})
             return rows
         for outcome in outcomes:
-            result = outcome.result()
-            if result is not None:
-                result.save(kept_file(self._journal.folder, outcome.row[0]))
+            if outcome.kept is not None:
+                outcome.kept.save(kept_file(self._journal.folder, outcome.row[0]))
         self._journal.append(rows)
         return rows
 

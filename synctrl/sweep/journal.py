@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import IO, Any, Self
 
 from ..errors import ResultError
+from ..files import write_whole
 
 FORMAT = "synctrl sweep 1"
 ABOUT, RUNS, TABLE, KEPT = "sweep.json", "runs.jsonl", "table.csv", "runs"
@@ -187,16 +188,6 @@ def difference(there: Any, here: Any, where: str = "") -> str:
 def _short(value: Any) -> str:
     text = json.dumps(value, ensure_ascii=False)
     return text if len(text) <= 80 else text[:77] + "..."
-
-
-def write_whole(path: Path, text: str) -> None:
-    """Write a file that appears under its name only once it is complete."""
-    partial = path.with_name(path.name + ".part")
-    with partial.open("w", encoding="utf-8", newline="") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    partial.replace(path)
 
 
 def lock(file: IO[bytes], folder: Path) -> None:

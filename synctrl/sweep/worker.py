@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 from ..errors import SimulationError, SweepError, SynctrlError
 from ..simulation.prepared import Prepared
-from ..simulation.result import LAYOUT, Result
+from ..simulation.result import Result
 from .distributions import Value
 from .factors import Factor, Setup
 from .journal import Row
@@ -26,14 +27,10 @@ class Task(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """A run that was made: its row and, if it is to be kept, arrays and info of its decimated result."""
+    """A run that was made: its row and, if it is to be kept, its decimated result."""
 
     row: Row
-    kept: tuple[dict[str, Any], dict[str, Any]] | None = None
-
-    def result(self) -> Result | None:
-        """The decimated result."""
-        return None if self.kept is None else Result(**self.kept[0], info=self.kept[1])
+    kept: Result | None = None
 
 
 class Job(NamedTuple):
@@ -123,12 +120,11 @@ class Runner:
         row = [task.run, *task.values, status, cause, None if time is None else float(time), *values]
         return Outcome(row, self._keep(task, result))
 
-    def _keep(self, task: Task, result: Result | None) -> tuple[dict[str, Any], dict[str, Any]] | None:
+    def _keep(self, task: Task, result: Result | None) -> Result | None:
         if self.job.keep_every is None or result is None:
             return None
         thin = result.decimated(self.job.keep_every)
-        arrays = {name: getattr(thin, name) for name in LAYOUT}
-        return {**arrays, "outputs": dict(thin.outputs)}, {**thin.info, "run": task.run}
+        return replace(thin, info={**thin.info, "run": task.run}, experiment=None)
 
 
 def run_batch(payload: bytes, tasks: Sequence[Task]) -> list[Outcome]:

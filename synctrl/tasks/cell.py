@@ -16,7 +16,14 @@ from ..robots.parameters import Parameters
 from ..robots.robot import Robot
 from .coupling import Coupling
 from .desired import desired_motion, desired_weights
-from .member_checks import check_friction, check_names, check_parameters, check_space, check_trajectory
+from .member_checks import (
+    check_friction,
+    check_labels,
+    check_names,
+    check_parameters,
+    check_space,
+    check_trajectory,
+)
 from .spaces import JointSpace, Space
 from .trajectories import Motion, Trajectory
 from .weights import Weights
@@ -110,6 +117,7 @@ class Cell:
         self._check_members()
         self._set_parameters()
         self._set_initial_state()
+        check_labels(self)
 
     # -- sizes --------------------------------------------------------------------------------------------
 

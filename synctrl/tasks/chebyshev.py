@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev as cheb
 
+from ..errors import Portable
+
 DEGREE = 16
 #: largest error of c, c' and c'', see `tolerances`
 ACCURACY = 1e-8
@@ -65,7 +67,7 @@ class Piece(NamedTuple):
     largest: np.ndarray
 
 
-class NotSmoothError(Exception):
+class NotSmoothError(Portable, Exception):
     """A function whose derivatives cannot be certified.
 
     Attributes:

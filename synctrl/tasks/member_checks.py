@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array, instance
+from ..checks import finite_array, instance, label
 from ..errors import InputError
 from ..robots.friction import Friction
 from ..robots.robot import Robot
@@ -25,10 +25,28 @@ def check_names(cell: str, names: Sequence[str]) -> None:
         InputError: a name that is no text, or two robots of one name.
     """
     for name in (cell, *names):
-        instance("name", name, str, "a text")
+        label("name", name)
     twice = [name for name, count in Counter(names).items() if count > 1]
     if twice:
         raise InputError(f"name: expected another one for each robot, found {twice[0]!r} twice")
+
+
+def check_labels(cell: Any) -> None:
+    """Refuse words of a cell that the figures and files of its runs could not hold.
+
+    Raises:
+        InputError: a name or unit that is not a text of one line, or two coordinates of one name.
+    """
+    label("space: unit", cell.space.unit)
+    label("coupling: name", cell.coupling.name)
+    label("coupling: unit", cell.coupling.unit)
+    for axis in cell.labels:
+        label("space: name of a coordinate", axis)
+    if len({*cell.labels}) < len(cell.labels):
+        raise InputError(f"space: expected coordinates of different names, found {', '.join(cell.labels)}")
+    for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True):
+        for word in (robot.name, *robot.joint_names, *parameters.names):
+            label(f"{name}: name of a joint or parameter", word)
 
 
 def check_space(space: Any) -> None:

@@ -1,0 +1,84 @@
+"""Files that are whole: whoever reads a name finds all of one version, and never a part."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import secrets
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+
+@contextlib.contextmanager
+def whole_file(path: str | Path) -> Iterator[BinaryIO]:
+    """A file to write to, which appears under its name, and on the disk, once all is written.
+
+    Until then it has a name of its own in the same folder, so that any number of processes may write to one
+    path: the last one to finish wins. If writing fails nothing is left, and what was there before stays. The
+    folder is made; a link is followed.
+
+    Raises:
+        OSError: the file cannot be written, its name is none, or there is something that is no regular file.
+    """
+    target = _target(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    partial, descriptor = _create_beside(target)
+    try:
+        with open(descriptor, "wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        partial.replace(target)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            partial.unlink()
+        raise
+    _keep_name(target.parent)
+
+
+def write_whole(path: str | Path, content: str | bytes) -> None:
+    """Write text, as UTF-8 with lines as they are, or bytes, as `whole_file` does.
+
+    Raises:
+        OSError: see `whole_file`; also a text with half a surrogate pair, which no file can hold.
+    """
+    try:
+        data = content.encode("utf-8") if isinstance(content, str) else content
+    except UnicodeEncodeError as error:
+        found = error.object[error.start : error.end]
+        raise OSError(errno.EILSEQ, f"expected text that UTF-8 can hold, found {found!r} in it") from None
+    with whole_file(path) as file:
+        file.write(data)
+
+
+def _target(path: str | Path) -> Path:
+    """Where a path leads; there is a regular file, or nothing."""
+    try:
+        target = Path(os.path.realpath(path))
+        taken = target.exists() and not target.is_file()
+    except ValueError:  # a zero byte, or half a surrogate pair
+        raise OSError(errno.EINVAL, f"expected the name of a file, found {str(path)!r}") from None
+    if taken:
+        raise OSError(errno.EEXIST, "expected a file, found a folder, a device or the like")
+    return target
+
+
+def _create_beside(target: Path) -> tuple[Path, int]:
+    """A new file in the folder of another one, with the permissions that new files have here."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+    while True:
+        partial = target.with_name(f".synctrl-{secrets.token_hex(8)}.part")
+        with contextlib.suppress(FileExistsError):
+            return partial, os.open(partial, flags, 0o666)
+
+
+def _keep_name(folder: Path) -> None:
+    """Bring a new name in a folder to the disk, where the system can."""
+    with contextlib.suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)

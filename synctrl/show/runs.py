@@ -1,0 +1,84 @@
+"""What figures and animations ask of a run before they draw it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..analysis.replay import experiment_of
+from ..checks import instance, positive_number
+from ..errors import InputError
+from ..simulation.result import Result
+from ..simulation.simulate import Experiment
+
+#: numbers beyond it are those of a run that went astray; no picture of them says anything
+LARGEST = 1e30
+#: frames of an animation, about two hours at 25 frames per second
+MOST_FRAMES = 200_000
+
+
+def check_run(result: Result, *arrays: str) -> None:
+    """Refuse what cannot be drawn.
+
+    Args:
+        result: the run.
+        arrays: names of those of its arrays that are to be drawn.
+
+    Raises:
+        InputError: no run, one without instants, or numbers so large that there is nothing to see.
+    """
+    instance("result", result, Result, "a Result")
+    if not len(result.t):
+        raise InputError(f"run '{result.info['title']}': nothing was logged, so there is nothing to draw")
+    for name in arrays:
+        numbers = getattr(result, name)
+        seen = np.abs(numbers) <= LARGEST
+        if not seen.all():
+            found = numbers[~seen][0]
+            raise InputError(
+                f"run '{result.info['title']}', {name}: expected numbers up to {LARGEST:g} to draw, found "
+                f"{found:g}; the run went astray"
+            )
+
+
+def shown_experiment(result: Result, experiment: Experiment | None) -> Experiment:
+    """The experiment that made a run, given or still known.
+
+    Raises:
+        InputError: there is none, or it is that of another cell.
+    """
+    if experiment is None and result.experiment is None:
+        raise InputError(
+            "experiment: expected the one that made the result, or a result that still has its experiment; "
+            "this one was loaded from a file"
+        )
+    experiment = experiment_of(result, experiment)
+    cell = experiment.cell
+    if (cell.n, cell.nv, cell.m) != (*result.q.shape[1:], result.x.shape[2]):
+        raise InputError(
+            f"experiment: expected the one that made the result, of {result.q.shape[1]} robots with up to "
+            f"{result.q.shape[2]} joints and {result.x.shape[2]} coordinates, found {cell!r}"
+        )
+    return experiment
+
+
+def frame_times(result: Result, fps: float) -> np.ndarray:
+    """When the frames of an animation of a run are, at least one, s.
+
+    Raises:
+        InputError: `fps` is not positive, or there are more frames than an animation can hold.
+    """
+    fps = positive_number("fps", fps)
+    if result.t[-1] * fps > MOST_FRAMES:
+        raise InputError(
+            f"fps: expected at most {MOST_FRAMES} frames, found {result.t[-1] * fps:.3g} at {fps:g} a second"
+        )
+    return np.append(0.0, np.arange(0.0, result.t[-1], 1 / fps)[1:])
+
+
+def frame_indices(result: Result, fps: float) -> np.ndarray:
+    """Indices of the logged instants that the frames of an animation show, the first at their time or later.
+
+    Raises:
+        InputError: see `frame_times`.
+    """
+    return np.clip(np.searchsorted(result.t, frame_times(result, fps)), 0, len(result.t) - 1)

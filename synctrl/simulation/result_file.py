@@ -1,0 +1,179 @@
+"""Result files: an uncompressed .npz archive of arrays, and info as JSON.
+
+A file may come from anybody. What is read is compared with the size of the file before memory is asked for,
+headers are matched with the one form that numpy writes and not evaluated, and whatever is wrong is a
+ResultError.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+import numpy as np
+
+from ..errors import ResultError
+from ..files import whole_file
+from .result_schema import check_arrays, check_info, check_shape, shapes
+from .schema import read_json
+
+#: what reading a file that is no archive, or a damaged one, may raise
+_DAMAGE = (OSError, ValueError, LookupError, EOFError, RuntimeError, MemoryError, ArithmeticError)
+_DAMAGE_OF_ARCHIVES = (*_DAMAGE, zipfile.BadZipFile, struct.error)
+#: bytes that are read at a time
+CHUNK = 2**20
+MAGIC = b"\x93NUMPY\x01\x00"
+_HEADER = re.compile(
+    rb"\{'descr': '([<>])([fU])(\d{1,10})', 'fortran_order': (True|False), "
+    rb"'shape': \(((?:\d{1,19}, )*(?:\d{1,19},?)?)\), \} *\n"
+)
+
+
+def write_result(path: Path, info: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:
+    """Write a result; what is written can be read.
+
+    Args:
+        path: the file.
+        info: plain data, with its "format".
+        arrays: those of `LAYOUT`, and outputs after "outputs/".
+
+    Raises:
+        ResultError: the file cannot be written, or the result does not follow the schema.
+    """
+    with _named(path, "cannot write the result to"):
+        try:
+            text = json.dumps(info)
+        except (TypeError, ValueError, RecursionError) as error:
+            raise ResultError(f"info: expected plain data, found {error}") from None
+        check_info(read_json(text))
+        check_arrays(info, arrays)
+        content: dict[str, Any] = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+        with whole_file(path) as file:
+            np.savez(file, info=np.array(text), **content)
+
+
+def read_result(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Info and arrays of a result file.
+
+    Raises:
+        ResultError: the file is missing, damaged, or no result.
+    """
+    if not path.is_file():
+        raise ResultError(f"no result file at '{path}'")
+    with _named(path, "no result of synctrl can be read from"), zipfile.ZipFile(path) as archive:
+        members = _members(archive, path.stat().st_size)
+        info = read_json(_read_text(archive, members.pop("info", None)))
+        check_info(info)
+        arrays = _read_arrays(archive, members, info)
+        check_arrays(info, arrays)
+    return info, arrays
+
+
+@contextmanager
+def _named(path: Path, what: str) -> Iterator[None]:
+    """Name the file in whatever goes wrong."""
+    try:
+        yield
+    except (ResultError, *_DAMAGE_OF_ARCHIVES) as error:
+        raise ResultError(f"{what} '{path}': {error}") from error
+
+
+# -- archives ---------------------------------------------------------------------------------------------
+
+
+def _members(archive: zipfile.ZipFile, size: int) -> dict[str, zipfile.ZipInfo]:
+    """What is in an archive, by name of the array: no more than there is on the disk."""
+    found = archive.infolist()
+    if any(entry.compress_type != zipfile.ZIP_STORED for entry in found):
+        raise ResultError("expected uncompressed entries")
+    if sum(entry.file_size for entry in found) > size:
+        raise ResultError(f"expected entries of at most {size} bytes, as large as the file")
+    members = {entry.filename.removesuffix(".npy"): entry for entry in found}
+    if len(members) < len(found) or not all(entry.filename.endswith(".npy") for entry in found):
+        raise ResultError("expected each array once, in an entry called <name>.npy")
+    return members
+
+
+def _read_arrays(
+    archive: zipfile.ZipFile, members: Mapping[str, zipfile.ZipInfo], info: Mapping[str, Any]
+) -> dict[str, np.ndarray]:
+    """The arrays, each of the shape that info says; how many instants there are says the first one."""
+    if "t" not in members:
+        raise ResultError("expected an array 't', found none")
+    with archive.open(members["t"]) as stream:
+        instants = _read_header(stream, members["t"]).shape
+    expected = shapes(info, instants[0] if instants else 0)
+    if members.keys() != expected.keys():
+        different = ", ".join(sorted(members.keys() ^ expected.keys()))
+        raise ResultError(f"expected the arrays that info speaks of, these differ: {different}")
+    return {name: _read_array(archive, members[name], name, expected[name]) for name in expected}
+
+
+def _read_array(
+    archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str, expected: tuple[int | None, ...]
+) -> np.ndarray:
+    with archive.open(member) as stream:
+        header = _read_header(stream, member)
+        check_shape(name, header.dtype.newbyteorder("="), header.shape, expected)
+        return _read_numbers(stream, header).astype(float, copy=False)
+
+
+def _read_text(archive: zipfile.ZipFile, member: zipfile.ZipInfo | None) -> str:
+    """The one text of an array that holds nothing else."""
+    if member is None:
+        raise ResultError("expected an array 'info', found none")
+    with archive.open(member) as stream:
+        header = _read_header(stream, member)
+        if header.dtype.kind != "U" or header.shape:
+            raise ResultError(f"info: expected a text, found {header.dtype} of shape {header.shape}")
+        return str(_read_numbers(stream, header))
+
+
+# -- arrays -----------------------------------------------------------------------------------------------
+
+
+class Header(NamedTuple):
+    """What an .npy entry says of its array; all of it is there."""
+
+    dtype: np.dtype
+    order: Any
+    shape: tuple[int, ...]
+
+
+def _read_header(stream: IO[bytes], member: zipfile.ZipInfo) -> Header:
+    """The header of an .npy entry, in the only form in which numpy writes the arrays of a result."""
+    start = stream.read(len(MAGIC) + 2)
+    length = int.from_bytes(start[len(MAGIC) :], "little")
+    found = _HEADER.fullmatch(stream.read(length))
+    if not start.startswith(MAGIC) or found is None:
+        raise ResultError(f"{member.filename!a}: expected an array of numbers or a text")
+    byte_order, kind, width, fortran, lengths = (part.decode("ascii") for part in found.groups())
+    shape = tuple(int(k) for k in lengths.replace(",", " ").split())
+    if kind == "f" and width != "8":
+        raise ResultError(f"{member.filename!a}: expected float64, found float{8 * int(width)}")
+    size = int(width) * (4 if kind == "U" else 1)
+    for k in shape:
+        size *= k
+    if len(start) + length + size != member.file_size:
+        raise ResultError(
+            f"{member.filename!a}: expected {size} bytes of an array of shape {shape}, found "
+            f"{member.file_size - length - len(start)}"
+        )
+    return Header(np.dtype(f"{byte_order}{kind}{width}"), "F" if fortran == "True" else "C", shape)
+
+
+def _read_numbers(stream: IO[bytes], header: Header) -> np.ndarray:
+    array: np.ndarray = np.empty(header.shape, header.dtype, header.order)
+    left = memoryview(array.reshape(-1, order=header.order).view(np.uint8))  # type: ignore[arg-type]
+    while left:
+        read = stream.readinto(left[:CHUNK])  # type: ignore[attr-defined]
+        if not read:
+            raise EOFError("an array ends too early")
+        left = left[read:]
+    return array

@@ -1,0 +1,203 @@
+"""What a result consists of: its arrays, and what the package reads of its info."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import chain
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from ..errors import ResultError
+from .schema import (
+    above,
+    boolean,
+    each,
+    entries,
+    label,
+    number,
+    numbers,
+    optional,
+    rows,
+    text,
+    whole,
+)
+
+FORMAT = "synctrl result 2"
+#: what is read; files of format 1 have no outputs
+FORMATS = ("synctrl result 1", FORMAT)
+#: largest time in a log, s, about 30,000 years: times beyond it are damage
+LATEST = 1e12
+
+#: array -> (dimensions, unit); "task" stands for the unit of the task, "weighted" for that of c e
+LAYOUT: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
+    {
+        "t": (("time",), "s"),
+        "x": (("time", "robot", "axis"), "task"),
+        "x_desired": (("time", "robot", "axis"), "task"),
+        "tracking_error": (("time", "robot", "axis"), "task"),
+        "sync_error": (("time", "pair", "axis"), "weighted"),
+        "sync_integral": (("time", "pair", "axis"), "weighted·s"),
+        "coupled_error": (("time", "robot", "axis"), "weighted"),
+        "q": (("time", "robot", "joint"), "rad"),
+        "v": (("time", "robot", "joint"), "rad/s"),
+        "v_error": (("time", "robot", "joint"), "rad/s"),
+        "tau": (("time", "robot", "joint"), "N·m"),
+        "disturbance": (("time", "robot", "joint"), "N·m"),
+        "theta_hat": (("time", "robot", "parameter"), "SI"),
+    }
+)
+
+
+def unit_of(array: str, task: str, weighted: str) -> str:
+    """Unit of an array of `LAYOUT`, given those of the task and of c e."""
+    return LAYOUT[array][1].replace("task", task).replace("weighted", weighted)
+
+
+# -- info -------------------------------------------------------------------------------------------------
+
+SIZES = entries(
+    {"robot": whole(1), "pair": whole(1), "axis": whole(1), "joint": whole(1), "parameter": whole(0)}
+)
+
+_ROBOT = entries(
+    {
+        "name": label,
+        "joints": rows(label, least=1, distinct=True),
+        "parameters": rows(label),
+        "theta": rows(number),
+    },
+    {"model": label, "torque_limits": rows(optional(above(0, or_equal=True)))},
+)
+_WINDOW = {"robot": whole(below="robot"), "start": number}
+_DISTURBANCE = entries({**_WINDOW, "torque": numbers, "stop": number})
+_PAYLOAD = entries({**_WINDOW, "stop": optional(number), "mass": number})
+_LEFT_LIMIT = entries({**_WINDOW, "stop": number, "joint": whole(below="joint"), "kind": label})
+_HELD = entries({"joints": rows(label), "largest": rows(number), "final": rows(number)})
+
+INFO = entries(
+    {
+        "status": text,
+        "title": text,
+        "task_unit": label,
+        "weighted_unit": label,
+        "robots": rows(_ROBOT, "robot"),
+        "axes": rows(label, "axis", distinct=True),
+        "pairs": rows(rows(whole(below="robot"), least=2, distinct=True), "pair"),
+        "gains": entries({"Lambda": numbers, "beta": numbers}),
+        "versions": each(label),
+    },
+    {
+        "units": each(label),
+        "coupling": label,
+        "signs": rows(rows(number), "pair"),
+        "outputs": each(entries({"unit": label, "axes": rows(label, least=1)})),
+        "integrator": label,
+        "engine": label,
+        "plant": label,
+        "dt": above(0),
+        "log_dt": above(0),
+        "duration": above(0),
+        "control_period": optional(above(0)),
+        "saturate": boolean,
+        "decimated": whole(1),
+        "disturbances": rows(_DISTURBANCE),
+        "payloads": rows(_PAYLOAD),
+        "damping": rows(entries({**_WINDOW, "stop": number})),
+        "limits": rows(_LEFT_LIMIT),
+        "held_joints": rows(_HELD, "robot"),
+    },
+)
+
+
+def check_info(info: Any) -> None:
+    """Refuse an info that somebody who reads it later would stumble over.
+
+    Raises:
+        ResultError: the entry, what is expected there, and what is found.
+    """
+    form = info.get("format") if isinstance(info, dict) else type(info).__name__
+    if form not in FORMATS:
+        raise ResultError(f"expected the format '{FORMAT}', found {form!a:.80}")
+    entries({"sizes": SIZES})("info", info, {})
+    INFO("info", info, info["sizes"])
+    _check_robots(info["robots"], info["sizes"])
+    for name, about in info.get("outputs", {}).items():
+        if not name.isidentifier() or about["axes"][0] != "time":
+            raise ResultError(
+                f"info, outputs, {name}: expected an identifier with 'time' as its first axis, found "
+                f"{about['axes']!a:.80}"
+            )
+
+
+def _check_robots(robots: list[dict[str, Any]], sizes: Mapping[str, int]) -> None:
+    """What a robot says of itself has to fit together, and into the arrays."""
+    if len({robot["name"] for robot in robots}) < len(robots):
+        raise ResultError("info, robots: expected another name for each robot, found one twice")
+    for k, robot in enumerate(robots):
+        found = {name: len(robot[name]) for name in ("joints", "parameters", "theta")}
+        limits = len(robot.get("torque_limits", robot["joints"]))
+        fits = found["joints"] <= sizes["joint"] and found["parameters"] <= sizes["parameter"]
+        if not fits or found["theta"] != found["parameters"] or limits != found["joints"]:
+            raise ResultError(
+                f"info, robots[{k}]: expected as many theta as parameters and torque_limits as joints, up to "
+                f"{sizes['parameter']} and {sizes['joint']}, found {found} and {limits} torque_limits"
+            )
+
+
+# -- arrays -----------------------------------------------------------------------------------------------
+
+
+def shapes(info: Mapping[str, Any], instants: int) -> dict[str, tuple[int | None, ...]]:
+    """Shape of every array, and of every output after "outputs/"; None is a length that info does not say."""
+    lengths = {**info["sizes"], "time": instants}
+    dimensions = chain(
+        ((name, axes) for name, (axes, _) in LAYOUT.items()),
+        ((f"outputs/{name}", about["axes"]) for name, about in info.get("outputs", {}).items()),
+    )
+    return {name: tuple(lengths.get(axis) for axis in axes) for name, axes in dimensions}
+
+
+def check_arrays(info: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:
+    """Refuse arrays that are not those that info speaks of, or numbers that no run has.
+
+    Every number is finite, as a run stops before anything else is logged; outputs may say by NaN that there
+    is no value. Times grow.
+
+    Raises:
+        ResultError: the array, what is expected and what is found.
+    """
+    expected = shapes(info, arrays["t"].size)
+    if arrays.keys() != expected.keys():
+        different = ", ".join(sorted(arrays.keys() ^ expected.keys()))
+        raise ResultError(f"expected the arrays that info speaks of and no others, these differ: {different}")
+    for name, array in arrays.items():
+        check_shape(name, array.dtype, array.shape, expected[name])
+        if name in LAYOUT and not np.isfinite(array).all():
+            where = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
+            raise ResultError(f"array '{name}': expected finite numbers, found {array[where]} at {where}")
+    _check_times(arrays["t"])
+
+
+def check_shape(name: str, dtype: np.dtype, found: tuple[int, ...], expected: tuple[int | None, ...]) -> None:
+    """Refuse an array of another kind or shape.
+
+    Raises:
+        ResultError: see above.
+    """
+    fits = len(found) == len(expected) and all(
+        e is None or e == f for e, f in zip(expected, found, strict=True)
+    )
+    if not fits or dtype != np.float64:
+        raise ResultError(
+            f"array '{name}': expected float64 of shape {expected}, found {dtype} of shape {found}"
+        )
+
+
+def _check_times(t: np.ndarray) -> None:
+    wrong = np.flatnonzero(~(np.abs(t) <= LATEST) | (np.diff(t, prepend=-np.inf) <= 0))
+    if wrong.size:
+        raise ResultError(
+            f"array 't': expected times that grow, at most {LATEST:g} s, found {t[wrong[0]]} at {wrong[0]}"
+        )
