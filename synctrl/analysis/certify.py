@@ -26,13 +26,15 @@ class Certificate:
         verdict: "certified": every assumption of the theorem holds along the run, V' <= 0 to rounding at
             every logged instant, and the balance of V closes. "outside the theorem": some assumption does not
             hold, and nothing else is wrong. "not certified": V grows although every assumption holds, or the
-            run is not accurate enough to tell.
+            run is not accurate enough to tell, or its log is thinned.
         outside: the assumptions that do not hold, each with what was found.
         doubts: what speaks against the run itself.
         growth: the first instant at which V grows, and the term that did it, or None.
         lyapunov: V and V' with their terms.
         gain_condition: where the gain condition is tightest; it matters only if `gain_condition.needed`.
         convergence: errors at the end.
+        every: steps of the run per logged instant. With more than one the log is thinned: what V did between
+            two instants, and whether its balance closes, cannot be seen.
     """
 
     title: str
@@ -43,11 +45,17 @@ class Certificate:
     lyapunov: Lyapunov
     gain_condition: GainCondition
     convergence: Convergence
+    every: int = 1
 
     @property
     def certified(self) -> bool:
         """Whether the verdict is "certified"."""
         return self.verdict == "certified"
+
+    @property
+    def closes(self) -> bool | None:
+        """Whether the balance of V closes; None if the log is thinned."""
+        return self.lyapunov.closes if self.every == 1 else None
 
     def as_dict(self) -> dict[str, Any]:
         """The same as plain numbers, words and lists, without the arrays over time."""
@@ -61,7 +69,8 @@ class Certificate:
             "V": {"start": float(record.V[0]), "end": float(record.V[-1]), **_ends(record)},
             "V_dot": {"largest": float(record.V_dot.max()), "rounding": float(record.rounding.max())},
             "energy": {name: float(value) for name, value in record.supplied.items()},
-            "balance": {"closes": record.closes, "drift": record.largest_drift, "bound": record.drift_bound},
+            "balance": {"closes": self.closes, "drift": record.largest_drift, "bound": record.drift_bound},
+            "steps_per_instant": self.every,
             "gain_condition": {**_finite(asdict(self.gain_condition)), "holds": self.gain_condition.holds},
             "convergence": asdict(self.convergence),
         }
@@ -87,7 +96,13 @@ def certify(result: Result, experiment: Experiment | None = None) -> Certificate
     doubts = tuple(_doubts(run, record, errors, growth, bool(outside)))
     verdict = VERDICTS[2] if doubts else VERDICTS[1] if outside else VERDICTS[0]
     title = str(result.info["title"])
-    return Certificate(title, verdict, outside, doubts, growth, record, condition, errors)
+    return Certificate(title, verdict, outside, doubts, growth, record, condition, errors, _every(result))
+
+
+def _every(result: Result) -> int:
+    """How many steps lie between two logged instants."""
+    dt = result.info.get("dt")
+    return max(1, round(float(np.diff(result.t).max(initial=0.0)) / dt)) if dt else 1
 
 
 def _outside(run: Replay, record: Lyapunov, condition: GainCondition) -> list[str]:
@@ -122,8 +137,13 @@ def _doubts(
 ) -> list[str]:
     """What should not be even outside the theorem, and growth of V inside it."""
     found = []
-    sampled = run.result.info.get("control_period") is not None
-    if not record.closes and not sampled:
+    sampled, every = run.result.info.get("control_period") is not None, _every(run.result)
+    if every > 1:
+        found.append(
+            f"the log is thinned, to one of {every} steps: what V did in between, and whether its balance "
+            "closes, cannot be seen; certify a run that logs every step"
+        )
+    elif not record.closes and not sampled:
         found.append(
             f"the balance of V does not close: V - V(0) - integral of V' reaches {record.largest_drift:.3g}, "
             f"numerical errors explain {record.drift_bound:.3g}; the step is too long to follow this motion"
@@ -165,9 +185,7 @@ def _lines(c: Certificate) -> list[str]:
     lines.append(f"  V goes from {record.V[0]:.5g} to {record.V[-1]:.5g}")
     lines.append(f"  by term: {supplied or 'no change'}")
     lines.append(f"  V' is at most {record.V_dot.max():.3g} (rounding {record.rounding.max():.1g})")
-    lines.append(
-        f"  balance: off by {record.largest_drift:.2g}, numerical errors explain {record.drift_bound:.2g}"
-    )
+    lines.append(f"  balance: {_balance(c)}")
     lines.append(f"  gain condition: {_state(c.gain_condition)}")
     final = ", ".join(f"{name} {value:.3g}" for name, value in errors.final.items())
     lines.append(f"  at the end: {final}")
@@ -175,6 +193,13 @@ def _lines(c: Certificate) -> list[str]:
     if c.growth is not None:
         lines.append(f"  V first grows at t = {c.growth.time:g} s, by the term '{c.growth.term}'")
     return lines
+
+
+def _balance(c: Certificate) -> str:
+    if c.closes is None:
+        return f"cannot be seen in a log of one of {c.every} steps"
+    record = c.lyapunov
+    return f"off by {record.largest_drift:.2g}, numerical errors explain {record.drift_bound:.2g}"
 
 
 def _state(condition: GainCondition) -> str:

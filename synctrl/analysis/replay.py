@@ -125,8 +125,9 @@ def replay(result: Result, experiment: Experiment | None = None) -> Replay:
     experiment = experiment_of(result, experiment)
     loop = experiment.closed_loop(result.info.get("plant", "pinocchio"))
     _check_sizes(result, loop)
-    jumps, crossed = _jumps(result.t, loop, experiment)
-    rows = Row(*(np.array(column) for column in zip(*_rows(result, loop, jumps), strict=True)))
+    schedule = DisturbanceSchedule(loop.cell, experiment.disturbances)
+    jumps, crossed = _jumps(result.t, loop, schedule)
+    rows = Row(*(np.array(column) for column in zip(*_rows(result, loop, schedule, jumps), strict=True)))
     instants = np.arange(len(result.t))
     logged = instants + np.searchsorted(jumps, instants, side="right")
     _check_same(result, Row(*(column[logged] for column in rows)))
@@ -152,10 +153,10 @@ def experiment_of(result: Result, experiment: Experiment | None) -> Experiment:
 # -- jumps ------------------------------------------------------------------------------------------------
 
 
-def _jumps(t: np.ndarray, loop: ClosedLoop, experiment: Experiment) -> tuple[list[int], list[int]]:
+def _jumps(t: np.ndarray, loop: ClosedLoop, schedule: DisturbanceSchedule) -> tuple[list[int], list[int]]:
     """Logged instants at which something jumps, and those before a jump that falls between two."""
-    edges = (*DisturbanceSchedule(loop.cell, experiment.disturbances).edges, *loop.plant.schedule.edges)
-    tolerance = 1e-9 * float(np.diff(t).max(initial=0.0))
+    edges = (*schedule.edges, *loop.plant.schedule.edges)
+    tolerance = _tolerance(t)
     on_log, between = set(), set()
     for jump in (*edges, *loop.cell.breaks):
         if t[0] < jump < t[-1]:
@@ -165,6 +166,11 @@ def _jumps(t: np.ndarray, loop: ClosedLoop, experiment: Experiment) -> tuple[lis
             else:
                 between.add(int(np.searchsorted(t, jump)) - 1)
     return sorted(on_log - {0, len(t) - 1}), sorted(between)
+
+
+def _tolerance(t: np.ndarray) -> float:
+    """How far a jump may be from a logged instant that stands for it, s."""
+    return 1e-9 * float(np.diff(t).max(initial=0.0))
 
 
 def _stretches(logged: np.ndarray, jumps: list[int], crossed: list[int]) -> tuple[Stretch, ...]:
@@ -180,13 +186,13 @@ def _stretches(logged: np.ndarray, jumps: list[int], crossed: list[int]) -> tupl
 # -- rows -------------------------------------------------------------------------------------------------
 
 
-def _rows(result: Result, loop: ClosedLoop, jumps: list[int]) -> Iterator[Row]:
+def _rows(result: Result, loop: ClosedLoop, schedule: DisturbanceSchedule, jumps: list[int]) -> Iterator[Row]:
     t, references, bodies = result.t, loop.cell.references, forests(loop.cell.robots)
     for start in range(0, len(t), BLOCK):
         for k, reference in enumerate(references(t[start : start + BLOCK]), start):
             if k in jumps:
-                from_left = references(np.array([before(t[k])]))[0]
-                yield _row(result, loop.at(before(t[k])), bodies, k, from_left, result.disturbance[k - 1])
+                from_left, left = references(np.array([before(t[k])]))[0], t[k] - 2 * _tolerance(t)
+                yield _row(result, loop.at(left), bodies, k, from_left, schedule.torque(left))
             yield _row(result, loop.at(t[k]), bodies, k, reference, result.disturbance[k])
 
 

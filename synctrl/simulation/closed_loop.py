@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..control.controller import Controller, Signals
+from ..errors import NonFiniteError
 from ..tasks.cell import Reference
 from .plant import Plant
 from .state import Layout, State
@@ -23,6 +24,8 @@ class ClosedLoop:
         self.cell = controller.cell
         self._layout = Layout(self.cell, plant.hidden0.size)
         self.size = self._layout.size
+        parts = (controller, plant, self.cell.space, *self.cell.parameters)
+        self._foreign = [type(part) for part in parts if not _is_ours(type(part))]
 
     def initial_state(self) -> np.ndarray:
         """y at t = 0."""
@@ -72,6 +75,8 @@ class ClosedLoop:
         if disturbance is not None:
             tau = tau + disturbance
         v_dot, hidden_dot = self.plant.move(state.q, state.v, tau, state.hidden)
+        if self._foreign:
+            self._watch(state, signals, v_dot)
         rate.q[...], rate.v[...] = state.v, v_dot
         rate.theta_hat[...], rate.integral[...] = signals.theta_hat_dot, signals.command.epsilon
         if hidden_dot.size:
@@ -94,3 +99,31 @@ class ClosedLoop:
         tau = self.plant.applied(tau) + disturbance
         accelerated[:], self.hidden(y_dot)[:] = self.plant.move(q, v, tau, self.hidden(y))
         return y_dot
+
+    def _watch(self, state: State, signals: Signals, v_dot: np.ndarray) -> None:
+        """Name parts that users wrote when a finite state becomes numbers that mean nothing.
+
+        Raises:
+            NonFiniteError: a torque, a rate of an estimate or an acceleration that is not finite; without
+                the time, which is not known here.
+        """
+        if not np.isfinite(state.flat).all():
+            return
+        found = {
+            "torque": signals.tau,
+            "rate of the estimates": signals.theta_hat_dot,
+            "acceleration": v_dot,
+        }
+        for what, rows in found.items():
+            if not np.isfinite(rows).all():
+                i = int(np.argmin(np.isfinite(rows).all(axis=1)))
+                names = " or ".join(dict.fromkeys(kind.__qualname__ for kind in self._foreign))
+                raise NonFiniteError(
+                    f"{names} gives {self.cell.names[i]} {rows[i].tolist()} as its {what}, from a state that "
+                    "is finite; expected finite numbers",
+                    robot=i,
+                )
+
+
+def _is_ours(kind: type) -> bool:
+    return kind.__module__.partition(".")[0] == __name__.partition(".")[0]

@@ -29,6 +29,17 @@ def user_failure(error: Exception, t: float) -> SimulationError:
     return failed(f"'{code.co_qualname}' ({code.co_filename}, line {line})", t, error)
 
 
+def date(error: SynctrlError, t: float) -> None:
+    """Say when a failure happened that was raised where the time was not known.
+
+    Args:
+        error: the failure.
+        t: simulated time of the last instant reached, s.
+    """
+    if isinstance(error, SimulationError) and error.time is None:
+        error.time, error.args = t, (f"{error}, in the step from t = {t:g} s",)
+
+
 def tell(progress: Progress | None, t: float) -> None:
     """Report the time reached to whoever wants to know.
 

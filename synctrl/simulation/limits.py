@@ -69,8 +69,11 @@ def torque_limits(cell: Cell) -> np.ndarray:
 def applied_torque(result: Result) -> np.ndarray:
     """Torque of the motors at every logged instant, (T, n, nv), N·m.
 
-    It is `result.tau`, what the controller commands; in a run with saturation cut off at the limits.
+    It is `result.tau`, what the controller commands; in a run with saturation cut off at the limits, which
+    newer results have as the output "applied_torque".
     """
+    if "applied_torque" in result.outputs:
+        return result.outputs["applied_torque"].copy()
     tau = result.tau.copy()
     for i, robot in enumerate(result.info["robots"]):
         for joint, limit in enumerate(robot.get("torque_limits", ()) if result.info.get("saturate") else ()):

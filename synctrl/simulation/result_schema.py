@@ -74,6 +74,14 @@ _WINDOW = {"robot": whole(below="robot"), "start": number}
 _DISTURBANCE = entries({**_WINDOW, "torque": numbers, "stop": number})
 _PAYLOAD = entries({**_WINDOW, "stop": optional(number), "mass": number})
 _LEFT_LIMIT = entries({**_WINDOW, "stop": number, "joint": whole(below="joint"), "kind": label})
+_CUT_OFF = entries(
+    {
+        "robot": whole(below="robot"),
+        "joint": whole(below="joint"),
+        **{name: above(0, or_equal=True) for name in ("limit", "share", "largest")},
+        "theta_hat": rows(above(0, or_equal=True)),
+    }
+)
 _HELD = entries({"joints": rows(label), "largest": rows(number), "final": rows(number)})
 
 INFO = entries(
@@ -106,6 +114,7 @@ INFO = entries(
         "payloads": rows(_PAYLOAD),
         "damping": rows(entries({**_WINDOW, "stop": number})),
         "limits": rows(_LEFT_LIMIT),
+        "saturation": rows(_CUT_OFF),
         "held_joints": rows(_HELD, "robot"),
     },
 )

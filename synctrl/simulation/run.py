@@ -14,7 +14,7 @@ from .clock import Clock
 from .closed_loop import ClosedLoop
 from .disturbances import DisturbanceSchedule
 from .guard import Guard
-from .handover import Progress, tell, user_failure
+from .handover import Progress, date, tell, user_failure
 from .integrators import Sample, adaptive, rk4
 from .recorder import Recorder, SampleRecorder
 from .result import Result
@@ -122,6 +122,7 @@ def _finish(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:
         except KeyboardInterrupt:
             raise _interrupted(recorder.reached, logged) from None
         except SynctrlError as error:
+            date(error, recorder.reached)
             error.result = logged(f"stopped: {error}")
             raise
         except Exception as error:

@@ -66,7 +66,7 @@ def warn_of_saturation(result: Result) -> None:
     found = result.info["saturation"]
     if not found:
         return
-    worst = max(found, key=lambda entry: entry["largest"] / entry["limit"])
+    worst = max(found, key=lambda entry: entry["largest"] - entry["limit"])
     start, largest = max((entry["theta_hat"] for entry in found), key=lambda pair: pair[1])
     grown = f", {largest / start:.3g} times as much" if start > 0 else ""
     warnings.warn(

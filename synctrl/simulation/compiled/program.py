@@ -18,7 +18,7 @@ from ...tasks.pose import MAX_ANGLE
 from ..closed_loop import ClosedLoop
 from .build import cached_library, content_key, require_casadi
 from .kind import Classified, Kind, classify
-from .known import check_known
+from .known import check_known, check_untouched
 from .specimen import Specimen
 from .structs import CellStruct, ReferenceStruct, WorkStruct
 from .trace import Trace
@@ -173,6 +173,7 @@ def _library(loop: ClosedLoop, classified: Classified, libraries: dict[str, ctyp
     keys = [kind.key() for kind in classified.kinds]
     name = json.dumps(keys)
     if name not in libraries:
+        check_untouched(loop)
         key = content_key(keys, require_casadi())
         libraries[name] = cached_library(
             key, lambda: generate(classified.kinds), lambda library: _compare(library, loop, classified)

@@ -2,7 +2,8 @@
 
 What is compared belongs to the code, not to the cell: generated functions take gains, weights, desired motion
 and placement as inputs. So the specimen stands near the origin, where world axes cost no digits, has weights,
-gains and motions of its own, and asks nothing of what a user has plugged in. Its size is the number of kinds.
+gains and motions of its own, and asks nothing of what a user has plugged in. It grows with the number of
+kinds, not of robots.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ from ..closed_loop import ClosedLoop
 from ..plant import Plant
 from .kind import Classified
 
+#: robots at least: with three in a ring, each is in two pairs, and each pair leaves one out
+ROBOTS = 3
 #: where the first joint of each robot is, m
 PLACE = (0.3, -0.2, 0.1)
 #: how far from the desired pose the robots are, m and rad: small errors, and some that are not
@@ -62,7 +65,7 @@ class Specimen:
     def __init__(self, loop: ClosedLoop, classified: Classified):
         self._rng = np.random.default_rng(0)
         count = len(classified.kinds)
-        self.index = [k % count for k in range(max(2, count))]
+        self.index = [k % count for k in range(max(ROBOTS, count))]
         chosen = [_most_turned(classified, k) for k in range(count)]
         members = [_member(loop.controller.cell, chosen[k]) for k in self.index]
         self.loop = self._loop(loop.controller, members)
@@ -84,8 +87,8 @@ class Specimen:
 
     def _loop(self, original: Controller, members: Sequence[Member]) -> ClosedLoop:
         n, m = len(members), original.cell.m
-        coupling = Coupling.chain(n, lambda t: tuple(self._moving(n, m)))
-        coupling = coupling.weighted(1.0 + np.arange(n - 1) / n)
+        coupling = Coupling.signed_ring(n, lambda t: tuple(self._moving(n, m)))
+        coupling = coupling.weighted(self._positive(n))
         cell = Cell(members, coupling, self._space(original.cell.space, [x.robot for x in members]))
         controller = Controller(
             cell,
@@ -119,8 +122,9 @@ class Specimen:
         if isinstance(space, JointSpace):
             return tried[0], 1.0
         rows = getattr(space, "rows", slice(None))
-        conditions = [float(np.linalg.cond(robot.jacobian(q)[rows])) for q in tried]
-        return tried[int(np.argmin(conditions))], min(conditions)
+        conditions = np.linalg.cond(np.stack([robot.jacobian(q)[rows] for q in tried]))
+        best = int(np.argmin(conditions))
+        return tried[best], float(conditions[best])
 
     def _state(self, q: np.ndarray) -> np.ndarray:
         y = self._random(self.loop.size)
