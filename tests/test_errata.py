@@ -211,7 +211,7 @@ class LiteralController(Controller):
         slip = np.matvec(s.reference.c_inv, s.r)
         force = np.vecmat(self.K_eps * s.sigma, s.reference.c)
         tau = np.matvec(s.Y, state[-2]) + self.K_r * slip + force
-        return replace(s, tau=tau, theta_hat_dot=self.Gamma * np.vecmat(slip, s.Y))
+        return replace(s, tau=tau, z_dot=self.adaptation.Gamma * np.vecmat(slip, s.Y))
 
 
 class LiteralExperiment(Experiment):

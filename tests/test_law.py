@@ -134,7 +134,7 @@ def test_the_torque_is_the_sum_of_its_three_terms(seed, space, coupling):
         force = now.reference.c[i].T @ (k.K_eps * now.sigma[i])
         push = force if now.task.J is None else now.task.J[i].T @ force
         np.testing.assert_allclose(now.tau[i], Y @ theta_hat[i] + k.K_r[i] * now.s_q[i] + push, atol=1e-9)
-        np.testing.assert_allclose(now.theta_hat_dot[i], k.Gamma[i] * (Y.T @ now.s_q[i]), atol=1e-9)
+        np.testing.assert_allclose(now.z_dot[i], k.adaptation.Gamma[i] * (Y.T @ now.s_q[i]), atol=1e-9)
 
 
 @given(seeds)
@@ -320,7 +320,7 @@ def test_the_law_never_asks_what_its_numbers_are():
 def test_signals_survive_the_next_evaluation():
     loop = random_experiment(3).closed_loop()
     first = look(loop, T, random_state(loop, 1))[1]
-    kept = {name: getattr(first, name).copy() for name in ("Y", "tau", "s_q", "u", "theta_hat_dot", "a_ref")}
+    kept = {name: getattr(first, name).copy() for name in ("Y", "tau", "s_q", "u", "z_dot", "a_ref")}
     look(loop, T, random_state(loop, 2))
     for name, value in kept.items():
         np.testing.assert_array_equal(getattr(first, name), value, err_msg=name)

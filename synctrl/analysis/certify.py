@@ -11,7 +11,7 @@ from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .convergence import Convergence, convergence_of
 from .gain_condition import GainCondition, gain_condition_of
-from .lyapunov import OUTSIDE, Growth, Lyapunov, first_growth, lyapunov_of
+from .lyapunov import OUTSIDE, THEOREM, Growth, Lyapunov, first_growth, lyapunov_of
 from .replay import Replay, replay
 
 VERDICTS = ("certified", "outside the theorem", "not certified")
@@ -113,9 +113,12 @@ def _outside(run: Replay, record: Lyapunov, condition: GainCondition) -> list[st
     period = run.result.info.get("control_period")
     if period is not None:
         found.append(f"torque and adaptation are held for {period:g} s at a time")
-    for name, words in _WORDS.items():
+    for name in (name for name in record.power if name not in THEOREM):
         power = record.power[name]
-        if (np.abs(power) > record.rounding).any():
+        if name in run.learning and name not in _WORDS and not (power > record.rounding).any():
+            continue  # a power of the adaptation that only takes from V
+        if name != "weight rate" and (np.abs(power) > record.rounding).any():
+            words = _WORDS.get(name, f"the adaptation's {name}")
             found.append(f"{words}: power from {power.min():.3g} to {power.max():.3g}")
     if condition.needed and not condition.holds:
         found.append(f"the gain condition fails: {_condition_in_words(run, condition)}")

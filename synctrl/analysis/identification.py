@@ -17,6 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from ..control.adaptation.gradient import BoundGradient
+from ..errors import InputError
 from ..robots.base_parameters import Grouping, grouping
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
@@ -105,7 +107,7 @@ def _identify(run: Replay, i: int) -> Identification:
     tilde = parameters.theta - result.theta_hat[:, i, :P]
     Y_b = Y[:, :, found.columns]
     strength = _integral(result.t, np.einsum("tja,tjk,tkb->tab", Y_b, _compliance(run, i), Y_b))
-    root = _root(found.K * run.loop.controller.Gamma[i, :P] @ found.K.T)
+    root = _root(found.K * _gamma(run)[i, :P] @ found.K.T)
     return Identification(
         cell.names[i],
         found,
@@ -115,6 +117,19 @@ def _identify(run: Replay, i: int) -> Identification:
         _integral(result.t, np.einsum("tja,tjb->tab", Y_b, Y_b)),
         np.maximum(np.linalg.eigvalsh(root @ strength @ root), 0.0),
     )
+
+
+def _gamma(run: Replay) -> np.ndarray:
+    """The diagonal Gamma of (14), (n, P).
+
+    Raises:
+        InputError: the run has another adaptation, whose lifetimes these are not.
+    """
+    adaptation = run.loop.controller.adaptation
+    if not isinstance(adaptation, BoundGradient):
+        found = run.result.info["adaptation"]["name"]
+        raise InputError(f"result: expected a run with the adaptation Gradient, eq. (14), found {found}")
+    return adaptation.Gamma
 
 
 def _regressors(run: Replay, i: int) -> np.ndarray:

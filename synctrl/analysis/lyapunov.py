@@ -1,7 +1,7 @@
 """The proof, watched: V and V' along a run, term by term.
 
     V  = sum_i 1/2 s_q^T M s_q                       kinetic
-       + sum_i 1/2 tilde^T Gamma^-1 tilde            parameter
+       + V_th                                        parameter: 1/2 tilde^T Gamma^-1 tilde for (14)
        + sum_k 1/2 eps_k^T K_eps eps_k               synchronization
        + sum_i 1/2 E_i^T K_eps Lambda beta E_i       integral
 
@@ -9,6 +9,7 @@
        - sum_k eps_k^T K_eps Lambda eps_k            synchronization rate
        - sum_i sigma_i^T K_eps beta sigma_i          coupling
        - sum_i s_q^T F_v s_q                         friction in Y, where viscous friction F_v is adapted
+       + named powers of the adaptation
        + power of what is outside the theorem
 
 with tilde = theta - theta_hat, E = S^T int eps, sigma = S^T eps; (19), (24), (34) and (39) for any coupling.
@@ -32,7 +33,8 @@ ENERGIES = ("kinetic", "parameter", "synchronization", "integral")
 #: what the theorem knows; each is at most 0
 THEOREM = ("damping", "synchronization rate", "coupling", "friction in Y")
 #: what it does not: each may have either sign
-OUTSIDE = ("friction", "disturbance", "saturation", "weight rate", "model error", "damped inverse", "other")
+OUTSIDE = ("friction", "disturbance", "saturation", "weight rate", "damped inverse", "other")
+#: the powers of any run; those of its adaptation come beside them
 POWERS = THEOREM + OUTSIDE
 EPS = float(np.finfo(float).eps)
 
@@ -46,7 +48,7 @@ class Lyapunov:
     Attributes:
         t: (T,), s.
         energy: terms of V under the names in `ENERGIES`, each (T,).
-        power: terms of V' under the names in `POWERS`, each (T,).
+        power: terms of V' under the names in `POWERS` and those of the adaptation, each (T,).
         rounding: bound of the rounding error of V', (T,).
         drift: V(t) - V(0) - integral of V', (T,); 0 but for the error of the run and of the quadrature.
         drift_bound: what these two errors and rounding may amount to.
@@ -69,7 +71,7 @@ class Lyapunov:
     @property
     def V_dot(self) -> np.ndarray:  # noqa: N802
         """V', the sum of the powers, (T,)."""
-        return np.sum([self.power[name] for name in POWERS], axis=0)
+        return np.sum(list(self.power.values()), axis=0)
 
     @property
     def largest_drift(self) -> float:
@@ -102,8 +104,9 @@ class Growth:
 def lyapunov(result: Result, experiment: Experiment | None = None) -> Lyapunov:
     """V and V' at every logged instant of a run.
 
-    Entries of theta that are not adapted (Gamma = 0) have no place in V; their error appears in V' as the
-    power "model error", s_q^T Y tilde.
+    The adaptation has its storage in V and powers of its own in V'. Entries of theta that the paper's does
+    not adapt (Gamma = 0) have no place in V; their error appears in V' as the power "model error",
+    s_q^T Y tilde.
 
     Args:
         result: the run.
@@ -142,10 +145,10 @@ def first_growth(record: Lyapunov) -> Growth | None:
         return None
     k = int(np.argmax(rising))
     if V_dot[k] > record.rounding[k]:
-        term = max(POWERS, key=lambda name: record.power[name][k])
+        term = max(record.power, key=lambda name: record.power[name][k])
         return Growth(float(record.t[k]), k, float(V_dot[k]), term)
     rate = float(gained[k] / (record.t[k + 1] - record.t[k]))
-    term = max(POWERS, key=lambda name: record.power[name][k + 1])
+    term = max(record.power, key=lambda name: record.power[name][k + 1])
     grows = record.power[term][k + 1] > record.rounding[k + 1]
     return Growth(float(record.t[k]), k, rate, term if grows else "integration")
 
@@ -164,22 +167,26 @@ def _energy(run: Replay) -> dict[str, np.ndarray]:
     x, controller = run.rows, run.loop.controller
     K_eps, beta, Lambda = controller.K_eps, controller.beta, controller.Lambda
     terms = (
-        x.s_q * np.matvec(x.M, x.s_q),
-        x.tilde * _per_gamma(run, x.tilde),
-        x.epsilon * K_eps * x.epsilon,
-        x.E * K_eps * Lambda * beta * x.E,
+        0.5 * _sum(x.s_q * np.matvec(x.M, x.s_q)),
+        x.storage,
+        0.5 * _sum(x.epsilon * K_eps * x.epsilon),
+        0.5 * _sum(x.E * K_eps * Lambda * beta * x.E),
     )
-    return {name: 0.5 * _sum(term) for name, term in zip(ENERGIES, terms, strict=True)}
+    return dict(zip(ENERGIES, terms, strict=True))
 
 
 def _rates(run: Replay) -> tuple[np.ndarray, ...]:
-    """Time derivatives of the terms of V by the chain rule, before they are added up over robots and axes."""
+    """Time derivatives of the terms of V by the chain rule, (R,) each."""
+    return (*map(_sum, _summands(run)), run.rows.storage_rate)
+
+
+def _summands(run: Replay) -> tuple[np.ndarray, ...]:
+    """The same but for the adaptation's, before they are added up over robots and axes."""
     x, controller = run.rows, run.loop.controller
     K_eps, beta, Lambda = controller.K_eps, controller.beta, controller.Lambda
     s_q_dot = x.a_ref + _reference_gap(run) - x.v_dot
     return (
         x.s_q * (np.matvec(x.M, s_q_dot) + x.C_s),
-        -x.theta_hat_dot * _per_gamma(run, x.tilde),
         x.epsilon * K_eps * x.epsilon_dot,
         x.E * K_eps * Lambda * beta * x.sigma,
     )
@@ -201,12 +208,11 @@ def _power(run: Replay) -> dict[str, np.ndarray]:
         -x.s_q * x.disturbance,
         x.s_q * x.cut_off,
         x.s_q * np.matvec(x.M, _reference_gap(run)),
-        x.s_q * x.Y_frozen,
         (s - moved) * force,
     )
     power = {name: _sum(term) for name, term in zip(POWERS, terms, strict=False)}
-    total = np.sum([_sum(rate) for rate in _rates(run)], axis=0)
-    power["other"] = total - np.sum(list(power.values()), axis=0)
+    power |= dict(zip(run.learning, x.learning.T, strict=True))
+    power["other"] = np.sum(_rates(run), axis=0) - np.sum(list(power.values()), axis=0)
     return power
 
 
@@ -216,12 +222,6 @@ def _reference_gap(run: Replay) -> np.ndarray:
     if run.loop.controller.reference_acceleration == "exact":
         return np.zeros_like(x.a_ref)
     return -np.matvec(x.J_inv, np.matvec(x.c_inv, np.matvec(x.c_dot, np.matvec(x.c_inv, x.r))))
-
-
-def _per_gamma(run: Replay, tilde: np.ndarray) -> np.ndarray:
-    """Gamma^-1 tilde, and 0 for what is not adapted."""
-    Gamma = run.loop.controller.Gamma
-    return tilde * np.divide(1.0, Gamma, out=np.zeros_like(Gamma), where=Gamma > 0)
 
 
 def _magnitude(run: Replay) -> np.ndarray:
@@ -234,7 +234,8 @@ def _magnitude(run: Replay) -> np.ndarray:
     command = np.abs(x.u) + np.abs(x.r) + controller.Lambda * np.abs(x.e_star)
     coupling = command * controller.K_eps * np.abs(x.sigma)
     per_robot = condition * (kinetic.sum(axis=-1) + coupling.sum(axis=-1))
-    return per_robot.sum(axis=-1) + sum(_sum(np.abs(rate)) for rate in _rates(run))
+    learned = _sum(np.abs(x.s_q) * x.Y_size)
+    return per_robot.sum(axis=-1) + learned + sum(_sum(np.abs(summand)) for summand in _summands(run))
 
 
 def _sum(term: np.ndarray) -> np.ndarray:
@@ -253,7 +254,7 @@ def _drift(run: Replay, V: np.ndarray, V_dot: np.ndarray) -> tuple[np.ndarray, f
     15 times its error. Summed over the terms of V, which exchange much, it stands for both errors.
     """
     drift, bound = np.zeros(len(run.logged)), 0.0
-    rates = [_sum(rate) for rate in _rates(run)]
+    rates = _rates(run)
     for first, last, rows in run.stretches:
         t = run.result.t[first : last + 1]
         missing = V[rows] - V[rows][0] - _integral(t, V_dot[rows])

@@ -16,6 +16,7 @@ from ..robots.forest import Forest, forests
 from ..simulation.clock import before
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.disturbances import DisturbanceSchedule
+from ..simulation.recorder import ADAPTATION_STATE, PLANT_STATE, own_states
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from ..tasks.cell import Reference
@@ -40,14 +41,14 @@ class Row(NamedTuple):
         friction: torque of friction that is not in Y, (n, nv).
         friction_damping: torque by which friction in Y damps, F_v s_q, (n, nv).
         cut_off: torque that saturation takes from tau, (n, nv).
-        tilde, theta_hat_dot: theta - theta_hat, and the rate of theta_hat, (n, P).
+        storage, storage_rate: V_th of the adaptation, and its rate by the chain rule, N·m and N·m/s.
+        learning: what V_th' has beside -s_q^T Y tilde, in the order of `Replay.learning`, N·m/s.
         epsilon, epsilon_dot: (p, m).
         E, sigma, e_star, u, r: (n, m).
         c, c_dot, c_inv: (n, m, m).
         J, J_inv: (n, m, nv) and (n, nv, m); identities in joint space.
         M: mass matrices, (n, nv, nv).
         C_s: C(q, v) s_q, (n, nv).
-        Y_frozen: Y tilde of the parameters that are not adapted, (n, nv).
         Y_size: |Y| (|theta| + |theta_hat|), the magnitude of the model's torque, (n, nv).
     """
 
@@ -61,8 +62,9 @@ class Row(NamedTuple):
     friction: np.ndarray
     friction_damping: np.ndarray
     cut_off: np.ndarray
-    tilde: np.ndarray
-    theta_hat_dot: np.ndarray
+    storage: np.ndarray
+    storage_rate: np.ndarray
+    learning: np.ndarray
     epsilon: np.ndarray
     epsilon_dot: np.ndarray
     E: np.ndarray
@@ -77,7 +79,6 @@ class Row(NamedTuple):
     J_inv: np.ndarray
     M: np.ndarray
     C_s: np.ndarray
-    Y_frozen: np.ndarray
     Y_size: np.ndarray
 
 
@@ -100,6 +101,7 @@ class Replay:
         rows: states and signals, one row per instant, and two where something jumps: from the left and right.
         logged: row of every logged instant, (T,); at a jump the one from the right.
         stretches: parts of the log in which nothing jumps.
+        learning: names of the powers of the adaptation.
     """
 
     result: Result
@@ -108,6 +110,7 @@ class Replay:
     rows: Row
     logged: np.ndarray
     stretches: tuple[Stretch, ...]
+    learning: tuple[str, ...]
 
 
 def replay(result: Result, experiment: Experiment | None = None) -> Replay:
@@ -131,7 +134,8 @@ def replay(result: Result, experiment: Experiment | None = None) -> Replay:
     instants = np.arange(len(result.t))
     logged = instants + np.searchsorted(jumps, instants, side="right")
     _check_same(result, Row(*(column[logged] for column in rows)))
-    return Replay(result, experiment, loop, rows, logged, _stretches(logged, jumps, crossed))
+    learning = _learning(loop, result)
+    return Replay(result, experiment, loop, rows, logged, _stretches(logged, jumps, crossed), learning)
 
 
 def experiment_of(result: Result, experiment: Experiment | None) -> Experiment:
@@ -199,21 +203,36 @@ def _rows(result: Result, loop: ClosedLoop, schedule: DisturbanceSchedule, jumps
 def _row(
     result: Result, loop: ClosedLoop, bodies: Bodies, k: int, reference: Reference, disturbance: np.ndarray
 ) -> Row:
-    q, v, theta_hat = result.q[k], result.v[k], result.theta_hat[k]
-    y = np.concatenate([part.ravel() for part in (q, v, theta_hat, result.sync_integral[k])])
+    q, v, y = result.q[k], result.v[k], _state(result, k)
     y_dot, s = loop.evaluate(reference, y, disturbance)
-    theta, adapted = loop.cell.theta, loop.controller.Gamma > 0
+    theta, adaptation, z = loop.cell.theta, loop.controller.adaptation, loop.state(y).z
     J, J_inv = _jacobians(loop, s)
-    tilde = theta - theta_hat
     M, C_s = _dynamics(bodies, q, v, s.s_q)
     friction, friction_damping = _friction(loop, bodies, q, v, s)
     return Row(
         v, loop.split(y_dot)[1], s.v_ref, s.a_ref, s.s_q, s.tau, disturbance, friction, friction_damping,
-        s.tau - loop.plant.applied(s.tau), tilde, s.theta_hat_dot, s.epsilon, s.epsilon_dot,
+        s.tau - loop.plant.applied(s.tau), np.array(adaptation.storage(z, theta)),
+        np.array(adaptation.storage_rate(z, s.z_dot, theta)),
+        np.array([*adaptation.powers(z, theta, s.seen).values()]), s.epsilon, s.epsilon_dot,
         s.E, s.sigma, s.e_star, s.u, s.r, reference.c, reference.c_dot, reference.c_inv, J, J_inv, M, C_s,
-        s.regressor.times(np.where(adapted, 0.0, tilde)),
-        s.regressor.size(np.abs(theta_hat) + np.abs(theta)),
+        s.regressor.size(np.abs(s.theta_hat) + np.abs(theta)),
     )  # fmt: skip
+
+
+def _state(result: Result, k: int) -> np.ndarray:
+    """The state of the loop at logged instant k."""
+    z = result.outputs.get(ADAPTATION_STATE, result.theta_hat)[k]
+    hidden = result.outputs[PLANT_STATE][k] if PLANT_STATE in result.outputs else np.zeros(0)
+    parts = result.q[k], result.v[k], z, result.sync_integral[k], hidden
+    return np.concatenate([part.ravel() for part in parts])
+
+
+def _learning(loop: ClosedLoop, result: Result) -> tuple[str, ...]:
+    """Names of what the storage of the adaptation changes by, beside -s_q^T Y tilde."""
+    y = loop.initial_state()
+    _, signals = loop.evaluate(loop.cell.references(result.t[:1])[0], y, result.disturbance[0])
+    z = loop.state(y).z
+    return tuple(loop.controller.adaptation.powers(z, loop.cell.theta, signals.seen))
 
 
 def _jacobians(loop: ClosedLoop, s: Signals) -> tuple[np.ndarray, np.ndarray]:
@@ -273,11 +292,13 @@ def _check_sizes(result: Result, loop: ClosedLoop) -> None:
             )
     if not len(result.t):
         raise InputError("result: expected at least one logged instant, found none")
-    if loop.plant.hidden0.size:
-        raise InputError(
-            "experiment: expected a plant whose whole state is logged; this one has joints that the "
-            "controller does not know, and the energy in their motion cannot be told from the result"
-        )
+    for name, shape in own_states(loop).items():
+        found = result.outputs[name].shape[1:] if name in result.outputs else None
+        if found != shape:
+            raise InputError(
+                f"experiment: expected the one that made the result, with the whole state in the log; its "
+                f"output '{name}' has the shape {shape} at an instant, but the result's has {found}"
+            )
 
 
 def _check_same(result: Result, rows: Row) -> None:

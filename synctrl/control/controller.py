@@ -13,6 +13,7 @@ from ..robots.regressors import RegressorBlocks, regressors
 from ..tasks.cell import Cell, Reference
 from ..tasks.spaces import Measurement
 from . import law
+from .adaptation import Adaptation, Seen, chosen
 from .commands import REFERENCE_ACCELERATIONS, Command, ConstantWeights, Law, MovingWeights
 from .folded import folded
 from .gains import Gains, spread
@@ -22,7 +23,8 @@ from .gains import Gains, spread
 class Signals:
     """Everything one evaluation of the controller computed, under its name.
 
-    Task-space rows are (n, m), rows per pair (p, m), joint-space rows (n, nv), parameters (n, P).
+    Task-space rows are (n, m), rows per pair (p, m), joint-space rows (n, nv), parameters (n, P), the state
+    of the adaptation (n, Z).
     """
 
     reference: Reference
@@ -33,7 +35,9 @@ class Signals:
     s_q: np.ndarray
     regressor: RegressorBlocks
     tau: np.ndarray
-    theta_hat_dot: np.ndarray
+    theta_hat: np.ndarray
+    z_dot: np.ndarray
+    seen: Seen
 
     @property
     def Y(self) -> np.ndarray:  # noqa: N802
@@ -55,20 +59,28 @@ class Signals:
 class Controller:
     """Adaptive synchronized control of a cell, eqs. (7)-(14) and (28)-(32).
 
-    Its state is theta_hat, (n, P), and the integrals of the synchronization errors, (p, m).
+    Its state is that of its adaptation, z, (n, Z), which is theta_hat itself for the paper's, and the
+    integrals of the synchronization errors, (p, m).
 
     Args:
         cell: the robots and their task.
         gains: the gains.
+        adaptation: how it learns; by default `Gradient(gains.Gamma)`, eq. (14).
         reference_acceleration: "exact", the derivative of xref', or "paper", as (13) prints it.
         k_r_space: "joint" for damping K_r s_q, or "task" for J^T K_r c^-1 r.
 
     Raises:
-        InputError: gains of the wrong size, or an unknown option.
+        InputError: gains of the wrong size, an unknown option, or Gamma and an adaptation, or neither.
     """
 
     def __init__(
-        self, cell: Cell, gains: Gains, *, reference_acceleration: str = "exact", k_r_space: str = "joint"
+        self,
+        cell: Cell,
+        gains: Gains,
+        *,
+        adaptation: Adaptation | None = None,
+        reference_acceleration: str = "exact",
+        k_r_space: str = "joint",
     ):
         instance("cell", cell, Cell, "a Cell")
         instance("gains", gains, Gains, "Gains")
@@ -83,7 +95,8 @@ class Controller:
         self.beta = spread("beta", gains.beta, (m,))
         self.K_eps = spread("K_eps", gains.K_eps, (m,))
         self.K_r = spread("K_r", gains.K_r, (n, nv if k_r_space == "joint" else m))
-        self.Gamma = spread("Gamma", gains.Gamma, cell.theta.shape)
+        learning = chosen(gains.Gamma, adaptation)
+        self.adaptation, self.adaptation_settings = learning.bind(cell), learning.as_dict()
         self._damping = self._joint_damping if k_r_space == "joint" else self._task_damping
         if cell.coupling.is_constant:
             self._command: Law = folded(cell, ConstantWeights(cell, self.Lambda, self.beta, self.K_eps))
@@ -96,14 +109,14 @@ class Controller:
         return regressors(self.cell.parameters, [robot.nv for robot in self.cell.robots])
 
     def evaluate(
-        self, reference: Reference, motion: np.ndarray, theta_hat: np.ndarray, integral: np.ndarray
+        self, reference: Reference, motion: np.ndarray, z: np.ndarray, integral: np.ndarray
     ) -> Signals:
         """The law at one instant.
 
         Args:
             reference: desired motion and weights.
             motion: joint positions and velocities, (2, n, nv).
-            theta_hat: estimates, (n, P).
+            z: state of the adaptation, (n, Z).
             integral: integrals of the synchronization errors, (p, m).
         """
         space = self.cell.task
@@ -114,9 +127,11 @@ class Controller:
         s_q = v_ref - v
         Y = self._regressor(q, v, v_ref, a_ref)
         damping = self._damping(reference, task, command, s_q)
+        theta_hat = self.adaptation.estimate(z)
         tau = law.torque(Y, theta_hat, damping, space.to_torque(task, command.force))
-        theta_hat_dot = law.adaptation(Y, s_q, self.Gamma)
-        return Signals(reference, task, command, v_ref, a_ref, s_q, Y, tau, theta_hat_dot)
+        seen = Seen(q, v, v_ref, a_ref, s_q, law.gradient(Y, s_q), Y)
+        z_dot = self.adaptation.rate(z, seen)
+        return Signals(reference, task, command, v_ref, a_ref, s_q, Y, tau, theta_hat, z_dot, seen)
 
     def _joint_damping(
         self, reference: Reference, task: Measurement, command: Command, s_q: np.ndarray

@@ -27,9 +27,9 @@ FAULTS = "error", "hold"
 class DiscreteController:
     """A controller with memory that is asked for torque once a period.
 
-    With z = (theta_hat, integrals of epsilon), its rate f by (14) and (28), tau by (13) or (32):
+    With x = (state of the adaptation, integrals of epsilon), x' = f by (14) and (28), tau by (13) or (32):
 
-        tau_k = tau(t_k, q_k, v_k, z_k),   z_{k+1} = z_k + period f(t_k, q_k, v_k, z_k).
+        tau_k = tau(t_k, q_k, v_k, x_k),   x_{k+1} = x_k + period f(t_k, q_k, v_k, x_k).
 
     Rows are robots; joints that a robot does not have are zeros, on the way in and on the way out.
 
@@ -115,11 +115,12 @@ class DiscreteController:
     def state(self) -> dict[str, np.ndarray]:
         """Everything that the next step depends on, as plain arrays.
 
-        `theta_hat`, (n, P), SI units; `sync_integral`, (p, m), unit of c e times s; `tau`, (n, nv), N·m, the
-        torque that is held; `start`, s, and `samples`, the place on the grid; `held`.
+        `z`, (n, Z), state of the adaptation, which is theta_hat for the paper's; `sync_integral`, (p, m),
+        unit of c e times s; `tau`, (n, nv), N·m, the torque that is held; `start`, s, and `samples`, the
+        place on the grid; `held`.
         """
         return {
-            "theta_hat": self.theta_hat.copy(),
+            "z": self.z.copy(),
             "sync_integral": self.sync_integral.copy(),
             "tau": self._tau.copy(),
             "start": np.array(self._t0),
@@ -134,7 +135,7 @@ class DiscreteController:
             found = sorted(state) if isinstance(state, Mapping) else type(state).__name__
             raise InputError(f"state: expected arrays called {', '.join(sorted(kept))}, found {found}")
         new = {name: finite_array(f"state, {name}", state[name], kept[name].shape) for name in kept}
-        self.theta_hat, self.sync_integral = new["theta_hat"].copy(), new["sync_integral"].copy()
+        self.z, self.sync_integral = new["z"].copy(), new["sync_integral"].copy()
         self._tau, self._t0 = new["tau"].copy(), float(new["start"])
         self._samples, self.held = int(new["samples"]), int(new["held"])
 
@@ -170,7 +171,7 @@ class DiscreteController:
 
     def _start(self, t: float = 0.0) -> None:
         self._t0, self._samples, self.held = t, 0, 0
-        self.theta_hat = self.cell.theta_hat0.copy()
+        self.z = self.controller.adaptation.start()
         self.sync_integral = np.zeros((self.cell.coupling.pairs, self.cell.m))
         self._tau = np.zeros(self._shape)
         self.signals: Signals | None = None
@@ -207,9 +208,9 @@ class DiscreteController:
         reference = self.cell.references(np.array([t]))[0]
         if desired is not None:
             reference = Reference(desired, reference.weights)
-        signals = self.controller.evaluate(reference, motion, self.theta_hat, self.sync_integral)
+        signals = self.controller.evaluate(reference, motion, self.z, self.sync_integral)
         self._tau = self._commanded(t, motion[0], signals)
-        self.theta_hat = self.theta_hat + self.period * signals.theta_hat_dot
+        self.z = self.controller.adaptation.settle(self.z + self.period * signals.z_dot)
         self.sync_integral = self.sync_integral + self.period * signals.epsilon
         self._samples, self.signals = self._samples + 1, signals
         return self._tau.copy()

@@ -24,7 +24,8 @@ class Gains:
         beta: weight of the integrated synchronization error, (m,), 1/s, 0 for independent control.
         K_r: damping, (nv,) or (n, nv), N·m·s/rad, above 0; (m,) if it acts in task space.
         K_eps: stiffness of the coupling, (m,), N·m/rad when c has no unit, 0 for independent control.
-        Gamma: adaptation rate, (P,) or (n, P), above 0; 0 switches the adaptation off.
+        Gamma: rate of the gradient adaptation (14), (P,) or (n, P), above 0; 0 switches the adaptation off.
+            None where a controller is given an adaptation of another kind.
 
     Raises:
         InputError: not numbers, not finite, or of the wrong sign.
@@ -34,10 +35,12 @@ class Gains:
     beta: Any
     K_r: Any
     K_eps: Any
-    Gamma: Any
+    Gamma: Any = None
 
     def __post_init__(self) -> None:
         for name, positive in _SIGNS.items():
+            if name == "Gamma" and self.Gamma is None:
+                continue
             array = finite_array(name, getattr(self, name))
             low = array.min() if array.size else 0.0
             if low < 0 or (positive and low == 0):
@@ -63,7 +66,8 @@ class Gains:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers and lists under the gains' names."""
-        return {field.name: getattr(self, field.name).tolist() for field in fields(self)}
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: None if value is None else value.tolist() for name, value in values.items()}
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Gains) and self.as_dict() == other.as_dict()

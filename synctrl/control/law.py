@@ -119,6 +119,11 @@ def torque(Y: Matrices, theta_hat: Array, damping: Array, coupling_torque: Array
     return times(Y, theta_hat) + damping + coupling_torque
 
 
+def gradient(Y: Matrices, s_q: Array) -> Array:
+    """Y_i^T s_q, the part of (14) that every adaptation learns from."""
+    return transposed_times(Y, s_q)
+
+
 def adaptation(gradient: Array, Gamma: Array) -> Array:
     """theta_hat_i' = Gamma Y_i^T s_q, eq. (14), of the gradient Y_i^T s_q."""
     return Gamma * gradient

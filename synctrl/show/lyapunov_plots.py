@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from ..analysis.lyapunov import ENERGIES, POWERS, THEOREM, Growth, Lyapunov
+from ..analysis.lyapunov import ENERGIES, THEOREM, Growth, Lyapunov
 from .panels import GAP, LEGEND, power_of_ten, stacked_panels
 from .plots import style
 from .style import ACCENT, DESIRED, PALETTE
@@ -33,7 +33,7 @@ def lyapunov_figure(record: Lyapunov) -> Figure:
         record: of `synctrl.analysis.lyapunov.lyapunov`.
     """
     with style():
-        energies, powers = _visible(record.energy, ENERGIES), _visible(record.power, POWERS)
+        energies, powers = _visible(record.energy, ENERGIES), _visible(record.power, tuple(record.power))
         above = [GAP + LEGEND * -(-(len(terms) + 1) // COLUMNS) for terms in (energies, powers)]
         figure, panels = stacked_panels([PANEL, PANEL], above)
         _energies(panels[0], record, energies)

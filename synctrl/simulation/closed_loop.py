@@ -12,7 +12,7 @@ from .state import Layout, State
 
 
 class ClosedLoop:
-    """y' = f(t, y) with y = (q, v, theta_hat, integrals of epsilon, state of the plant's own).
+    """y' = f(t, y) with y = (q, v, z, integrals of epsilon, state of the plant's own), see `State`.
 
     Args:
         controller: the controller of a cell.
@@ -22,16 +22,17 @@ class ClosedLoop:
     def __init__(self, controller: Controller, plant: Plant):
         self.controller, self.plant = controller, plant
         self.cell = controller.cell
-        self._layout = Layout(self.cell, plant.hidden0.size)
+        self._z0 = controller.adaptation.start()
+        self._layout = Layout(self.cell, self._z0.shape, plant.hidden0.size)
         self.size = self._layout.size
-        parts = (controller, plant, self.cell.space, *self.cell.parameters)
+        parts = (controller, controller.adaptation, plant, self.cell.space, *self.cell.parameters)
         self._foreign = [type(part) for part in parts if not _is_ours(type(part))]
 
     def initial_state(self) -> np.ndarray:
         """y at t = 0."""
         cell = self.cell
         integral = np.zeros(cell.coupling.pairs * cell.m)
-        parts = (cell.q0, cell.v0, cell.theta_hat0, integral, self.plant.hidden0)
+        parts = (cell.q0, cell.v0, self._z0, integral, self.plant.hidden0)
         return np.concatenate([part.ravel() for part in parts])
 
     def state(self, y: np.ndarray | None = None) -> State:
@@ -44,9 +45,9 @@ class ClosedLoop:
         return self if plant is self.plant else ClosedLoop(self.controller, plant)
 
     def split(self, y: np.ndarray) -> list[np.ndarray]:
-        """Views of q, v, theta_hat and the integrals in y."""
+        """Views of q, v, z and the integrals in y."""
         state = self.state(y)
-        return [state.q, state.v, state.theta_hat, state.integral]
+        return [state.q, state.v, state.z, state.integral]
 
     def hidden(self, y: np.ndarray) -> np.ndarray:
         """View of the state of the plant's own in y."""
@@ -70,7 +71,7 @@ class ClosedLoop:
         self, reference: Reference, state: State, disturbance: np.ndarray | None, rate: State
     ) -> Signals:
         """`evaluate` for states whose views are at hand: y' is written into `rate`."""
-        signals = self.controller.evaluate(reference, state.motion, state.theta_hat, state.integral)
+        signals = self.controller.evaluate(reference, state.motion, state.z, state.integral)
         tau = self.plant.applied(signals.tau)
         if disturbance is not None:
             tau = tau + disturbance
@@ -78,10 +79,17 @@ class ClosedLoop:
         if self._foreign:
             self._watch(state, signals, v_dot)
         rate.q[...], rate.v[...] = state.v, v_dot
-        rate.theta_hat[...], rate.integral[...] = signals.theta_hat_dot, signals.command.epsilon
+        rate.z[...], rate.integral[...] = signals.z_dot, signals.command.epsilon
         if hidden_dot.size:
             rate.hidden[...] = hidden_dot
         return signals
+
+    def settled(self, state: State) -> State:
+        """The state after a step, with what the adaptation makes of its own, for example projected."""
+        z = self.controller.adaptation.settle(state.z)
+        if z is not state.z:
+            state.z[...] = z
+        return state
 
     def coast(self, y: np.ndarray, held: np.ndarray, tau: np.ndarray, disturbance: np.ndarray) -> np.ndarray:
         """y' while the controller is not asked: only the plant moves on.
@@ -111,7 +119,7 @@ class ClosedLoop:
             return
         found = {
             "torque": signals.tau,
-            "rate of the estimates": signals.theta_hat_dot,
+            "rate of the estimates": signals.z_dot,
             "acceleration": v_dot,
         }
         for what, rows in found.items():

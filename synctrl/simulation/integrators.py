@@ -78,7 +78,7 @@ def rk4(loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule) -> Iterat
         now.derive(middle, stage.ahead(y, 0.5 * h, k1.flat), push, k2)
         now.derive(middle, stage.ahead(y, 0.5 * h, k2.flat), push, k3)
         now.derive(end, stage.ahead(y, h, k3.flat), push, k4)
-        y, following = following.ahead(y, h / 6, _SIMPSON.dot(rates)), y
+        y, following = now.settled(following.ahead(y, h / 6, _SIMPSON.dot(rates))), y
     yield final(loop, clock, y.flat, schedule.torques[window])
 
 

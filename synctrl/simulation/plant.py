@@ -16,6 +16,8 @@ from ..tasks.cell import Cell
 from .limits import torque_limits
 from .payloads import Payload, PayloadSchedule
 
+Output = tuple[np.ndarray, str, tuple[str, ...]]
+"""An array over time, its unit, and the names of its axes, the first of which is "time"."""
 Dynamics = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """Positions, velocities and torques of the joints of all robots, (n, nv), -> accelerations, (n, nv)."""
 
@@ -52,7 +54,8 @@ PHYSICS: dict[str, Callable[[Sequence[Robot]], Dynamics]] = {
 class Plant:
     """Accelerations of all robots under torque and friction, with the payloads they carry.
 
-    A kind of plant with more joints than the controller knows overrides `hidden0`, `move` and `report`.
+    A kind of plant with a state of its own, for example of joints that the controller does not know,
+    overrides `hidden0` and `move`, and what it wants a result to say, `outputs` and `report`.
 
     Args:
         cell: the robots, with their true parameters and friction.
@@ -124,6 +127,10 @@ class Plant:
     def friction(self, v: np.ndarray) -> np.ndarray:
         """Torque by which friction opposes the velocities v, (n, nv), N·m."""
         return self.viscous * v + self.coulomb * np.tanh(v / self.smoothing)
+
+    def outputs(self, hidden: np.ndarray) -> dict[str, Output]:
+        """Further arrays over time that a result gets, of the plant's own state, (T, size of the state)."""
+        return {}
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         """What a result says of the plant's own state at its logged instants, (T, size of the state)."""

@@ -42,11 +42,11 @@ class Recorder:
         self._loop, instants = loop, clock.rows
         lengths = {"time": instants, **sizes(loop)}
         shapes = {name: [lengths[d] for d in dimensions] for name, (dimensions, _) in LAYOUT.items()}
-        numbers = sum(int(np.prod(shape[1:])) for shape in shapes.values()) + loop.plant.hidden0.size
+        shapes |= {name: [instants, *shape] for name, shape in own_states(loop).items()}
+        numbers = sum(int(np.prod(shape[1:])) for shape in shapes.values())
         check_fits(clock, 8 * self.copies * numbers)
-        self._hidden = np.zeros((instants, loop.plant.hidden0.size))
         self._arrays = self._allocate(shapes)
-        self._rows = tuple(self._arrays.values())
+        self._rows = tuple(self._arrays[name] for name in LAYOUT)
         self._damping = DampingLog(instants, loop.cell.n)
         self.count, self.reached = 0, 0.0
 
@@ -70,14 +70,19 @@ class Recorder:
     def result(self, status: str, info: Mapping[str, Any], experiment: Any) -> Result:
         """What was logged until now."""
         arrays = {name: _taken(array, self.count) for name, array in self._arrays.items()}
+        states = {name: arrays.pop(name) for name in own_states(self._loop)}
         described = {"status": printable(status), **describe(self._loop), **info}
         described["damping"] = self._damping.report(arrays["t"])
         seen = (arrays[name] for name in ("t", "q", "v", "tau"))
         described["limits"] = limit_report(self._loop.cell, *seen)
-        described.update(self._loop.plant.report(self._hidden[: self.count]))
-        described["saturation"] = saturation_report(self._loop.plant, arrays)
-        outputs, about = applied_output(self._loop.plant, arrays["tau"])
-        described["outputs"] = about
+        plant = self._loop.plant
+        hidden = states.get(PLANT_STATE, np.zeros((self.count, 0)))
+        described.update(plant.report(hidden))
+        described["saturation"] = saturation_report(plant, arrays)
+        found = {name: (array, "SI", _STATE_AXES[name]) for name, array in states.items()}
+        found |= {**applied_output(plant, arrays["tau"]), **plant.outputs(hidden)}
+        outputs = {name: array for name, (array, _, _) in found.items()}
+        described["outputs"] = {n: {"unit": unit, "axes": list(axes)} for n, (_, unit, axes) in found.items()}
         return Result(**arrays, info=described, outputs=outputs, experiment=experiment)
 
 
@@ -87,25 +92,22 @@ class SampleRecorder(Recorder):
     copies = 2  # the rows, and the arrays that are made of them at the end
 
     def _allocate(self, shapes: Mapping[str, list[int]]) -> dict[str, np.ndarray]:
-        shapes = {name: shapes[name] for name in (*_SIGNALS, *_STATE)}
-        ends = np.cumsum([int(np.prod(shape[1:])) for shape in shapes.values()])
-        self._log = np.zeros((shapes["t"][0], ends[-1] + self._loop.plant.hidden0.size))
-        columns = np.split(self._log, ends, axis=1)
-        arrays = {
-            name: part.reshape(shape)
-            for part, (name, shape) in zip(columns[:-1], shapes.items(), strict=True)
-        }
-        self._hidden = columns[-1]
-        return {name: arrays[name] for name in LAYOUT}
+        order = {name: shapes[name] for name in (*_SIGNALS, *_STATE, *own_states(self._loop))}
+        ends = np.cumsum([int(np.prod(shape[1:])) for shape in order.values()])
+        self._log, self._logs_z = np.zeros((order["t"][0], ends[-1])), ADAPTATION_STATE in order
+        columns = np.split(self._log, ends[:-1], axis=1)
+        arrays = {name: part.reshape(order[name]) for name, part in zip(order, columns, strict=True)}
+        return {name: arrays[name] for name in shapes}
 
     def add(self, sample: Sample) -> None:
         """Log one instant."""
-        s, row = sample.signals, self._log[self.count]
+        s, row, y = sample.signals, self._log[self.count], self._loop.state(sample.y)
         task, command = s.task, s.command
         row[0] = sample.t
         values = (
             task.motion[0], s.reference.desired[0], task.error[0], command.epsilon, command.e_star,
-            s.s_q, s.tau, sample.disturbance, sample.y,
+            s.s_q, s.tau, sample.disturbance, y.motion, s.theta_hat, y.integral,
+            *([y.z] if self._logs_z else []), y.hidden,
         )  # fmt: skip
         np.concatenate([value.ravel() for value in values], out=row[1:])
         self._damping.add(self.count, s)
@@ -117,6 +119,19 @@ _SIGNALS = (
     "t", "x", "x_desired", "tracking_error", "sync_error", "coupled_error", "v_error", "tau", "disturbance",
 )  # fmt: skip
 _STATE = "q", "v", "theta_hat", "sync_integral"
+#: outputs that have what an adaptation and a plant have of their own in the state of the loop
+ADAPTATION_STATE, PLANT_STATE = "adaptation_state", "plant_state"
+_STATE_AXES = {ADAPTATION_STATE: ("time", "robot", "state"), PLANT_STATE: ("time", "plant state")}
+
+
+def own_states(loop: ClosedLoop) -> dict[str, tuple[int, ...]]:
+    """Shapes of the parts of the state that are in no array of `LAYOUT`, under the names of outputs.
+
+    The state of an adaptation that is theta_hat itself is logged as that.
+    """
+    z, adaptation = loop.controller.adaptation.start(), loop.controller.adaptation
+    found = {} if adaptation.estimate(z) is z else {ADAPTATION_STATE: z.shape}
+    return found | ({PLANT_STATE: loop.plant.hidden0.shape} if loop.plant.hidden0.size else {})
 
 
 def _taken(array: np.ndarray, count: int) -> np.ndarray:
@@ -163,6 +178,7 @@ def describe(loop: ClosedLoop) -> dict[str, Any]:
         "signs": cell.coupling.signs.tolist(),
         "sizes": sizes(loop),
         "gains": controller.gains.as_dict(),
+        "adaptation": controller.adaptation_settings,
         "reference_acceleration": controller.reference_acceleration,
         "k_r_space": controller.k_r_space,
         "versions": versions(),

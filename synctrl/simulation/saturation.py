@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import SaturationWarning
 from .limits import torque_limits
-from .plant import Plant
+from .plant import Output, Plant
 
 if TYPE_CHECKING:
     from .result import Result
@@ -54,11 +54,9 @@ def _growth(theta_hat: np.ndarray) -> list[float]:
     return [float(size[0].max()), float(size.max())]
 
 
-def applied_output(plant: Plant, tau: np.ndarray) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """What reached the joints of torques tau, (T, n, nv), N·m, as an output, and its description."""
-    if not plant.saturate:
-        return {}, {}
-    return {APPLIED: plant.applied(tau)}, {APPLIED: {"unit": "N·m", "axes": ["time", "robot", "joint"]}}
+def applied_output(plant: Plant, tau: np.ndarray) -> dict[str, Output]:
+    """What reached the joints of torques tau, (T, n, nv), N·m, as an output."""
+    return {APPLIED: (plant.applied(tau), "N·m", ("time", "robot", "joint"))} if plant.saturate else {}
 
 
 def warn_of_saturation(result: Result) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..checks import boolean, choice, instance, label, positive_number
+from ..control.adaptation import Adaptation
 from ..control.controller import Controller
 from ..control.discrete import DiscreteController
 from ..control.gains import Gains
@@ -38,7 +39,8 @@ class Experiment:
         title: for figures and files.
         payloads: what robots pick up and put down, of which the controller is not told.
         saturate: whether the plant cuts torques off at the limits of the robots' descriptions.
-        plant_type: `Plant`, or a kind of plant with joints that the controller does not know.
+        plant_type: `Plant`, or a kind of plant with a state of its own.
+        adaptation: how the controller learns; by default `Gradient(gains.Gamma)`, eq. (14).
     """
 
     cell: Cell
@@ -51,6 +53,7 @@ class Experiment:
     payloads: Sequence[Payload] = ()
     saturate: bool = False
     plant_type: Callable[..., Plant] = Plant
+    adaptation: Adaptation | None = None
 
     def __post_init__(self) -> None:
         instance("cell", self.cell, Cell, "a Cell")
@@ -67,6 +70,7 @@ class Experiment:
         controller = Controller(
             self.cell,
             self.gains,
+            adaptation=self.adaptation,
             reference_acceleration=self.reference_acceleration,
             k_r_space=self.k_r_space,
         )
@@ -193,6 +197,7 @@ def simulate(
     payloads: Sequence[Payload] = (),
     saturate: bool = False,
     plant_type: Callable[..., Plant] = Plant,
+    adaptation: Adaptation | None = None,
     engine: str = "pinocchio",
     plant: str = "pinocchio",
     control_period: float | None = None,
@@ -206,7 +211,7 @@ def simulate(
     Args:
         cell, gains, duration: as in `Experiment`.
         disturbances, reference_acceleration, k_r_space, title: as in `Experiment`.
-        payloads, saturate, plant_type: as in `Experiment`.
+        payloads, saturate, plant_type, adaptation: as in `Experiment`.
         dt, integrator, engine, plant, control_period, log_dt: as in `Experiment.simulate`.
         rtol, atol, progress: as in `Experiment.simulate`.
 
@@ -225,6 +230,7 @@ def simulate(
         payloads,
         saturate,
         plant_type,
+        adaptation,
     )
     return experiment.simulate(
         dt=dt,

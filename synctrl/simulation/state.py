@@ -1,4 +1,4 @@
-"""The state of a closed loop, y = (q, v, theta_hat, integrals of epsilon, state of the plant's own)."""
+"""The state of a closed loop, y = (q, v, z, integrals of epsilon, the plant's own)."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ class State:
         flat: y.
         motion: q and v together, (2, n, nv).
         q, v: joint positions and velocities, (n, nv).
-        theta_hat: estimates, (n, P).
+        z: state of the adaptation, (n, Z).
         integral: integrals of the synchronization errors, (p, m).
         hidden: state of the plant's own.
     """
 
-    __slots__ = ("flat", "hidden", "integral", "motion", "q", "theta_hat", "v")
+    __slots__ = ("flat", "hidden", "integral", "motion", "q", "v", "z")
 
     def __init__(self, layout: Layout, flat: np.ndarray):
         a, b, c = layout.ends
         self.flat = flat
         self.motion = flat[:a].reshape(layout.motion)
         self.q, self.v = self.motion
-        self.theta_hat = flat[a:b].reshape(layout.theta)
+        self.z = flat[a:b].reshape(layout.z)
         self.integral = flat[b:c].reshape(layout.integral)
         self.hidden = flat[c:]
 
@@ -42,11 +42,12 @@ class Layout:
 
     Args:
         cell: the cell.
+        z: shape of the state of the adaptation.
         hidden: size of the plant's own state.
     """
 
-    def __init__(self, cell: Cell, hidden: int):
-        self.motion, self.theta = (2, cell.n, cell.nv), cell.theta.shape
+    def __init__(self, cell: Cell, z: tuple[int, ...], hidden: int):
+        self.motion, self.z = (2, cell.n, cell.nv), z
         self.integral = cell.coupling.pairs, cell.m
-        self.ends = tuple(np.cumsum([np.prod(s) for s in (self.motion, self.theta, self.integral)]).tolist())
+        self.ends = tuple(np.cumsum([np.prod(s) for s in (self.motion, self.z, self.integral)]).tolist())
         self.size = self.ends[-1] + hidden

@@ -1,4 +1,4 @@
-"""An adaptation of one's own: (14) that slowly forgets what it has learned, theta_hat' = Gamma Y^T s - nu tilde_0.
+"""An adaptation of one's own: (14) that forgets, theta_hat' = Gamma Y^T s_q - nu (theta_hat - theta_hat0).
 
 Its storage is that of (14); the leakage adds the power nu tilde^T Gamma^-1 (theta_hat - theta_hat0).
 """

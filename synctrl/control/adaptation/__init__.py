@@ -1,7 +1,7 @@
 """Ways to learn: from velocity errors to estimates of the robots' parameters."""
 
-from .gradient import Gradient
+from .gradient import Gradient, chosen
 from .natural import Natural
 from .protocol import Adaptation, BoundAdaptation, Seen
 
-__all__ = ["Adaptation", "BoundAdaptation", "Gradient", "Natural", "Seen"]
+__all__ = ["Adaptation", "BoundAdaptation", "Gradient", "Natural", "Seen", "chosen"]

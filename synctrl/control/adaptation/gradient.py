@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...errors import InputError
 from ...tasks.cell import Cell
 from .. import law
 from ..gains import adaptation_gain, spread
-from .protocol import Seen
+from .protocol import Adaptation, Seen
 
 
 class Gradient:
@@ -40,6 +41,22 @@ class Gradient:
 
     def as_dict(self) -> dict[str, Any]:
         return {"name": "Gradient", "Gamma": self.Gamma.tolist()}
+
+
+def chosen(Gamma: np.ndarray | None, adaptation: Adaptation | None) -> Adaptation:
+    """The adaptation of a controller: the one given, or the paper's with the rate among its gains.
+
+    Raises:
+        InputError: both or neither are given, or something that is no adaptation.
+    """
+    if adaptation is None and Gamma is not None:
+        return Gradient(Gamma)
+    if adaptation is None or Gamma is not None:
+        found = "neither" if adaptation is None else "both"
+        raise InputError(f"adaptation: expected the gain Gamma or an adaptation, found {found}")
+    if not hasattr(adaptation, "bind") or isinstance(adaptation, type):
+        raise InputError(f"adaptation: expected, for example, Gradient(0.3), found {adaptation!r}")
+    return adaptation
 
 
 class BoundGradient:

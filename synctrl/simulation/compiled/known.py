@@ -13,6 +13,7 @@ from types import FunctionType, MethodType
 from typing import Any, NamedTuple
 
 from ...control import law
+from ...control.adaptation.gradient import BoundGradient
 from ...control.commands import REFERENCE_ACCELERATIONS, ConstantWeights, MovingWeights
 from ...control.controller import Controller
 from ...control.folded import FoldedWeights
@@ -83,6 +84,7 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     yield Part("plant", loop.plant, (Plant,))
     yield Part("controller", controller, (Controller,))
     yield Part("law of the controller", controller._command, LAWS)
+    yield Part("adaptation", controller.adaptation, (BoundGradient,))
     yield Part("gains", controller.gains, (Gains,))
     yield Part("cell", cell, (Cell,))
     yield Part("coupling", cell.coupling, (Coupling,))

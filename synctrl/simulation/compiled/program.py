@@ -122,7 +122,7 @@ class CompiledLoop:
         arrays = (
             np.array(index, dtype=np.intc), coupling.edges.astype(np.intc), coupling.signs.copy(),
             first.astype(np.intc), incident.astype(np.intc), incident_sign.copy(),
-            controller.Lambda, controller.beta, controller.K_eps, controller.K_r, controller.Gamma,
+            controller.Lambda, controller.beta, controller.K_eps, controller.K_r, gamma_of(controller),
             W_inv, posture, gain, base, pi, plant.viscous, plant.coulomb, plant.smoothing[:, 0],
         )  # fmt: skip
         sizes = (cell.n, cell.m, cell.nv, cell.theta.shape[1], coupling.pairs, bodies)
@@ -206,6 +206,11 @@ def _agree(expected: list[np.ndarray], found: list[np.ndarray]) -> None:
                 f"generated code differs from Pinocchio by {difference:.2g} relative in {name} at a random "
                 "state; use engine='pinocchio', and please report the cell"
             )
+
+
+def gamma_of(controller: Controller) -> np.ndarray:
+    """Gamma of (14), (n, P); `check_known` has seen to it that there is one."""
+    return controller.adaptation.Gamma  # type: ignore[attr-defined]
 
 
 def _posture(controller: Controller) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

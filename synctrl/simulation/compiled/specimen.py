@@ -133,7 +133,7 @@ class Specimen:
         state.v[...] *= self._joints()
         for row, parameters in zip(known, cell.parameters, strict=True):
             row[: len(parameters.theta)] = 1
-        state.theta_hat[...] = known * (cell.theta + 0.1 * state.theta_hat)
+        state.z[...] = known * (cell.theta + 0.1 * state.z)
         return y
 
     def _desired(self, q: np.ndarray, distance: float) -> np.ndarray:
