@@ -133,7 +133,7 @@ def test_the_terms_of_v_are_what_the_proof_says_and_not_negative() -> None:
     result = experiment(link).simulate(0.02, 1e-3)
     record, cell = lyapunov(result), result.experiment.cell
     assert set(record.energy) == set(ENERGIES)
-    assert set(record.power) == set(POWERS)
+    assert set(record.power) == {*POWERS, "model error"}, "those of any run, and that of its adaptation"
     assert all((record.energy[name] >= 0).all() for name in ENERGIES)
     assert all((record.power[name] <= 0).all() for name in THEOREM)
     k = 11
