@@ -147,14 +147,6 @@ class MissingDependencyError(SynctrlError, ImportError):
     """An optional package is needed for what was asked."""
 
 
-def _remade(kind: type[BaseException], args: tuple) -> BaseException:
-    """An exception of a kind that is told its message only; its attributes are set afterwards."""
-    error = kind.__new__(kind, *args)
-    builtin = next(base for base in kind.__mro__ if base.__module__ == "builtins")
-    builtin.__init__(error, *args)  # type: ignore[misc]
-    return error
-
-
 def failed(what: str, t: float, error: Exception, robot: int | None = None) -> SimulationError:
     """The error of a run in which a function of the user's raised an exception.
 
@@ -167,6 +159,14 @@ def failed(what: str, t: float, error: Exception, robot: int | None = None) -> S
     return SimulationError(
         f"{what} failed at t = {t:g} s with {type(error).__name__}: {error}", time=t, robot=robot
     )
+
+
+def _remade(kind: type[BaseException], args: tuple) -> BaseException:
+    """An exception of a kind that is told its message only; its attributes are set afterwards."""
+    error = kind.__new__(kind, *args)
+    builtin = next(base for base in kind.__mro__ if base.__module__ == "builtins")
+    builtin.__init__(error, *args)  # type: ignore[misc]
+    return error
 
 
 def near(name: str, known: Iterable[str]) -> str:

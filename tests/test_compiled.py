@@ -180,7 +180,7 @@ def test_a_damaged_entry_is_built_again(monkeypatch, tmp_path):
 
 def test_code_that_differs_from_pinocchio_is_refused(monkeypatch, tmp_path):
     monkeypatch.setenv("SYNCTRL_CACHE", str(tmp_path))
-    compile_sources = build._compile
+    compile_sources = build.compile_library
 
     def tampered(sources, folder):
         *functions, driver = sources
@@ -188,7 +188,7 @@ def test_code_that_differs_from_pinocchio_is_refused(monkeypatch, tmp_path):
         assert broken != driver
         return compile_sources([*functions, broken], folder)
 
-    monkeypatch.setattr(build, "_compile", tampered)
+    monkeypatch.setattr(build, "compile_library", tampered)
     with pytest.raises(CompilationError, match="differs from Pinocchio"):
         Program(planar_four().closed_loop())
     assert not list(tmp_path.glob("*.so"))

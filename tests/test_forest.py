@@ -16,11 +16,12 @@ from synctrl.control.controller import Controller
 from synctrl.control.folded import FoldedWeights
 from synctrl.robots.base_parameters import BaseParameters
 from synctrl.robots.blocks import BlockProduct, Blocks
-from synctrl.robots.forest import LARGE, Forest, forests
+from synctrl.robots.forest import LARGE, SMALL, Forest, as_rows, forests
 from synctrl.robots.friction import Friction
 from synctrl.robots.friction_parameters import FrictionParameters
 from synctrl.robots.parameters import FullParameters, planar_two_link_parameters
-from synctrl.robots.regressors import regressors
+from synctrl.robots.regressors import _groups, regressors
+from synctrl.simulation.plant import pinocchio_dynamics
 from synctrl.tasks.tips import Tips
 
 NAMES = ("planar2r", "a460", "ur5", "panda", "kinova")
@@ -92,19 +93,65 @@ def mixed(seed: int) -> list[Robot]:
 
 @given(seeds, st.integers(1, 20))
 @settings(max_examples=10)
-def test_forests_have_every_robot_once_and_in_order(seed: int, joints: int) -> None:
+def test_forests_have_every_robot_once_and_each_its_own_in_order(seed: int, joints: int) -> None:
     robots = mixed(seed)
-    found = forests(robots, joints)
-    assert [i for rows, _ in found for i in range(len(robots))[rows]] == list(range(len(robots)))
+    found = [(np.arange(len(robots))[rows].tolist(), forest) for rows, forest in forests(robots, joints)]
+    assert sorted(i for rows, _ in found for i in rows) == list(range(len(robots)))
     for rows, forest in found:
-        assert {robot.nv for robot in robots[rows]} == {forest.nv}
+        assert rows == sorted(rows)
+        assert forest.robots == tuple(robots[i] for i in rows)
+        assert {robot.nv for robot in forest.robots} == {forest.nv}
         assert forest.n == 1 or forest.n * forest.nv <= joints
+
+
+@given(st.lists(st.integers(0, 30), min_size=1, unique=True).map(sorted))
+def test_rows_are_a_slice_exactly_where_they_are_evenly_spaced(indices: list[int]) -> None:
+    rows = as_rows(indices)
+    assert np.arange(31)[rows].tolist() == indices
+    assert isinstance(rows, slice) == (len(set(np.diff(indices).tolist())) <= 1)
+
+
+@pytest.mark.parametrize("order", ["ABAB", "ABBA", "BABA", "AABBA", "ABCABC", "CBACABB"])
+@pytest.mark.parametrize("joints", [SMALL, LARGE])
+def test_there_are_as_many_forests_in_any_order(order: str, joints: int) -> None:
+    arms = dict(zip("ABC", map(load_robot, ("planar2r", "ur5", "panda")), strict=True))
+    mixed, sorted_by_kind = (
+        len(forests([arms[kind] for kind in row], joints)) for row in (order * 9, sorted(order * 9))
+    )
+    assert mixed == sorted_by_kind
+
+
+@pytest.mark.parametrize("kind", ["full", "base", "friction of base parameters"])
+def test_there_are_as_many_groups_of_regressors_in_any_order(kind: str) -> None:
+    one, other = (parameters_of(kind, load_robot(name)) for name in ("planar2r", "ur5"))
+    counts = [
+        len(list(_groups(row, [6] * 8)))
+        for row in ([one, other] * 4, [one] * 4 + [other] * 4, [other, one, one, other] * 2)
+    ]
+    assert counts == [2, 2, 2]
+
+
+@given(st.permutations(range(8)), seeds)
+@settings(max_examples=10)
+def test_robots_in_another_order_move_the_same(order: list[int], seed: int) -> None:
+    robots = mixed(7)
+    shuffled, nv = [robots[i] for i in order], [robots[i].nv for i in order]
+    rows = motion(seed, 4, len(robots), 6) * (np.arange(6) < [[robot.nv] for robot in robots])
+    tips = [Tips(some).poses(*x[:2]) for some, x in ((robots, rows), (shuffled, rows[:, order]))]
+    for k, (one, other) in enumerate(zip(*tips, strict=True)):
+        np.testing.assert_allclose(other, one[:, order] if k == 0 else one[order], rtol=0, atol=1e-12)
+    v_dot = [pinocchio_dynamics(some)(*x[:3]) for some, x in ((robots, rows), (shuffled, rows[:, order]))]
+    np.testing.assert_allclose(v_dot[1], v_dot[0][order], rtol=1e-12, atol=1e-12)
+    parameters = [FullParameters(robot) for robot in robots]
+    Y = regressors(parameters, [robot.nv for robot in robots])(*rows).matrices()
+    Y_shuffled = regressors([parameters[i] for i in order], nv)(*rows[:, order]).matrices()
+    np.testing.assert_allclose(Y_shuffled, Y[order], rtol=0, atol=1e-12 * np.abs(Y).max())
 
 
 def test_robots_under_different_gravity_are_apart() -> None:
     robot = load_robot("a460")
     light = Robot(robot._weightless, robot.tip)
-    assert [forest.n for _, forest in forests([robot, robot, light, robot])] == [2, 1, 1]
+    assert [forest.n for _, forest in forests([robot, robot, light, robot])] == [3, 1]
 
 
 def test_cost_per_robot_is_bounded_by_bounded_forests() -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from ..checks import instance
 from ..control.controller import Signals
 from ..errors import InputError
+from ..robots.blocks import Rows
 from ..robots.forest import Forest, forests
 from ..simulation.clock import before
 from ..simulation.closed_loop import ClosedLoop
@@ -27,7 +28,7 @@ MISMATCH = 1e-6
 KNOWN = 1e-9
 
 
-Bodies = Sequence[tuple[slice, Forest]]
+Bodies = Sequence[tuple[Rows, Forest]]
 """The robots of a cell as `forests` groups them."""
 
 

@@ -8,6 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
+Rows = slice | np.ndarray
+"""Rows of an array that belong to some of the robots."""
+
 
 class Blocks:
     """Block-diagonal matrices with equal blocks, one per robot.
@@ -132,7 +135,7 @@ class Part(NamedTuple):
         blocks: the blocks.
     """
 
-    robots: slice
+    robots: Rows
     rows: int
     columns: int
     blocks: Blocks | BlockProduct | Beside

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from functools import partial
-from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from .blocks import Beside, BlockProduct, Blocks, Padded, Part
-from .forest import SMALL, forests
+from .blocks import Beside, BlockProduct, Blocks, Padded, Part, Rows
+from .forest import SMALL, Forest, alike, as_rows, shares
 from .friction_parameters import FrictionParameters
 from .parameters import FullParameters, LinearParameters, Parameters
 
@@ -32,7 +31,7 @@ class Group(NamedTuple):
         regressor: of these robots.
     """
 
-    rows: slice
+    rows: Rows
     nv: int
     size: int
     regressor: Regressor
@@ -60,13 +59,14 @@ def _together(groups: Sequence[Group], shape: tuple[int, int, int], *motion: np.
 
 
 def _groups(parameters: Sequence[Any], joints: Sequence[int]) -> Iterator[Group]:
-    kinds = [_kind(p) for p in parameters]
-    for kind, group in groupby(range(len(joints)), kinds.__getitem__):
-        rows = list(group)
+    """Parameters of one kind share forests wherever their robots stand; others are asked one by one."""
+    for kind, rows in alike(map(_kind, parameters)).items():
         if kind is None:
             yield from (_alone(i, parameters[i], joints[i]) for i in rows)
         else:
-            yield from _in_forests(rows[0], parameters[rows[0] : rows[-1] + 1])
+            rigid = [_rigid(parameters[i]) for i in rows]
+            for share in shares([p.robot for p in rigid], SMALL):
+                yield _in_forest([rows[k] for k in share], parameters)
 
 
 def _kind(parameters: Any) -> Hashable:
@@ -78,18 +78,23 @@ def _kind(parameters: Any) -> Hashable:
     return (own, size) if own in _RIGID else None
 
 
-def _in_forests(first: int, parameters: Sequence[Any]) -> Iterator[Group]:
-    """Groups of parameters of one kind whose robots share forests."""
-    rigid: list[Any] = [p.base if isinstance(p, FrictionParameters) else p for p in parameters]
-    for rows, forest in forests([p.robot for p in rigid], SMALL):
-        regressor: Regressor = forest.regressor
-        if isinstance(rigid[0], LinearParameters):
-            regressor = partial(_mapped, regressor, Blocks.of(np.stack([p.matrix for p in rigid[rows]])))
-        if isinstance(parameters[0], FrictionParameters):
-            smoothing = np.array([[p.smoothing] for p in parameters[rows]])
-            regressor = partial(_rubbing, regressor, smoothing, parameters[0].armature)
-        place = slice(first + rows.start, first + rows.stop)
-        yield Group(place, forest.nv, len(parameters[0].theta), regressor)
+def _rigid(parameters: Any) -> Any:
+    """Parameters of the rigid bodies alone."""
+    return parameters.base if isinstance(parameters, FrictionParameters) else parameters
+
+
+def _in_forest(rows: Sequence[int], parameters: Sequence[Any]) -> Group:
+    """The group of some parameters of one kind whose robots share a forest."""
+    mine = [parameters[i] for i in rows]
+    rigid = [_rigid(p) for p in mine]
+    forest = Forest([p.robot for p in rigid])
+    regressor: Regressor = forest.regressor
+    if isinstance(rigid[0], LinearParameters):
+        regressor = partial(_mapped, regressor, Blocks.of(np.stack([p.matrix for p in rigid])))
+    if isinstance(mine[0], FrictionParameters):
+        smoothing = np.array([[p.smoothing] for p in mine])
+        regressor = partial(_rubbing, regressor, smoothing, mine[0].armature)
+    return Group(as_rows(rows), forest.nv, len(mine[0].theta), regressor)
 
 
 def _mapped(regressor: Regressor, B: Blocks, *motion: np.ndarray) -> BlockProduct:
@@ -106,8 +111,9 @@ def _rubbing(regressor: Regressor, smoothing: np.ndarray, armature: bool, *motio
 
 def _alone(i: int, parameters: Parameters, nv: int) -> Group:
     """One robot with parameters of a kind of their own."""
+    return Group(slice(i, i + 1), nv, len(parameters.theta), partial(_asked, parameters))
 
-    def regressor(*motion: np.ndarray) -> Blocks:
-        return Blocks(np.asarray(parameters.regressor(*(part[0] for part in motion))), 1)
 
-    return Group(slice(i, i + 1), nv, len(parameters.theta), regressor)
+def _asked(parameters: Parameters, *motion: np.ndarray) -> Blocks:
+    """The regressor of one robot as its parameters give it."""
+    return Blocks(np.asarray(parameters.regressor(*(part[0] for part in motion))), 1)

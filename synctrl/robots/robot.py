@@ -14,6 +14,7 @@ from ..checks import finite_array, instance
 from ..errors import FrameNotFound, InputError
 from .catalog import load_description
 from .model_checks import check_inertia, check_joints, check_numbering
+from .per_thread import PerThread
 from .urdf_document import Document, Pose
 
 _WORLD_AXES = pin.LOCAL_WORLD_ALIGNED
@@ -26,8 +27,8 @@ class Robot:
     Joint positions q, (nv,), are angles in rad (or m for a sliding joint), also for joints that turn without
     end, which Pinocchio stores as cosine and sine. Everything Cartesian is in world axes.
 
-    The model is never changed after construction; methods share scratch memory, so one Robot must not be used
-    from two threads at once.
+    The model is never changed after construction, and every thread that uses a Robot has scratch memory of
+    its own: threads may share one.
 
     Args:
         model: rigid-body model, with a fixed base.
@@ -62,10 +63,10 @@ class Robot:
         self.nv: int = model.nv
         self.joint_names: tuple[str, ...] = tuple(model.names)[1:]
         self.body_count: int = model.njoints - 1
-        self._data = model.createData()
+        self._data = PerThread(model.createData)
         self._weightless = pin.Model(model)
         self._weightless.gravity.setZero()
-        self._weightless_data = self._weightless.createData()
+        self._weightless_data = PerThread(self._weightless.createData)
         self._neutral = pin.neutral(model)
         self._plain_q = model.nq == model.nv
         self._zero = np.zeros(model.nv)
@@ -169,24 +170,24 @@ class Robot:
 
     def mass_matrix(self, q: ArrayLike) -> np.ndarray:
         """M(q), (nv, nv), kg·m^2."""
-        return pin.crba(self.model, self._data, self.configuration(q)).copy()
+        return pin.crba(self.model, self._data.own, self.configuration(q)).copy()
 
     def coriolis_matrix(self, q: ArrayLike, v: ArrayLike) -> np.ndarray:
         """C(q, v) from Christoffel symbols, (nv, nv): M' - 2C is skew-symmetric."""
         state = self.configuration(q), *self._vectors(v=v)
-        return pin.computeCoriolisMatrix(self.model, self._data, *state).copy()
+        return pin.computeCoriolisMatrix(self.model, self._data.own, *state).copy()
 
     def gravity(self, q: ArrayLike) -> np.ndarray:
         """g(q), (nv,), N·m."""
-        return pin.computeGeneralizedGravity(self.model, self._data, self.configuration(q)).copy()
+        return pin.computeGeneralizedGravity(self.model, self._data.own, self.configuration(q)).copy()
 
     def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> np.ndarray:
         """Torque M a + C v + g, (nv,), N·m."""
-        return pin.rnea(self.model, self._data, self.configuration(q), *self._vectors(v=v, a=a)).copy()
+        return pin.rnea(self.model, self._data.own, self.configuration(q), *self._vectors(v=v, a=a)).copy()
 
     def forward_dynamics(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike) -> np.ndarray:
         """Acceleration under joint torques tau, (nv,), rad/s^2."""
-        return pin.aba(self.model, self._data, self.configuration(q), *self._vectors(v=v, tau=tau)).copy()
+        return pin.aba(self.model, self._data.own, self.configuration(q), *self._vectors(v=v, tau=tau)).copy()
 
     def regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
         """Slotine-Li regressor Y, (nv, 10 bodies).
@@ -201,16 +202,16 @@ class Robot:
         """
         q = self._stored(q)
         mean = 0.5 * (v + v_ref)
-        Y = _regressor(self.model, self._data, q, mean, a_ref)
-        Y -= _regressor(self._weightless, self._weightless_data, q, v - mean, self._zero)
+        Y = _regressor(self.model, self._data.own, q, mean, a_ref)
+        Y -= _regressor(self._weightless, self._weightless_data.own, q, v - mean, self._zero)
         return Y if self.nv > 1 else Y.reshape(1, -1)
 
     # -- kinematics ---------------------------------------------------------------------------------------
 
     def tip_pose(self, q: ArrayLike) -> pin.SE3:
         """Placement of the tip frame in the world."""
-        pin.forwardKinematics(self.model, self._data, self.configuration(q))
-        return pin.updateFramePlacement(self.model, self._data, self.tip_id).copy()
+        pin.forwardKinematics(self.model, self._data.own, self.configuration(q))
+        return pin.updateFramePlacement(self.model, self._data.own, self.tip_id).copy()
 
     def tip_position(self, q: ArrayLike) -> np.ndarray:
         """Position of the tip in the world, (3,), m."""
@@ -218,7 +219,7 @@ class Robot:
 
     def jacobian(self, q: ArrayLike) -> np.ndarray:
         """Jacobian of the tip, (6, nv): linear velocity of the tip, then angular, in world axes."""
-        model, data = self.model, self._data
+        model, data = self.model, self._data.own
         J = pin.computeFrameJacobian(model, data, self.configuration(q), self.tip_id, pin.LOCAL_WORLD_ALIGNED)
         return J.reshape(6, self.nv).copy()
 
@@ -229,9 +230,9 @@ class Robot:
     def tip_kinematics(self, q: np.ndarray, v: np.ndarray) -> tuple[pin.SE3, np.ndarray, np.ndarray]:
         """Pose of the tip, its Jacobian and the Jacobian's derivative, from one pass over the mechanism.
 
-        The pose is scratch memory, valid until the next call.
+        The pose is scratch memory, valid until this thread's next call.
         """
-        model, data, tip = self.model, self._data, self.tip_id
+        model, data, tip = self.model, self._data.own, self.tip_id
         pin.computeJointJacobiansTimeVariation(model, data, self._stored(q), v)
         pose = pin.updateFramePlacement(model, data, tip)
         J = pin.getFrameJacobian(model, data, tip, _WORLD_AXES)

@@ -10,12 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from math import isfinite
+from threading import current_thread, main_thread
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..control.controller import Signals
-from ..errors import NonFiniteError, SynctrlError
+from ..errors import InputError, NonFiniteError, SynctrlError
 from ..tasks.cell import Reference
 from .clock import Clock, Stretch, before
 from .closed_loop import ClosedLoop
@@ -89,9 +90,14 @@ def adaptive(
     rtol: float,
     atol: float,
 ) -> Iterator[Sample]:
-    """One of SciPy's methods with error control, restarted at every jump."""
+    """One of SciPy's methods with error control, restarted at every jump.
+
+    Raises:
+        InputError: LSODA outside the main thread, of a SciPy that has memory for one problem only.
+    """
     import scipy.integrate
 
+    _check_thread(method, scipy.__version__)
     y = loop.initial_state()
     logged = clock.logged
     borders = np.concatenate(([0.0], clock.jumps, [clock.end]))
@@ -106,6 +112,16 @@ def adaptive(
             raise _stuck(loop, method, solver.t, rhs(solver.t, solver.y))
         y = solver.y.copy()
     yield final(loop, clock, y, disturbance)
+
+
+def _check_thread(method: str, version: str) -> None:
+    """Before version 1.17 SciPy's LSODA kept its state in one place, where runs would spoil each other."""
+    old = tuple(map(int, version.split(".")[:2])) < (1, 17)
+    if method == "LSODA" and old and current_thread() is not main_thread():
+        raise InputError(
+            f"integrator: LSODA of SciPy {version} solves one problem at a time, so it runs in the main "
+            f"thread only, found thread '{current_thread().name}'; use another method, or SciPy 1.17 or newer"
+        )
 
 
 def _states(solver: Any, instants: np.ndarray) -> Iterator[tuple[float, np.ndarray]]:

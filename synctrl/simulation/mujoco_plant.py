@@ -8,11 +8,13 @@ damping are off: friction is that of the cell's members, as for every plant.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, MissingDependencyError
+from ..robots.per_thread import PerThread
 from ..robots.robot import Robot
 from ..robots.urdf_document import Document
 from ..robots.urdf_writer import dynamics_xml
@@ -34,6 +36,7 @@ class MujocoArm:
 
     def __init__(self, robot: Robot):
         self._mujoco = mujoco = require_mujoco()
+        self._robot = robot
         self.model = model = _model(mujoco, robot)
         model.opt.gravity = robot.gravity_vector
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
@@ -41,14 +44,18 @@ class MujocoArm:
         self._order = np.array([names.index(name) for name in robot.joint_names])
         model.dof_damping[:] = 0
         model.dof_armature[self._order] = robot.armature
-        self._data, self.nv = mujoco.MjData(model), robot.nv
+        self._data, self.nv = PerThread(partial(mujoco.MjData, model)), robot.nv
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """v', (nv,), under joint torques tau, (nv,); a row (1, nv) of each will do."""
-        data, order = self._data, self._order
+        data, order = self._data.own, self._order
         data.qpos[order], data.qvel[order], data.qfrc_applied[order] = q.ravel(), v.ravel(), tau.ravel()
         self._mujoco.mj_forward(self.model, data)
         return data.qacc[order]
+
+    def __reduce__(self) -> tuple:
+        """Copies and other processes make the scratch memory anew."""
+        return type(self), (self._robot,)
 
 
 def require_mujoco() -> Any:

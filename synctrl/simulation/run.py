@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, RunInterrupted, SynctrlError
+from ..errors import RunInterrupted, SynctrlError
 from ..tasks.reachability import SAMPLES, check_reachable
 from .clock import Clock
 from .closed_loop import ClosedLoop
@@ -16,7 +16,6 @@ from .disturbances import DisturbanceSchedule
 from .guard import Guard
 from .handover import Progress, date, tell, user_failure
 from .integrators import Sample, adaptive, rk4
-from .plant import Plant
 from .recorder import Recorder, SampleRecorder
 from .result import Result
 from .sampled import sampled_rk4
@@ -85,7 +84,6 @@ def run_compiled(
     from .compiled.engine import advance
     from .compiled.program import Program
 
-    _needs_plain_plant(run.loop.plant)
     run.info["engine"] = "compiled"
     recorder = Recorder(run.loop, run.clock)
     with _before_the_start(run):
@@ -95,17 +93,6 @@ def run_compiled(
         recorder,
         lambda: advance(program, run.clock, run.schedule, recorder, run.every, progress, tables),
     )
-
-
-def _needs_plain_plant(plant: Plant) -> None:
-    special = {
-        f"plant='{plant.physics}'": plant.physics != "pinocchio",
-        "saturation": plant.saturate,
-        "payloads": bool(plant.payloads),
-        type(plant).__name__: type(plant) is not Plant,
-    }
-    for name in (name for name, found in special.items() if found):
-        raise InputError(f"engine='compiled' does not have {name}; use engine='pinocchio'")
 
 
 def _collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> Result:

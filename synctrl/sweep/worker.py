@@ -135,7 +135,7 @@ def run_batch(payload: bytes, tasks: Sequence[Task]) -> list[Outcome]:
 
 @lru_cache(maxsize=8)
 def _runner(payload: bytes, thread: int) -> Runner:
-    """The runner of a job, made once per thread: robots must not be shared between threads."""
+    """The runner of a job, made once per thread: a user's functions need not be safe to share."""
     import pickle
 
     return Runner(pickle.loads(payload))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
+from copy import copy
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array, finite_number, instance
-from ..errors import CouplingError, CouplingWarning, InputError
+from ..errors import CouplingError, InputError
 from . import graphs
 from .weights import ConstantWeights, WeightFunction, Weights, WeightSource, as_source, check_weights
 
@@ -61,8 +61,7 @@ class Coupling:
         self._in_pairs = self.signs.shape[1] == 2
         graphs.check_rows(name, self.robots, self.edges, self.signs)
         self._source = as_source(self.robots, c)
-        self._gather_by_robot()
-        self._S = self.matrix if self.robots * self.pairs <= SMALL else None
+        self._set_sums()
 
     # -- ready couplings ----------------------------------------------------------------------------------
 
@@ -178,9 +177,11 @@ class Coupling:
         return self._again(self.signs, self._source.scaled(1 / size), "")
 
     def _again(self, signs: np.ndarray, source: WeightSource, unit: str) -> Self:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", CouplingWarning)  # said once is enough
-            return type(self)(self.robots, self.edges, signs, source, self.name, unit)
+        """A copy with other entries and weights; what there is to warn of was said of the first one."""
+        again = copy(self)
+        again.signs, again._source, again.unit = finite_array("signs", signs), source, unit
+        again._set_sums()
+        return again
 
     # -- use ----------------------------------------------------------------------------------------------
 
@@ -250,13 +251,14 @@ class Coupling:
 
     # -- internals ----------------------------------------------------------------------------------------
 
-    def _gather_by_robot(self) -> None:
+    def _set_sums(self) -> None:
         """Lists the rows of each robot one after another, so that a sum over them is one pass."""
         ends = self.edges.T.ravel()
         order = np.argsort(ends, kind="stable")
         self._incident = np.tile(np.arange(self.pairs), self.edges.shape[1])[order]
         self._incident_sign = self.signs.T.ravel()[order][:, None]
         self._first = np.searchsorted(ends[order], np.arange(self.robots))
+        self._S = self.matrix if self.robots * self.pairs <= SMALL else None
 
     def __repr__(self) -> str:
         rows = f"{self.pairs} pairs" if self._in_pairs else "all in one"

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..robots.blocks import Rows
 from ..robots.forest import Forest, forests
 from ..robots.robot import Robot
 
@@ -18,7 +19,7 @@ class Tips:
         self._robots = robots
 
     @cached_property
-    def _forests(self) -> list[tuple[slice, Forest]]:
+    def _forests(self) -> list[tuple[Rows, Forest]]:
         return forests(self._robots)
 
     @cached_property

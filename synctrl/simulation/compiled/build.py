@@ -11,19 +11,25 @@ import ctypes
 import hashlib
 import json
 import os
-import shlex
-import shutil
-import subprocess
-import sys
-import tempfile
+import platform
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 from ...errors import CompilationError, MissingDependencyError
+from .cache import building_folder, load, open_cache, read_file, remove_leftovers
+from .compiler import FLAGS, compile_library, compiler, compiler_version
 
-#: -O1, because generated code is one long sum of products: -O2 makes it no faster, only longer to compile
-FLAGS = ("-O1", "-fPIC", "-fno-math-errno", "-ffp-contract=off")
+#: rooms of the package that generated code is made from, or compared with
+ROOMS = ("robots", "tasks", "control", "simulation")
+#: a digest in a file is shorter than this, bytes
+DIGEST = 200
+
+Check = Callable[[ctypes.CDLL], None]
+
+#: libraries that this process has loaded and checked, by key and digest: to do it once is enough
+_CHECKED: dict[tuple[str, str], ctypes.CDLL] = {}
 
 
 def require_casadi() -> str:
@@ -41,120 +47,102 @@ def require_casadi() -> str:
     return str(CasadiMeta.version())
 
 
-def compiler() -> list[str]:
-    """The machine's C compiler: the environment variable CC, or cc, gcc or clang.
+def content_key(*parts: object) -> str:
+    """Digest of plain data, of all code that generates code or that it is compared with, and of the compiler.
 
     Raises:
-        MissingDependencyError: there is none.
+        MissingDependencyError, CompilationError: there is no compiler, or it cannot be run.
     """
-    wanted = shlex.split(os.environ.get("CC", ""))
-    for command in [wanted] if wanted else [["cc"], ["gcc"], ["clang"]]:
-        if shutil.which(command[0]):
-            return command
-    named = f" named by CC, '{wanted[0]}'" if wanted else ""
-    raise MissingDependencyError(
-        f"engine='compiled' needs a C compiler, and the one{named} was not found; "
-        "install one (gcc or clang), or use engine='pinocchio'"
-        if named
-        else "engine='compiled' needs a C compiler (cc, gcc or clang), and none was found; "
-        "install one, or use engine='pinocchio'"
-    )
-
-
-def cache_folder() -> Path:
-    """Where compiled libraries are kept: SYNCTRL_CACHE, or the user's cache folder."""
-    chosen = os.environ.get("SYNCTRL_CACHE")
-    if chosen:
-        return Path(chosen)
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "synctrl"
-    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "synctrl"
-
-
-def content_key(*parts: object) -> str:
-    """Digest of plain data, of the generating code, and of the compiler."""
     command = compiler()
-    version = subprocess.run([*command, "--version"], capture_output=True, text=True, check=False).stdout
-    sources = [path.read_text(encoding="utf-8") for path in _generating_code()]
-    content = json.dumps([*parts, command, version, FLAGS, sources], sort_keys=True)
+    version, machine = compiler_version(command), [platform.system(), platform.machine()]
+    content = json.dumps([*parts, command, version, machine, FLAGS, digest_of_sources()], sort_keys=True)
     return hashlib.sha256(content.encode()).hexdigest()
 
 
-def cached_library(
-    key: str, generate: Callable[[], Iterable[str]], check: Callable[[ctypes.CDLL], None]
-) -> ctypes.CDLL:
+@cache
+def digest_of_sources(package: Path = Path(__file__).parents[2]) -> str:
+    """Digest of every source file in the rooms that generated code depends on."""
+    files = sorted(path for room in ROOMS for path in (package / room).rglob("*"))
+    found = hashlib.sha256()
+    for path in files:
+        if path.suffix in (".py", ".c"):
+            content = path.read_bytes()
+            found.update(f"{path.relative_to(package)} {len(content)}\n".encode() + content)
+    return found.hexdigest()
+
+
+def cached_library(key: str, generate: Callable[[], Iterable[str]], check: Check) -> ctypes.CDLL:
     """The library of a key, from the cache or built now.
 
     Args:
         key: see `content_key`.
         generate: writes the C sources, called only if they are needed; they are compiled as they come.
-        check: raises if a newly built library computes something else than it should.
+        check: raises a CompilationError if a library computes something else than it should; it is called
+            once in a process, for a new library and for one from the cache.
 
     Raises:
-        CompilationError: the compiler refused the code, or the cache cannot be written.
+        CompilationError: the compiler refused the code, the cache cannot be written, somebody else can write
+            to it, or the library fails the check.
     """
-    library = cache_folder() / f"{key}.so"
-    loaded = _load(library)
-    if loaded is None:
-        try:
-            library.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryDirectory(dir=library.parent, prefix="building-") as folder:
-                built = _compile(generate(), Path(folder))
-                check(ctypes.CDLL(str(built)))
-                _publish(built, library)
-        except OSError as error:
-            raise CompilationError(f"cannot write to the cache '{library.parent}': {error}") from error
-        loaded = _load(library)
-    if loaded is None:
-        raise CompilationError(f"'{library}' was built but cannot be loaded")
-    return loaded
-
-
-def _load(library: Path) -> ctypes.CDLL | None:
-    """The library if its content is what was once published, else None."""
+    folder = open_cache()
     try:
-        digest = library.with_suffix(".sha256").read_text(encoding="ascii").strip()
-        if hashlib.sha256(library.read_bytes()).hexdigest() != digest:
-            return None
-        return ctypes.CDLL(str(library))
-    except (OSError, UnicodeDecodeError):
+        return _stored(folder, key, check) or _built(folder, key, generate, check)
+    except OSError as error:
+        raise CompilationError(f"cannot write to the cache '{folder}': {error}") from error
+
+
+# -- internals --------------------------------------------------------------------------------------------
+
+
+def _stored(folder: Path, key: str, check: Check) -> ctypes.CDLL | None:
+    """The library if its file is what was once published, and computes what it should; else None."""
+    try:
+        digest, content = read_file(folder / f"{key}.sha256", DIGEST), read_file(folder / f"{key}.so")
+    except OSError:
         return None
+    if digest is None or content is None or digest.strip() != _digest(key, content).encode():
+        return None
+    with suppress(OSError, CompilationError):
+        return _checked(folder, key, content, check)
+    return None
 
 
-def _publish(built: Path, library: Path) -> None:
-    """Move a library and its digest to their names. In between, a reader sees a digest that does not fit."""
-    digest = built.with_suffix(".sha256")
-    digest.write_text(hashlib.sha256(built.read_bytes()).hexdigest(), encoding="ascii")
-    built.replace(library)
-    digest.replace(library.with_suffix(".sha256"))
-
-
-def _compile(sources: Iterable[str], folder: Path) -> Path:
-    """Compile each source as soon as it is there, as many at a time as there are cores, and link them."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        jobs = [pool.submit(_compile_one, source, folder / f"part{k}.c") for k, source in enumerate(sources)]
-    library = folder / "library.so"
-    _run([*compiler(), "-shared", *(str(job.result()) for job in jobs), "-o", str(library), "-lm"])
+def _built(folder: Path, key: str, generate: Callable[[], Iterable[str]], check: Check) -> ctypes.CDLL:
+    remove_leftovers(folder)
+    with building_folder(folder) as place:
+        content = compile_library(generate(), place).read_bytes()
+        try:
+            library = _checked(folder, key, content, check)
+        except OSError as error:
+            raise CompilationError(
+                f"the C compiler '{compiler()[0]}' wrote what cannot be loaded as a library: {error}"
+            ) from error
+        _publish(place, folder / key, key, content)
     return library
 
 
-def _compile_one(source: str, path: Path) -> Path:
-    path.write_text(source, encoding="utf-8")
-    _run([*compiler(), *FLAGS, "-c", str(path), "-o", str(path.with_suffix(".o"))])
-    return path.with_suffix(".o")
+def _checked(folder: Path, key: str, content: bytes, check: Check) -> ctypes.CDLL:
+    """The library with this content, loaded and checked unless this process has done so before."""
+    name = key, _digest(key, content)
+    if name not in _CHECKED:
+        library = load(content, folder)
+        check(library)
+        _CHECKED[name] = library
+    return _CHECKED[name]
 
 
-def _run(command: list[str]) -> None:
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise CompilationError(f"the C compiler refused generated code:\n{done.stderr.strip()[:2000]}")
+def _publish(place: Path, target: Path, key: str, content: bytes) -> None:
+    """Write a library and its digest, then move them to their names.
+
+    In between, a reader finds a digest that does not fit.
+    """
+    for suffix, data in ((".so", content), (".sha256", _digest(key, content).encode())):
+        file = place / f"published{suffix}"
+        with open(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as stream:
+            stream.write(data)
+        file.replace(f"{target}{suffix}")
 
 
-def _generating_code() -> list[Path]:
-    package = Path(__file__).parents[2]
-    here = Path(__file__).parent
-    return [
-        package / "control" / "law.py",
-        package / "robots" / "symbolic.py",
-        *(here / name for name in ("kind.py", "trace.py", "pose.py", "program.py", "driver.c")),
-    ]
+def _digest(key: str, content: bytes) -> str:
+    """Digest of a library under its key, so that it does not fit under another one."""
+    return hashlib.sha256(key.encode() + b" " + content).hexdigest()

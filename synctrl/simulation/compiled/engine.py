@@ -59,33 +59,41 @@ def _step_bytes(cell: Cell) -> int:
     return 3 * 8 * cell.n * (3 * cell.m + weights)
 
 
+class Kept(NamedTuple):
+    """The blocks of a run, and what they were made for: motions and weights, the clock, and its log."""
+
+    made_for: tuple[Any, ...]
+    instants: tuple[Clock, int] | None
+    blocks: list[Block]
+
+
 class Tables:
-    """What is desired in a run, kept for the next one with the same motions if it fits into memory."""
+    """What is desired in a run, kept for the next one with the same motions if it fits into memory.
+
+    What is kept is looked up and replaced as a whole, so threads may share it.
+    """
 
     def __init__(self) -> None:
-        self._made_for: tuple[Any, ...] = ()
-        self._clock: Clock | None = None
-        self._blocks: list[Block] = []
+        self._kept = Kept((), None, [])
 
     def blocks(self, program: Program, clock: Clock) -> Iterable[Block]:
         """The steps of a run, made anew if the run before had other motions, weights or instants."""
-        cell = program.loop.cell
+        cell, kept = program.loop.cell, self._kept
         if clock.steps * _step_bytes(cell) > BLOCK_BYTES:
             return blocks(program, clock)
         wanted = (cell.coupling, *(member.trajectory for member in cell.members))
-        same = len(wanted) == len(self._made_for) and all(map(operator.is_, wanted, self._made_for))
-        if not (same and (clock, clock.every) == (self._clock, self._clock and self._clock.every)):
-            self._made_for = ()
-            return self._kept(blocks(program, clock), wanted, clock)
-        return self._blocks
+        same = len(wanted) == len(kept.made_for) and all(map(operator.is_, wanted, kept.made_for))
+        if same and kept.instants == (clock, clock.every):
+            return kept.blocks
+        return self._keep(blocks(program, clock), wanted, clock)
 
-    def _kept(self, fresh: Iterable[Block], wanted: tuple[Any, ...], clock: Clock) -> Iterator[Block]:
+    def _keep(self, fresh: Iterable[Block], wanted: tuple[Any, ...], clock: Clock) -> Iterator[Block]:
         """Fresh blocks, which are known from when the last of them has been made."""
         found = []
         for block in fresh:
             found.append(block)
             yield block
-        self._made_for, self._clock, self._blocks = wanted, clock, found
+        self._kept = Kept(wanted, (clock, clock.every), found)
 
 
 class Pace:

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
-from ...robots.mechanism import Mechanism
+from ...control.controller import Controller
+from ...errors import InputError
+from ...robots.friction_parameters import FrictionParameters
+from ...robots.mechanism import Mechanism, mechanism
+from ...tasks.pose import PoseSpace
+from ...tasks.spaces import CartesianSpace
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +29,7 @@ class Kind:
         reference_acceleration, k_r_space: options of the controller.
         smoothing: velocity at which adapted Coulomb friction reaches tanh(1), or None without it.
         rotors: whether rotors are adapted too.
+        made_of: names of the types that the user has plugged in.
     """
 
     fixed: Mechanism
@@ -35,6 +42,7 @@ class Kind:
     k_r_space: str
     smoothing: float | None = None
     rotors: bool = False
+    made_of: tuple[str, ...] = ()
 
     @property
     def nv(self) -> int:
@@ -67,5 +75,73 @@ class Kind:
         shared = None if self.base_rotation is None else self.base_rotation.tolist()
         matrix = None if self.matrix is None else self.matrix.tolist()
         options: list[Any] = [self.reference_acceleration, self.k_r_space, list(self.gravity)]
-        options += [self.smoothing, self.rotors]
+        options += [self.smoothing, self.rotors, list(self.made_of)]
         return [self.fixed.key(), self.space, list(self.rows), matrix, shared, options]
+
+
+class Classified(NamedTuple):
+    """The robots of a cell, sorted.
+
+    Attributes:
+        kinds: the kinds of robots there are.
+        kind_of: which one each robot is, (n,).
+        bases: placement of the first joint of each robot, (n,).
+    """
+
+    kinds: list[Kind]
+    kind_of: list[int]
+    bases: list[pin.SE3]
+
+
+def classify(controller: Controller) -> Classified:
+    """The kinds of robots in a cell of known parts, see `check_known`.
+
+    Raises:
+        InputError: the cell uses something the compiled engine does not have.
+    """
+    found = [mechanism(robot) for robot in controller.cell.robots]
+    names = [repr(fixed.key()) for fixed, _ in found]
+    rotations: dict[str, set[bytes]] = {}
+    for name, (_, base) in zip(names, found, strict=True):
+        rotations.setdefault(name, set()).add((base.rotation + 0.0).tobytes())  # -0 counts as 0
+    kinds: dict[str, Kind] = {}
+    index = []
+    for i, (name, (fixed, base)) in enumerate(zip(names, found, strict=True)):
+        same = len(rotations[name]) == 1
+        kind = _kind(controller, i, fixed, base.rotation if same else None)
+        key = repr(kind.key())
+        kinds.setdefault(key, kind)
+        index.append(list(kinds).index(key))
+    return Classified(list(kinds.values()), index, [base for _, base in found])
+
+
+def _kind(controller: Controller, i: int, fixed: Mechanism, rotation: np.ndarray | None) -> Kind:
+    cell, parameters = controller.cell, controller.cell.parameters[i]
+    rigid: Any = parameters.base if isinstance(parameters, FrictionParameters) else parameters
+    gravity = cell.robots[i].gravity_vector
+    space, rows = _space(controller)
+    return Kind(
+        fixed,
+        space,
+        rows,
+        getattr(rigid, "matrix", None),
+        rotation,
+        (float(gravity[0]), float(gravity[1]), float(gravity[2])),
+        controller.reference_acceleration,
+        controller.k_r_space,
+        getattr(parameters, "smoothing", None),
+        getattr(parameters, "armature", False),
+        tuple(type(part).__qualname__ for part in (cell.space, parameters, rigid)),
+    )
+
+
+def _space(controller: Controller) -> tuple[str, tuple[int, ...]]:
+    space: Any = controller.cell.space
+    if getattr(space, "damping", None) is not None:
+        raise InputError(
+            "engine='compiled' does not damp singular configurations; use singularity='stop', or "
+            "engine='pinocchio'"
+        )
+    if type(space) is CartesianSpace:
+        return "position", tuple(space.rows)
+    return ("pose", ()) if type(space) is PoseSpace else ("joint", ())

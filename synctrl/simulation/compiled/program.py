@@ -12,86 +12,19 @@ from typing import Any
 import numpy as np
 
 from ...control.controller import Controller
-from ...errors import CompilationError, InputError
-from ...robots.friction_parameters import FrictionParameters
-from ...robots.mechanism import Mechanism, mechanism
-from ...robots.parameters import FullParameters, LinearParameters
+from ...errors import CompilationError
 from ...tasks.cell import Reference
-from ...tasks.pose import MAX_ANGLE, PoseSpace
-from ...tasks.spaces import CartesianSpace, JointSpace
+from ...tasks.pose import MAX_ANGLE
 from ..closed_loop import ClosedLoop
-from ..plant import Plant
 from .build import cached_library, content_key, require_casadi
-from .kind import Kind
+from .kind import Classified, Kind, classify
+from .known import check_known, check_untouched
+from .specimen import Specimen
 from .structs import CellStruct, ReferenceStruct, WorkStruct
 from .trace import Trace
 
 #: relative difference between generated code and the reference engine above which the code is refused
 AGREEMENT = 1e-9
-
-
-def classify(controller: Controller) -> tuple[list[Kind], list[int], list[Any]]:
-    """The kinds of robots in a cell, which one each robot is, and the placement of its first joint.
-
-    Raises:
-        InputError: the cell uses something the compiled engine does not have.
-    """
-    cell = controller.cell
-    found = [mechanism(robot) for robot in cell.robots]
-    bases = [base for _, base in found]
-    names = [repr(fixed.key()) for fixed, _ in found]
-    rotations: dict[str, set[bytes]] = {}
-    for name, base in zip(names, bases, strict=True):
-        rotations.setdefault(name, set()).add((base.rotation + 0.0).tobytes())  # -0 counts as 0
-    kinds: dict[str, Kind] = {}
-    index = []
-    for i, (name, (fixed, base)) in enumerate(zip(names, found, strict=True)):
-        same = len(rotations[name]) == 1
-        kind = _kind(controller, i, fixed, base.rotation if same else None)
-        key = repr(kind.key())
-        kinds.setdefault(key, kind)
-        index.append(list(kinds).index(key))
-    return list(kinds.values()), index, bases
-
-
-def _kind(controller: Controller, i: int, fixed: Mechanism, rotation: np.ndarray | None) -> Kind:
-    cell, parameters = controller.cell, controller.cell.parameters[i]
-    rigid = parameters.base if isinstance(parameters, FrictionParameters) else parameters
-    if not isinstance(rigid, (FullParameters, LinearParameters)):
-        raise InputError(
-            f"engine='compiled' knows full and linear parameters, found {type(rigid).__name__} for "
-            f"{cell.names[i]}; use engine='pinocchio'"
-        )
-    gravity = cell.robots[i].gravity_vector
-    space, rows = _space(controller)
-    return Kind(
-        fixed,
-        space,
-        rows,
-        getattr(rigid, "matrix", None),
-        rotation,
-        (float(gravity[0]), float(gravity[1]), float(gravity[2])),
-        controller.reference_acceleration,
-        controller.k_r_space,
-        getattr(parameters, "smoothing", None),
-        getattr(parameters, "armature", False),
-    )
-
-
-def _space(controller: Controller) -> tuple[str, tuple[int, ...]]:
-    space = controller.cell.space
-    if getattr(space, "damping", None) is not None:
-        raise InputError(
-            "engine='compiled' does not damp singular configurations; use singularity='stop', or "
-            "engine='pinocchio'"
-        )
-    if type(space) is JointSpace:
-        return "joint", ()
-    if type(space) is CartesianSpace:
-        return "position", tuple(space.rows)
-    if type(space) is PoseSpace:
-        return "pose", ()
-    raise InputError(f"engine='compiled' does not know the space {space!r}; use engine='pinocchio'")
 
 
 def generate(kinds: list[Kind]) -> Iterator[str]:
@@ -135,51 +68,46 @@ def _table(kinds: list[Kind]) -> str:
     )
 
 
-class Program:
+class CompiledLoop:
     """A closed loop as a loaded library with its arrays.
 
     Args:
-        loop: controller and plant of a cell.
-        libraries: libraries that are loaded already, by what they were made for; this program's is added.
+        loop: controller and plant of a cell of known parts.
+        index: which kind each robot is.
+        bases: placement of the first joint of each robot.
+        library: made for these kinds.
 
     Attributes:
-        kinds: number of different robots, each with generated functions of its own.
         scratch: sizes of the scratch arrays arg, res, iw and w that the generated functions ask for.
-
-    Raises:
-        InputError: the cell uses something the compiled engine does not have.
-        MissingDependencyError: CasADi or a C compiler is missing.
-        CompilationError: the code cannot be compiled, or computes something else than the reference engine.
     """
 
-    def __init__(self, loop: ClosedLoop, libraries: dict[str, ctypes.CDLL] | None = None):
-        self.loop = loop
-        kinds, index, bases = classify(loop.controller)
+    def __init__(self, loop: ClosedLoop, index: list[int], bases: list[Any], library: ctypes.CDLL):
+        self.loop, self.library = loop, library
         self._keep: list[np.ndarray] = []
         self.cell = self._cell(index, bases)
-        self.kinds = len(kinds)
-        self.library = self._library(kinds, {} if libraries is None else libraries)
-        self.scratch = _work_sizes(self.library)
-        self.work = self._work(self.library)
+        self.scratch = _work_sizes(library)
+        self.work = self._work(library)
 
     def state_dot(self, reference: Reference, y: np.ndarray, disturbance: np.ndarray) -> np.ndarray:
         """y' at one instant, for comparison with `ClosedLoop.evaluate`."""
-        return self._state_dot(self.library, self.work, reference, y, disturbance)
-
-    # -- internals ----------------------------------------------------------------------------------------
+        y_dot = np.zeros(self.loop.size)
+        desired = np.ascontiguousarray(reference.desired.swapaxes(0, 1))
+        weights = np.ascontiguousarray(np.stack(reference.weights, axis=1))
+        table = ReferenceStruct(desired.ctypes.data, weights.ctypes.data, 1, 1)
+        pointers = (np.ascontiguousarray(part).ctypes for part in (y, disturbance))
+        y_data, disturbance_data = (pointer.data_as(ctypes.c_void_p) for pointer in pointers)
+        self.library.state_dot(
+            ctypes.byref(self.cell), ctypes.byref(table), y_data, disturbance_data,
+            y_dot.ctypes.data_as(ctypes.c_void_p), ctypes.byref(self.work),
+        )  # fmt: skip
+        return y_dot
 
     def address(self, array: np.ndarray) -> int:
-        """Address of an array that lives as long as the program."""
+        """Address of an array that lives as long as the loop."""
         self._keep.append(array)
         return array.ctypes.data
 
-    def _library(self, kinds: list[Kind], libraries: dict[str, ctypes.CDLL]) -> ctypes.CDLL:
-        keys = [kind.key() for kind in kinds]
-        name = json.dumps(keys)
-        if name not in libraries:
-            key = content_key(keys, require_casadi())
-            libraries[name] = cached_library(key, lambda: generate(kinds), self._check)
-        return libraries[name]
+    # -- internals ----------------------------------------------------------------------------------------
 
     def _cell(self, index: list[int], bases: list[Any]) -> CellStruct:
         controller, cell, plant = self.loop.controller, self.loop.cell, self.loop.plant
@@ -216,57 +144,68 @@ class Program:
         rest = [self.address(np.zeros(length)) for length in (size, n, size, n * nv)]
         return WorkStruct(*buffers, k, *rest)
 
-    def _check(self, library: ctypes.CDLL) -> None:
-        """Compare a new library with Pinocchio at random states."""
-        loop, work = self.loop, self._work(library)
-        rng = np.random.default_rng(0)
-        plant = Plant(loop.cell)
-        for t in (0.0, 0.1, 0.4):
-            reference = loop.cell.references(np.array([t]))[0]
-            y = loop.initial_state() + 0.1 * rng.standard_normal(loop.size) * self._used()
-            disturbance = rng.standard_normal(plant.viscous.shape) * self._joints()
-            expected = loop.evaluate(reference, y, disturbance)[0]
-            found = self._state_dot(library, work, reference, y, disturbance)
-            difference = np.abs(found - expected).max() / (1 + np.abs(expected).max())
-            if not difference < AGREEMENT:
-                raise CompilationError(
-                    f"generated code differs from Pinocchio by {difference:.2g} relative at a random state; "
-                    "use engine='pinocchio', and please report the cell"
-                )
 
-    def _used(self) -> np.ndarray:
-        """1 for entries of the state that are no padding, else 0."""
-        cell = self.loop.cell
-        joints = self._joints()
-        parameters = np.zeros(cell.theta.shape)
-        for i, kind in enumerate(cell.parameters):
-            parameters[i, : len(kind.theta)] = 1
-        integral = np.ones(cell.coupling.pairs * cell.m)
-        return np.concatenate([joints.ravel(), joints.ravel(), parameters.ravel(), integral])
+class Program(CompiledLoop):
+    """A closed loop as a library that was found in the cache or built, and was compared with Pinocchio.
 
-    def _joints(self) -> np.ndarray:
-        cell = self.loop.cell
-        return (np.arange(cell.nv) < np.array([robot.nv for robot in cell.robots])[:, None]).astype(float)
+    Args:
+        loop: controller and plant of a cell.
+        libraries: libraries that are loaded already, by what they were made for; this program's is added.
 
-    def _state_dot(
-        self,
-        library: ctypes.CDLL,
-        work: WorkStruct,
-        reference: Reference,
-        y: np.ndarray,
-        disturbance: np.ndarray,
-    ) -> np.ndarray:
-        y_dot = np.zeros(self.loop.size)
-        desired = np.ascontiguousarray(reference.desired.swapaxes(0, 1))
-        weights = np.ascontiguousarray(np.stack(reference.weights, axis=1))
-        table = ReferenceStruct(desired.ctypes.data, weights.ctypes.data, 1, 1)
-        pointers = (np.ascontiguousarray(part).ctypes for part in (y, disturbance))
-        y_data, disturbance_data = (pointer.data_as(ctypes.c_void_p) for pointer in pointers)
-        library.state_dot(
-            ctypes.byref(self.cell), ctypes.byref(table), y_data, disturbance_data,
-            y_dot.ctypes.data_as(ctypes.c_void_p), ctypes.byref(work),
-        )  # fmt: skip
-        return y_dot
+    Attributes:
+        kinds: number of different robots, each with generated functions of its own.
+
+    Raises:
+        InputError: the cell uses something the compiled engine does not have, such as a user's subclass.
+        MissingDependencyError: CasADi or a C compiler is missing.
+        CompilationError: the code cannot be compiled, or computes something else than the reference engine.
+    """
+
+    def __init__(self, loop: ClosedLoop, libraries: dict[str, ctypes.CDLL] | None = None):
+        check_known(loop)
+        classified = classify(loop.controller)
+        self.kinds = len(classified.kinds)
+        library = _library(loop, classified, {} if libraries is None else libraries)
+        super().__init__(loop, classified.kind_of, classified.bases, library)
+
+
+def _library(loop: ClosedLoop, classified: Classified, libraries: dict[str, ctypes.CDLL]) -> ctypes.CDLL:
+    keys = [kind.key() for kind in classified.kinds]
+    name = json.dumps(keys)
+    if name not in libraries:
+        check_untouched(loop)
+        key = content_key(keys, require_casadi())
+        libraries[name] = cached_library(
+            key, lambda: generate(classified.kinds), lambda library: _compare(library, loop, classified)
+        )
+    return libraries[name]
+
+
+def _compare(library: ctypes.CDLL, loop: ClosedLoop, classified: Classified) -> None:
+    """Compare a library with Pinocchio, on one robot of each kind.
+
+    Raises:
+        CompilationError: they differ.
+    """
+    if not (hasattr(library, "work_sizes") and hasattr(library, "state_dot")):
+        raise CompilationError("the library was made from other code")
+    specimen = Specimen(loop, classified)
+    small = specimen.loop
+    bases = classify(small.controller).bases
+    found = CompiledLoop(small, specimen.index, bases, library)
+    for case in specimen.cases():
+        expected = small.evaluate(*case)[0]
+        _agree(small.split(expected), small.split(found.state_dot(*case)))
+
+
+def _agree(expected: list[np.ndarray], found: list[np.ndarray]) -> None:
+    for name, a, b in zip(("q'", "v'", "theta_hat'", "epsilon"), expected, found, strict=True):
+        difference = np.abs(b - a).max(initial=0.0) / (1 + np.abs(a).max(initial=0.0))
+        if not difference < AGREEMENT:
+            raise CompilationError(
+                f"generated code differs from Pinocchio by {difference:.2g} relative in {name} at a random "
+                "state; use engine='pinocchio', and please report the cell"
+            )
 
 
 def _posture(controller: Controller) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,0 +1,165 @@
+"""What generated code stands for, told apart from what a user has replaced.
+
+The compiled engine does not call Python objects, it runs equations that were traced before. It may do so only
+for objects of exactly the package's own types, with exactly their methods: what else a user has plugged in is
+refused by name, even a subclass that changes nothing of importance, for else it would silently run as its
+base. Desired motions, weights and disturbances may be anything: they are called, and tabulated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import FunctionType, MethodType
+from typing import Any, NamedTuple
+
+from ...control import law
+from ...control.commands import REFERENCE_ACCELERATIONS, ConstantWeights, MovingWeights
+from ...control.controller import Controller
+from ...control.folded import FoldedWeights
+from ...control.gains import Gains
+from ...errors import InputError
+from ...robots.base_parameters import BaseParameters
+from ...robots.friction_parameters import FrictionParameters
+from ...robots.parameters import FullParameters, LinearParameters
+from ...robots.robot import Robot
+from ...tasks.cell import Cell
+from ...tasks.coupling import Coupling
+from ...tasks.pose import BoundPoseSpace, PoseSpace
+from ...tasks.redundancy import Redundancy
+from ...tasks.spaces import BoundCartesianSpace, BoundJointSpace, CartesianSpace, JointSpace
+from ..closed_loop import ClosedLoop
+from ..plant import Plant
+
+WAY_OUT = "use engine='pinocchio'"
+
+SPACES = (JointSpace, CartesianSpace, PoseSpace)
+BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace)
+RIGID = (FullParameters, LinearParameters, BaseParameters)
+LAWS = (FoldedWeights, ConstantWeights, MovingWeights)
+
+
+class Part(NamedTuple):
+    """A part of a closed loop: what it is, the object, and the types that generated code stands for."""
+
+    role: str
+    value: Any
+    known: tuple[type, ...]
+
+
+def check_known(loop: ClosedLoop) -> None:
+    """Refuse a closed loop with a part that generated code does not stand for.
+
+    Args:
+        loop: controller and plant of a cell.
+
+    Raises:
+        InputError: naming the part, its class, and the way out.
+    """
+    for part in _parts(loop):
+        _check_type(part)
+        _check_own_methods(part)
+    _check_plant(loop)
+
+
+def check_untouched(loop: ClosedLoop) -> None:
+    """Refuse to compile, or to take from the cache, what somebody has exchanged in the package itself.
+
+    Raises:
+        InputError: naming the method or function, what was put in its place, and the way out.
+    """
+    for kind in {type(part.value) for part in _parts(loop)}:
+        _check_class(kind)
+    for role, function, module in _functions(loop.controller):
+        if getattr(function, "__module__", None) != module:
+            raise _replaced(role, function)
+
+
+# -- internals --------------------------------------------------------------------------------------------
+
+
+def _parts(loop: ClosedLoop) -> Iterator[Part]:
+    controller, cell = loop.controller, loop.controller.cell
+    yield Part("closed loop", loop, (ClosedLoop,))
+    yield Part("plant", loop.plant, (Plant,))
+    yield Part("controller", controller, (Controller,))
+    yield Part("law of the controller", controller._command, LAWS)
+    yield Part("gains", controller.gains, (Gains,))
+    yield Part("cell", cell, (Cell,))
+    yield Part("coupling", cell.coupling, (Coupling,))
+    yield Part("space", cell.space, SPACES)
+    yield Part("space bound to the robots", cell.task, BOUND)
+    if not isinstance(cell.space, JointSpace):
+        yield Part("redundancy", cell.space.redundancy, (Redundancy,))  # type: ignore[attr-defined]
+    for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True):
+        yield Part(f"model of {name}", robot, (Robot,))
+        yield Part(f"parameters of {name}", parameters, (*RIGID, FrictionParameters))
+        if type(parameters) is FrictionParameters:
+            yield Part(f"parameters of {name} without friction", parameters.base, RIGID)
+
+
+def _functions(controller: Controller) -> Iterator[tuple[str, Any, str]]:
+    """Functions that generated code was traced from, and the modules that they come from."""
+    for name, function in vars(law).items():
+        if callable(function) and name[0].islower():
+            yield f"line '{name}' of the law", function, law.__name__
+    acceleration = REFERENCE_ACCELERATIONS[controller.reference_acceleration]
+    yield "reference acceleration", acceleration, law.__name__
+    yield "damping of the controller", controller._damping, Controller.__module__
+
+
+def _check_type(part: Part) -> None:
+    if type(part.value) not in part.known:
+        names = ", ".join(known.__name__ for known in part.known)
+        raise InputError(
+            f"engine='compiled' does not have the {part.role} {_name(type(part.value))}, only {names} and no "
+            f"subclass: its equations were compiled before; {WAY_OUT}"
+        )
+
+
+def _check_own_methods(part: Part) -> None:
+    """Refuse an object that has a method of its own in place of its class's."""
+    kind = type(part.value)
+    for name, own in vars(part.value).items():
+        if isinstance(getattr(kind, name, None), (FunctionType, MethodType, property)):
+            raise _replaced(f"{part.role}, {kind.__name__}.{name}", own)
+
+
+def _check_class(kind: type) -> None:
+    """Refuse a class of the package into which somebody has put another method."""
+    for base in kind.__mro__[:-1]:
+        for name, value in vars(base).items():
+            function = _unwrapped(value)
+            ours = getattr(function, "__module__", None) == base.__module__
+            if callable(function) and not ours and (name == "__call__" or not name.startswith("__")):
+                raise _replaced(f"{base.__name__}.{name}", function)
+
+
+def _check_plant(loop: ClosedLoop) -> None:
+    plant, robots = loop.plant, loop.controller.cell.robots
+    special = {
+        f"plant='{plant.physics}'": plant.physics != "pinocchio",
+        "saturation": plant.saturate,
+        "payloads": bool(plant.payloads),
+        "a plant with a state of its own": plant.hidden0.size > 0,
+        "a plant with other robots than the cell": list(map(id, plant.robots)) != list(map(id, robots)),
+    }
+    for name in (name for name, found in special.items() if found):
+        raise InputError(f"engine='compiled' does not have {name}; {WAY_OUT}")
+
+
+def _replaced(role: str, function: Any) -> InputError:
+    return InputError(
+        f"engine='compiled' does not have the {role} that was replaced by {_name(function)}: its equations "
+        f"were compiled before; {WAY_OUT}"
+    )
+
+
+def _name(thing: Any) -> str:
+    """What a class or function is called, with its module."""
+    kind = thing if hasattr(thing, "__qualname__") else type(thing)
+    return f"{kind.__module__}.{kind.__qualname__}"
+
+
+def _unwrapped(method: Any) -> Any:
+    """The function of a method."""
+    return getattr(method, "fget", None) or getattr(method, "__func__", method)
