@@ -103,15 +103,17 @@ class Pace:
         self._steps = 1
 
     def parts(self, count: int) -> Iterator[tuple[int, int]]:
-        """Steps 0 to `count` as ranges [first, last), each to be made before the next is asked for."""
+        """Steps 0 to `count` as ranges [first, last), each as long as was learnt until then."""
         first = 0
         while first < count:
             last = min(first + self._steps, count)
-            start = perf_counter()
             yield first, last
-            took = max(perf_counter() - start, 1e-6)
-            self._steps = max(1, min(8 * self._steps, int(0.5 * AWAY / took * (last - first))))
             first = last
+
+    def learn(self, steps: int, took: float) -> None:
+        """Aim at half the time, from how long some steps took, s; grow no faster than eightfold."""
+        fitting = int(0.5 * AWAY * steps / max(took, 1e-6))
+        self._steps = max(1, min(8 * self._steps, fitting))
 
 
 def advance(
@@ -142,7 +144,9 @@ def advance(
     steps = _Steps(program, clock, schedule, recorder, every)
     for block in blocks(program, clock) if tables is None else tables.blocks(program, clock):
         for first, last in pace.parts(len(block.steps.starts)):
+            start = perf_counter()
             steps.advance(block, first, last, y)
+            pace.learn(last - first, perf_counter() - start)
             recorder.reached = float(block.steps.times[last])
             tell(progress, recorder.reached)
     steps.finish(y)
