@@ -172,6 +172,8 @@ OPTIONS = {
     "continuous": {},
     "sampled": {"control_period": 6e-3},
     "DOP853": {"integrator": "DOP853"},
+    "RK45": {"integrator": "RK45"},
+    "LSODA": {"integrator": "LSODA"},
     "compiled": {"engine": "compiled"},
     "compiled, sampled": {"engine": "compiled", "control_period": 6e-3},
 }
