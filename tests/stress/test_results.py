@@ -58,8 +58,8 @@ def test_damaged_files_are_valid_results_or_result_errors(damaged_files, tmp_pat
         assert Result.load(loaded.save(tmp_path / "again.npz")) == loaded
     record_property(
         "figure",
-        f"{FILES:,} damaged files: {ended['refused']:,} ended in a ResultError, {ended['loaded']:,} in a valid "
-        "result that was saved and loaded again, none in anything else",
+        f"{FILES:,} damaged files: {ended['refused']:,} ended in a ResultError, {ended['loaded']:,} in a "
+        "valid result that was saved and loaded again, none in anything else",
     )
 
 
@@ -72,8 +72,8 @@ def test_whatever_loads_can_be_used(damaged_files, experiment, record_property):
     record_property(
         "figure",
         f"{ended['loaded']:,} damaged files that load were given to metrics, plots, scenes and certificates "
-        f"{uses.total():,} times: {uses['done']:,} worked, {uses.total() - uses['done']:,} ended in an error of "
-        "the toolkit, none in anything else",
+        f"{uses.total():,} times: {uses['done']:,} worked, {uses.total() - uses['done']:,} ended in an error "
+        "of the toolkit, none in anything else",
     )
 
 
@@ -94,5 +94,5 @@ def test_processes_that_write_large_files_to_one_path(tmp_path, record_property)
     reading = [partial(read_often, path, Path.read_bytes, contents, 500) for _ in range(2)]
     assert at_once(*writing, *reading) == []
     record_property(
-        "figure", "3 processes wrote 5 MB to one path 300 times while 2 read 1,000 times: all whole"
+        "figure", "3 processes wrote 5 MB to one path 300 times, 2 read it 1,000 times: always whole"
     )
