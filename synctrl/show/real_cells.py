@@ -85,6 +85,7 @@ def payload_scene(result: Result, size: ArrayLike, fps: float = 25) -> Scene:
 
 def error_colors(result: Result) -> np.ndarray:
     """A colour per instant and pair, (T, p, 3): green without synchronization error, red with a large one."""
+    check_run(result, "sync_error")
     size = np.linalg.norm(result.sync_error[:, :, :3], axis=2)
     share = np.clip(size / max(RED * float(size.max()), 1e-12), 0, 1)[..., None]
     return (1 - share) * GOOD + share * BAD
