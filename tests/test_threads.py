@@ -21,6 +21,7 @@ from shared_work import (
     base_parameters,
     certificates,
     evaluations,
+    loading,
     margins,
     questions,
     reaching,
@@ -63,6 +64,10 @@ def test_threads_may_share_a_closed_loop(kind):
 @pytest.mark.parametrize("name", ["planar2r", "ur5", "panda", "random"])
 def test_threads_may_ask_one_robot(name):
     assert differing(lambda: questions(name), 400) == []
+
+
+def test_threads_may_load_robots_and_make_couplings():
+    assert differing(lambda: loading(["planar2r", "a460"]), 8) == []
 
 
 @pytest.mark.parametrize(
