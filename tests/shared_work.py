@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,6 +39,7 @@ from synctrl.experiments import (
 )
 from synctrl.experiments.circles import circle_cell
 from synctrl.experiments.mixed_four import STATIONS
+from synctrl.show.plots import joint_trajectories, save, sync_errors, tracking_errors
 from synctrl.simulation.payloads import Payload
 from synctrl.simulation.prepared import Prepared
 from synctrl.simulation.result import LAYOUT
@@ -240,6 +243,18 @@ def loading(names: Sequence[str]) -> Work:
             robot.placed((1, 0, 0)).gravity(np.ones(robot.nv)),
             coupling.matrix,
         ]
+
+    return work
+
+
+def figures(kind: Kind, folder: Path) -> Work:
+    """Figures of one result, as the bytes of their files."""
+    result = kind.make().simulate(duration=0.02)
+
+    def work(k: int) -> Sequence[Any]:
+        figure = (tracking_errors, sync_errors, partial(joint_trajectories, robot=0))[k % 3](result)
+        files = save(figure, folder / f"figure {k}")
+        return [np.frombuffer(file.read_bytes(), dtype=np.uint8) for file in files]
 
     return work
 
