@@ -53,6 +53,14 @@ def non_negative_number(name: str, value: object) -> float:
     return number
 
 
+def count(name: str, value: object, least: int = 1) -> int:
+    """`value` as a whole number of at least `least`."""
+    instance(name, value, int, "a whole number")
+    if isinstance(value, bool) or value < least:  # type: ignore[operator]
+        raise InputError(f"{name}: expected a whole number of at least {least}, found {value!r}")
+    return int(value)  # type: ignore[call-overload]
+
+
 def boolean(name: str, value: object) -> bool:
     """`value` if it is True or False."""
     if not isinstance(value, (bool, np.bool_)):

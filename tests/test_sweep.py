@@ -20,7 +20,7 @@ import pytest
 from cells import SMALL_GAINS, small_cell
 from hypothesis import given
 from hypothesis import strategies as st
-from sweeps import DT, base, die, die_once, quiet, slow_sweep, small_sweep
+from sweeps import DT, base, begun, die, die_once, quiet, slow_sweep, small_sweep
 
 from synctrl import Experiment
 from synctrl.errors import InputError, ResultError, SweepError
@@ -50,7 +50,7 @@ from synctrl.sweep import (
     true_parameters,
     weights,
 )
-from synctrl.sweep.journal import Journal, difference
+from synctrl.sweep.description import difference
 
 pytest.importorskip("pandas", reason="tables are read with pandas: pip install 'synctrl[sweep]'")
 TESTS = Path(__file__).parent
@@ -467,11 +467,10 @@ def wait_for_lines(path: Path, count: int, process: subprocess.Popen) -> None:
 
 FULL_DISK = """
 import resource
-from sweeps import Journal, quiet, small_sweep
+from sweeps import begun, quiet, small_sweep
 from synctrl.errors import ResultError
 sweep = small_sweep()
-about = sweep.study.about(sweep.study.job(), samples=5, runs=5, keep_every=None)
-Journal({folder!r}, about).close()
+begun(sweep, {folder!r}).close()
 resource.setrlimit(resource.RLIMIT_FSIZE, ({room}, {room}))
 try:
     quiet(sweep, {folder!r}, backend="serial", batch=1)
@@ -533,8 +532,7 @@ def test_descriptions_differ_exactly_if_a_difference_is_found(a, b):
 def test_two_processes_cannot_write_one_sweep(tmp_path):
     pytest.importorskip("fcntl", reason="this system has no locks of this kind")
     sweep = small_sweep()
-    about = sweep.study.about(sweep.study.job(), samples=5, runs=5, keep_every=None)
-    with Journal(tmp_path, about), pytest.raises(ResultError, match="another process"):
+    with begun(sweep, tmp_path), pytest.raises(ResultError, match="another process"):
         quiet(sweep, tmp_path, backend="serial")
     quiet(sweep, tmp_path, backend="serial")
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Protocol
 
 import numpy as np
@@ -154,3 +155,39 @@ class Grid(_Listed):
     Raises:
         InputError: none, two equal ones, or something else.
     """
+
+
+#: kinds of values by the name in their description
+KINDS: Mapping[str, type] = MappingProxyType(
+    {kind.__name__: kind for kind in (Uniform, LogUniform, Normal, Choice, Grid)}
+)
+
+
+def described(description: Mapping[str, Any]) -> Values | None:
+    """The values that `describe` has described, or None if they are of a kind of the user's own.
+
+    Raises:
+        InputError: parameters that the kind does not have.
+    """
+    parameters = dict(description)
+    name = parameters.pop("kind", None)
+    kind = KINDS.get(name) if isinstance(name, str) else None
+    if kind is None:
+        return None
+    try:
+        return kind(**parameters)
+    except TypeError as error:
+        raise InputError(f"{name}: {error}") from error
+
+
+def drawn(name: str, values: Any, rng: np.random.Generator) -> Value:
+    """One value of a distribution, as a plain number or word.
+
+    Raises:
+        InputError: a distribution of the user's own draws something else.
+    """
+    value = values.draw(rng)
+    plain = value.item() if isinstance(value, np.generic) else value
+    if isinstance(plain, str) or type(plain) is int:
+        return plain
+    return finite_number(f"factor '{name}', a value that {type(values).__name__} has drawn", plain)

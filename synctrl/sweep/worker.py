@@ -12,10 +12,8 @@ from ..simulation.prepared import Prepared
 from ..simulation.result import LAYOUT, Result
 from .distributions import Value
 from .factors import Factor, Setup
-from .journal import Row
 from .measures import MEASURES, measures
-
-COMPLETED, STOPPED, REFUSED = "completed", "stopped", "refused"
+from .rows import COMPLETED, REFUSED, STOPPED, Row, columns
 
 
 class Task(NamedTuple):
@@ -54,7 +52,7 @@ class Job(NamedTuple):
     @property
     def columns(self) -> list[str]:
         """Names of the entries of a row."""
-        return columns(self.factors)
+        return columns(factor.name for factor in self.factors)
 
     def setup(self, values: Sequence[Value]) -> Setup:
         """The base with all factors applied, in their order."""
@@ -62,11 +60,6 @@ class Job(NamedTuple):
         for factor, value in zip(self.factors, values, strict=True):
             setup = factor.apply(setup, value)
         return setup
-
-
-def columns(factors: Sequence[Factor]) -> list[str]:
-    """Names of the entries of a row of a sweep over some factors."""
-    return ["run", *(factor.name for factor in factors), "status", "cause", "stop_time", *MEASURES]
 
 
 class Runner:
