@@ -27,7 +27,7 @@ from .sweep.worker import Job, Task
 Range = Uniform | LogUniform
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Tuned:
     """What tuning has found.
 
@@ -47,6 +47,13 @@ class Tuned:
     def gains(self) -> Gains:
         """The gains of the best run."""
         return self.experiment.gains
+
+    def __repr__(self) -> str:
+        values, measured = (
+            ", ".join(f"{name} = {value:.4g}" for name, value in numbers.items() if value is not None)
+            for numbers in (self.values, self.measures)
+        )
+        return f"Tuned: the best of {len(self.history)} runs\n  values: {values}\n  measures: {measured}"
 
 
 def tune(

@@ -13,6 +13,8 @@ from ..checks import finite_number, positive_number
 from ..errors import InputError
 
 Value = float | str
+#: how many listed values are shown one by one
+SHOWN = 8
 
 
 class Values(Protocol):
@@ -129,7 +131,10 @@ class _Listed:
         return {"kind": type(self).__name__, "values": list(self.values)}
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({list(self.values)})"
+        kind, count = type(self).__name__, len(self.values)
+        if count <= SHOWN:
+            return f"{kind}({list(self.values)})"
+        return f"{kind}({count} values from {self.values[0]!r} to {self.values[-1]!r})"
 
 
 class Choice(_Listed):

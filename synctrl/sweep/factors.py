@@ -31,6 +31,11 @@ class Setup(NamedTuple):
     engine: str
     control_period: float | None
 
+    def __repr__(self) -> str:
+        name = self.experiment.title or self.experiment.cell.name
+        period = "" if self.control_period is None else f", control period {self.control_period:g} s"
+        return f"{name}, {self.duration:g} s in steps of {self.dt:g} s, engine '{self.engine}'{period}"
+
     def simulate(self) -> Result:
         """Run it; see `Experiment.simulate`."""
         return self.experiment.simulate(
@@ -38,7 +43,7 @@ class Setup(NamedTuple):
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Factor:
     """Something that differs from run to run.
 
@@ -86,6 +91,9 @@ class Factor:
         }
         name = getattr(function, "__qualname__", type(function).__qualname__)
         return {"name": self.name, "values": self.values.describe(), "change": name, "with": plain}
+
+    def __repr__(self) -> str:
+        return f"Factor({self.name!r}, {self.values!r})"
 
 
 class _PeriodFactor(Factor):

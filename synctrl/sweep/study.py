@@ -85,6 +85,10 @@ class Study:
             "versions": versions(),
         }
 
+    def __repr__(self) -> str:
+        factors = "".join(f"\n  {factor.name}: {factor.values!r}" for factor in self.factors)
+        return f"Study of {self.base!r}, seed {self.seed}{factors}"
+
     @cached_property
     def _found_bands(self) -> dict[str, float]:
         if self._bands is not None:

@@ -62,6 +62,9 @@ class Sweep:
         values = {factor.name: factor.values for factor in self.study.factors}
         self._draws = Draws(values, self.samples, self.study.seed)
 
+    def __repr__(self) -> str:
+        return f"Sweep of {len(self)} runs\n{self.study!r}"
+
     # -- single runs --------------------------------------------------------------------------------------
 
     def __len__(self) -> int:

@@ -49,6 +49,9 @@ class Job(NamedTuple):
     bands: Mapping[str, float]
     keep_every: int | None = None
 
+    def __repr__(self) -> str:
+        return f"Job: {self.base!r}, {len(self.factors)} factors"
+
     @property
     def columns(self) -> list[str]:
         """Names of the entries of a row."""
