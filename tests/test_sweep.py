@@ -408,7 +408,7 @@ def test_a_table_is_read_by_pandas_as_it_is_loaded(serial_table, tmp_path):
     import pandas as pd
 
     quiet(small_sweep(), tmp_path, backend="serial")
-    read = pd.read_csv(tmp_path / "table.csv", index_col="run")
+    read = pd.read_csv(tmp_path / "table.csv", index_col="run", float_precision="round_trip")
     loaded = load(tmp_path)
     for name in loaded.columns:
         if name not in ("status", "cause"):
