@@ -141,6 +141,20 @@ def test_mujoco_gets_inertias_in_the_axes_of_their_links(name: str) -> None:
             np.testing.assert_allclose(inertial.parameters(place), expected, atol=1e-14 * link.inertial.mass)
 
 
+def test_a_robot_with_inertias_in_turned_axes_moves_as_its_model_does() -> None:
+    document = load_robot("ur5").document
+    turned = [
+        link.inertial and replace(link.inertial, origin=Pose(link.inertial.origin.xyz, (0.4, -0.5, 0.6)))
+        for link in document.links
+    ]
+    links = tuple(replace(link, inertial=i) for link, i in zip(document.links, turned, strict=True))
+    description = describe(replace(document, links=links))
+    robot = Robot(description.model, description.tip, document=description.document)
+    q, v, tau = np.random.default_rng(4).uniform(-2, 2, (3, robot.nv))
+    expected = robot.forward_dynamics(q, v, tau)
+    assert np.abs(MujocoArm(robot).acceleration(q, v, tau) - expected).max() <= SAME * np.abs(expected).max()
+
+
 def test_inertias_in_turned_axes_are_turned() -> None:
     turned = Inertial(2.0, (1.0, 0.1, 0.2, 2.0, 0.3, 2.5), Pose((0.1, 0.2, 0.3), (0.4, -0.5, 0.6)))
     place = pin.SE3(pin.exp3(np.array([0.3, 0.2, 0.1])), np.array([1.0, 2.0, 3.0]))

@@ -23,8 +23,8 @@ COMPILER = '<mujoco><compiler balanceinertia="false" boundmass="0" boundinertia=
 
 #: the first major version that reads inertias in turned axes rightly
 OLDEST = 4
-#: by how much mass matrices may differ, relative to their diagonal
-SAME_MASS = 1e-8
+#: by how much mass matrices may differ, relative to their diagonal: MuJoCo finds principal axes to 1e-8
+SAME_MASS = 1e-6
 #: in how many configurations mass matrices are compared
 CONFIGURATIONS = 4
 
