@@ -408,12 +408,30 @@ def test_a_table_is_read_by_pandas_as_it_is_loaded(serial_table, tmp_path):
     import pandas as pd
 
     quiet(small_sweep(), tmp_path, backend="serial")
-    read = pd.read_csv(tmp_path / "table.csv", index_col="run", float_precision="round_trip")
+    read = pd.read_csv(tmp_path / "table.csv", index_col="run", dtype=str)
     loaded = load(tmp_path)
     for name in loaded.columns:
         if name not in ("status", "cause"):
             np.testing.assert_array_equal(read[name].astype(float), loaded[name])
     assert loaded.attrs["measures"]["sync_rms"]["unit"] == "m"
+
+
+def test_a_table_becomes_a_dataset_of_xarray(serial_table, tmp_path):
+    pytest.importorskip("xarray", reason="pip install 'synctrl[sweep]'")
+    quiet(small_sweep(), tmp_path, backend="serial")
+    table = load(tmp_path)
+    dataset = table.to_xarray()
+    assert dict(dataset.sizes) == {"run": len(table)}
+    np.testing.assert_array_equal(dataset["sync_rms"], table["sync_rms"])
+
+
+def test_what_is_made_here_is_shown_in_a_few_lines():
+    sweep = Sweep(base(), [gain("beta", Grid(np.linspace(1, 2, 1000))), model_error(Uniform(-1, 1))], dt=DT)
+    job = sweep.study.job()
+    for thing in (sweep, sweep.study, sweep.study.base, *sweep.study.factors, job, sweep._task(0)):
+        assert len(repr(thing)) < 400
+        assert repr(thing).count("\n") < 6
+    assert "beta: Grid(1000 values from 1.0 to 2.0)" in repr(sweep)
 
 
 # -- nothing is lost but runs in flight -------------------------------------------------------------------
