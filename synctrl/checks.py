@@ -18,7 +18,7 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | No
         if value is None or np.asarray(value).dtype.kind in "USc":  # neither "1" nor 1j is a number here
             raise TypeError
         array = np.array(value, dtype=float)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{name}: expected numbers, found {value!r}") from error
     if shape is not None and not _fits(array.shape, shape):
         raise InputError(f"{name}: expected shape {_show(shape)}, found {_show(array.shape)}")

@@ -105,6 +105,7 @@ def test_a_choice_draws_every_value_and_no_other():
         lambda: true_parameters(Uniform(0, 1), robot=-1),
         lambda: Factor("", Uniform(0, 1), lambda e, v: e),
         lambda: Factor("f", Uniform(0, 1), None),
+        lambda: Factor("f", np.random.default_rng(0), lambda e, v: e),
         lambda: Sweep(base(), []),
         lambda: Sweep(base(), [gain("beta", Uniform(0, 1))] * 2),
         lambda: Sweep(base(), [Factor("status", Uniform(0, 1), lambda e, v: e)]),

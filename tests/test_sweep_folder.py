@@ -213,7 +213,7 @@ def test_what_follows_values_of_the_users_own_is_compared_when_they_are_at_hand(
         load(tmp_path)
 
 
-@pytest.mark.parametrize("value", [None, math.nan, [1], True, 1j])
+@pytest.mark.parametrize("value", [None, math.nan, [1], True, 1j, "\ud800"])
 def test_what_a_users_own_values_draw_has_to_be_a_number_or_a_word(value):
     class Wrong(Dice):
         def draw(self, rng):
@@ -223,11 +223,23 @@ def test_what_a_users_own_values_draw_has_to_be_a_number_or_a_word(value):
         dice_sweep(Wrong(6)).values(0)
 
 
+def test_words_that_no_file_can_hold_are_refused_or_replaced(tmp_path):
+    with pytest.raises(InputError, match="a word that can be written"):
+        Choice(["a", "\ud800"])
+    refuse = Factor("own", Grid([1]), half_a_letter)
+    quiet(Sweep(base(), [refuse], dt=DT, engine="pinocchio"), tmp_path, backend="serial")
+    assert load(tmp_path).loc[0, "cause"] == "InputError: half a letter, ?"
+
+
+def half_a_letter(experiment, value):
+    raise InputError("half a letter, \ud800")
+
+
 DAMAGED = {
     "seed": [-1, "3", None, True],
     "samples": [0, 2, None],
     "runs": [7, None, "6"],
-    "duration": [0, -1, "long", None],
+    "duration": [0, -1, "long", None, 10**400],
     "columns": [["run"], None, [*COLUMNS]],
     "settling_bands": [{}, None, {"tracking_error": 1, "sync_error": -1}],
     "factors": [[], None, [3], [{"name": 1}], [{"name": "a", "values": {"kind": "Uniform", "low": 2}}]],

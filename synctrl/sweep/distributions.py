@@ -123,7 +123,7 @@ class _Listed:
         kind = type(self).__name__
         if isinstance(values, str) or not len(values):
             raise InputError(f"{kind}: expected a list of numbers or words, found {values!r}")
-        self.values = tuple(v if isinstance(v, str) else finite_number(kind, v) for v in values)
+        self.values = tuple(_plain(kind, value) for value in values)
         if len(set(self.values)) != len(self.values):
             raise InputError(f"{kind}: expected different values, found {list(self.values)}")
 
@@ -193,6 +193,20 @@ def drawn(name: str, values: Any, rng: np.random.Generator) -> Value:
     """
     value = values.draw(rng)
     plain = value.item() if isinstance(value, np.generic) else value
-    if isinstance(plain, str) or type(plain) is int:
+    if type(plain) is int:
         return plain
-    return finite_number(f"factor '{name}', a value that {type(values).__name__} has drawn", plain)
+    return _plain(f"factor '{name}', a value that {type(values).__name__} has drawn", plain)
+
+
+def is_text(value: object) -> bool:
+    """Whether this is a text that can be written to a file: half of a surrogate pair cannot."""
+    return isinstance(value, str) and not any("\ud800" <= letter <= "\udfff" for letter in value)
+
+
+def _plain(name: str, value: Any) -> Value:
+    """A value as a float, or as the word that it is."""
+    if not isinstance(value, str):
+        return finite_number(name, value)
+    if not is_text(value):
+        raise InputError(f"{name}: expected a word that can be written to a file, found {value!a}")
+    return str(value)

@@ -64,9 +64,11 @@ class Factor:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():
             raise InputError(f"factor: expected a name, found {self.name!r}")
-        if not isinstance(self.values, Grid) and not hasattr(self.values, "draw"):
+        needed = ("describe",) if isinstance(self.values, Grid) else ("draw", "describe")
+        if not all(callable(getattr(self.values, method, None)) for method in needed):
             raise InputError(
-                f"factor '{self.name}': expected a distribution or a Grid, found {self.values!r}"
+                f"factor '{self.name}': expected a distribution, which has draw and describe, or a Grid, "
+                f"found {self.values!r}"
             )
         if not callable(self.change):
             raise InputError(f"factor '{self.name}': expected a function, found {self.change!r}")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from ..errors import SweepFileError
-from .distributions import Value
+from .distributions import Value, is_text
 from .measures import MEASURES
 
 Row = list[Any]
@@ -93,7 +93,7 @@ def line_of(run: int, rows: Mapping[int, Row]) -> int:
 def fault_of_values(names: Iterable[str], expected: Sequence[Value | None], found: Sequence[Any]) -> str:
     """The first value that is not the expected one; None stands for any number or word."""
     for name, wanted, value in zip(names, expected, found, strict=True):
-        if not _is_number(value) and not _is_text(value):
+        if not _is_number(value) and not is_text(value):
             return f"{name}: expected a finite number or a word, found {_short(value)}"
         if wanted is not None and not _close(wanted, value):
             return f"{name}: expected {_short(wanted)}, found {_short(value)}"
@@ -103,7 +103,7 @@ def fault_of_values(names: Iterable[str], expected: Sequence[Value | None], foun
 def _fault_of_ending(status: Any, cause: Any, stop_time: Any, duration: float) -> str:
     if status not in (COMPLETED, STOPPED, REFUSED):
         return f"status: expected {COMPLETED}, {STOPPED} or {REFUSED}, found {_short(status)}"
-    if (cause is not None) if status == COMPLETED else not _is_text(cause):
+    if (cause is not None) if status == COMPLETED else not is_text(cause):
         expected = "none" if status == COMPLETED else "why the run ended"
         return f"cause: expected {expected}, found {_short(cause)}"
     if stop_time is None:
@@ -142,11 +142,6 @@ def _is_number(value: Any) -> bool:
     if type(value) is int:
         return abs(value) < 2**1000  # larger ones are no floats, and cannot even be compared with one
     return type(value) is float and math.isfinite(value)
-
-
-def _is_text(value: Any) -> bool:
-    """Whether this is a text that can be written: half a surrogate pair cannot."""
-    return isinstance(value, str) and not any("\ud800" <= letter <= "\udfff" for letter in value)
 
 
 def _short(value: Any) -> str:

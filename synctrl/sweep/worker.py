@@ -111,7 +111,7 @@ class Runner:
         return self._prepared.simulate(setup.experiment, setup.control_period)
 
     def _outcome(self, task: Task, status: str, error: SynctrlError | None, result: Result | None) -> Outcome:
-        cause = None if error is None else f"{type(error).__name__}: {error}"
+        cause = None if error is None else _written(f"{type(error).__name__}: {error}")
         time = error.time if isinstance(error, SimulationError) else None
         values: list[Any] = [None] * len(MEASURES)
         if status == COMPLETED and result is not None:
@@ -124,6 +124,11 @@ class Runner:
             return None
         thin = result.decimated(self.job.keep_every)
         return {name: getattr(thin, name) for name in LAYOUT}, {**thin.info, "run": task.run}
+
+
+def _written(text: str) -> str:
+    """A text that files can hold: halves of surrogate pairs, which a name may have, become question marks."""
+    return text.encode(errors="replace").decode()
 
 
 def run_batch(payload: bytes, tasks: Sequence[Task]) -> list[Outcome]:
