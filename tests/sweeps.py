@@ -102,11 +102,12 @@ def take(folder, processes, rounds):
     for process in crew:
         process.start()
     try:
-        for _ in range(rounds):
-            yield [answers.get(timeout=60) for _ in range(processes)]
+        told = [answers.get(timeout=600) for _ in range(rounds * processes)]
     finally:
         for process in crew:
-            process.join()
+            process.join(60)
+            process.kill()
+    return [[answer for k, answer in told if k == number] for number in range(rounds)]
 
 
 def _take(folder, rounds, barrier, answers):
@@ -122,7 +123,7 @@ def _take(folder, rounds, barrier, answers):
         except ResultError as error:
             answer = str(error).split(":")[0]
         barrier.wait()  # nobody lets go before all have tried
-        answers.put(answer)
+        answers.put((number, answer))
         if journal is not None:
             journal.close()
         barrier.wait()
