@@ -139,6 +139,10 @@ class SweepError(SynctrlError):
     """A sweep that cannot go on; runs that were finished are kept."""
 
 
+class SweepFileError(SweepError, ResultError):
+    """A line in the folder of a sweep that cannot be of that sweep."""
+
+
 class CompilationError(SynctrlError):
     """Generated code that could not be compiled, kept, or trusted."""
 
