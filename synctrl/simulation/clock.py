@@ -27,6 +27,13 @@ class Clock:
     times: np.ndarray
     jumps: np.ndarray
 
+    @property
+    def joined(self) -> np.ndarray:
+        """Whether the right-hand side goes on smoothly from the step before each of the times, (T,)."""
+        joined = ~np.isin(self.times, self.jumps)
+        joined[[0, -1]] = False
+        return joined
+
 
 def make_clock(duration: float, dt: float, edges: Sequence[float], breaks: Sequence[float] = ()) -> Clock:
     """A clock that lands exactly on every jump.

@@ -19,6 +19,7 @@ from ..tasks.cell import Reference
 from .clock import Clock, before
 from .closed_loop import ClosedLoop
 from .disturbances import DisturbanceSchedule
+from .step_error import StepError
 
 ADAPTIVE = ("RK45", "RK23", "DOP853", "Radau", "BDF", "LSODA")
 #: weights of the four stages, times 6
@@ -38,23 +39,29 @@ class Sample(NamedTuple):
     signals: Signals
 
 
-def rk4(loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule) -> Iterator[Sample]:
+def rk4(
+    loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule, step_error: StepError
+) -> Iterator[Sample]:
     """The classical Runge-Kutta method of fourth order, one step per instant of the clock."""
-    rates = np.empty((4, loop.size))
+    rates = np.zeros((4, loop.size))
     k1, k2, k3, k4 = map(loop.state, rates)
     y, following, stage = loop.state(loop.initial_state()), loop.state(), loop.state()
     logged = np.isin(clock.times, clock.logged).tolist()
     windows, pushes = _windows(schedule, clock), [tau if tau.any() else None for tau in schedule.torques]
+    joined, h = clock.joined.tolist(), 0.0
     for k, (t, t_next, (start, middle, end)) in enumerate(steps(loop, clock.times)):
         push = pushes[windows[k]]
-        h, now = t_next - t, loop.at(0.5 * (t + t_next))
+        now = loop.at(0.5 * (t + t_next))
         signals = now.derive(start, y, push, k1)
+        step_error.add(t, y.v, h if joined[k] else 0.0, k4.v - k1.v, k1.v)
+        h = t_next - t
         if logged[k]:
             yield Sample(t, y.flat, schedule.torques[windows[k]], signals)
         now.derive(middle, stage.ahead(y, 0.5 * h, k1.flat), push, k2)
         now.derive(middle, stage.ahead(y, 0.5 * h, k2.flat), push, k3)
         now.derive(end, stage.ahead(y, h, k3.flat), push, k4)
         y, following = following.ahead(y, h / 6, _SIMPSON.dot(rates)), y
+    step_error.add(float(clock.times[-1]), y.v)
     yield final(loop, clock, y.flat, schedule.torques[windows[-1]])
 
 
@@ -120,8 +127,8 @@ def _stuck(loop: ClosedLoop, method: str, t: float, y_dot: np.ndarray) -> NonFin
     v_dot = np.nan_to_num(np.abs(loop.split(y_dot)[1]), nan=np.inf).max(axis=1)
     i = int(v_dot.argmax())
     return NonFiniteError(
-        f"{method} got stuck at t = {t:g} s, where {loop.cell.names[i]} accelerates with {v_dot[i]:.3g} "
-        "rad/s²; the closed loop is unstable, near a singularity, or too stiff for the method's tolerances",
+        f"{method} got stuck at t = {t:g} s, where {loop.cell.names[i]} accelerates with "
+        f"{v_dot[i]:.3g} rad/s²",
         time=float(t),
         robot=i,
     )

@@ -17,7 +17,12 @@ from .result import LAYOUT, Result, unit_of
 
 
 class Recorder:
-    """Preallocated arrays for all logged instants of a run."""
+    """Preallocated arrays for all logged instants of a run.
+
+    Attributes:
+        count: number of instants logged until now.
+        state: flat state that the run has come to.
+    """
 
     def __init__(self, loop: ClosedLoop, instants: int):
         self._loop = loop
@@ -27,7 +32,7 @@ class Recorder:
         self._arrays = self._allocate(shapes)
         self._rows = tuple(self._arrays.values())
         self._damping = DampingLog(instants, loop.cell.n)
-        self.count = 0
+        self.count, self.state = 0, loop.initial_state()
 
     def _allocate(self, shapes: Mapping[str, list[int]]) -> dict[str, np.ndarray]:
         return {name: np.zeros(shape) for name, shape in shapes.items()}
@@ -45,6 +50,10 @@ class Recorder:
         """An array at the last instant that was logged; zeros if there is none."""
         array = self._arrays[name]
         return array[self.count - 1] if self.count else np.zeros(array.shape[1:])
+
+    def logged(self) -> dict[str, np.ndarray]:
+        """What was logged until now, by name."""
+        return {name: array[: self.count] for name, array in self._arrays.items()}
 
     def result(self, status: str, info: Mapping[str, Any], experiment: Any) -> Result:
         """What was logged until now."""

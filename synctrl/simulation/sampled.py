@@ -17,6 +17,7 @@ from .clock import Clock
 from .closed_loop import ClosedLoop
 from .disturbances import DisturbanceSchedule
 from .integrators import Sample, final, steps
+from .step_error import StepError
 
 
 def steps_per_sample(period: float, dt: float) -> int:
@@ -33,7 +34,7 @@ def steps_per_sample(period: float, dt: float) -> int:
 
 
 def sampled_rk4(
-    loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule, every: int
+    loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule, every: int, step_error: StepError
 ) -> Iterator[Sample]:
     """The plant by the classical Runge-Kutta method, under a controller that acts once in so many instants.
 
@@ -42,6 +43,7 @@ def sampled_rk4(
     """
     y = loop.initial_state()
     logged = np.isin(clock.times, clock.logged)
+    step_error.add(0.0, loop.cell.v0)
     count = 0
     held, tau = np.zeros(loop.size), np.zeros((loop.cell.n, loop.cell.nv))
     for k, (t, t_next, (start, _, _)) in enumerate(steps(loop, clock.times)):
@@ -53,14 +55,17 @@ def sampled_rk4(
                 held, tau = y_dot, signals.tau
             count += 1
             yield Sample(t, y, disturbance, replace(signals, tau=tau))
-        y = _rk4_step(plant, y, t_next - t, held, tau, disturbance)
+        y, k4, k5 = _rk4_step(plant, y, t_next - t, held, tau, disturbance)
+        step_error.add(t_next, loop.split(y)[1], t_next - t, loop.split(k4 - k5)[1])
     last = final(loop, clock, y, disturbance)
     yield last._replace(signals=replace(last.signals, tau=tau))
 
 
 def _rk4_step(
     loop: ClosedLoop, y: np.ndarray, h: float, held: np.ndarray, tau: np.ndarray, disturbance: np.ndarray
-) -> np.ndarray:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The state a step later, the last derivative on the way, and the one there before a new sample."""
+
     def coast(y: np.ndarray) -> np.ndarray:
         return loop.coast(y, held, tau, disturbance)
 
@@ -68,4 +73,5 @@ def _rk4_step(
     k2 = coast(y + 0.5 * h * k1)
     k3 = coast(y + 0.5 * h * k2)
     k4 = coast(y + h * k3)
-    return y + (h / 6) * (k1 + 2 * (k2 + k3) + k4)
+    y = y + (h / 6) * (k1 + 2 * (k2 + k3) + k4)
+    return y, k4, coast(y)

@@ -25,6 +25,7 @@ from .plant import PHYSICS, Plant
 from .recorder import Recorder, SampleRecorder
 from .result import Result
 from .sampled import sampled_rk4, steps_per_sample
+from .step_error import StepError, step_report, warn_of_step
 
 if TYPE_CHECKING:
     from ctypes import CDLL
@@ -116,6 +117,9 @@ class Experiment:
             UnreachableError: a robot cannot reach its desired positions; raised before anything runs.
             MissingDependencyError, CompilationError: the compiled engine cannot be had, and why.
             SimulationError: the run had to stop; its kinds say why, and it carries what was computed.
+
+        Warns:
+            StepWarning: the step of "rk4" was too long, and which one does; `info["step_error"]` says more.
         """
         choice("integrator", integrator, ("rk4", *ADAPTIVE))
         choice("engine", engine, ("pinocchio", "compiled"))
@@ -131,9 +135,9 @@ class Experiment:
             return _collect(
                 run, adaptive(run.loop, run.clock, run.schedule, integrator, *tolerances), progress
             )
-        if engine == "compiled":
-            return run_compiled(run, progress)
-        return run_reference(run, progress)
+        result = run_compiled(run, progress) if engine == "compiled" else run_reference(run, progress)
+        warn_of_step(result.info["step_error"], result.names, dt)
+        return result
 
     def plan(
         self, duration: float | None, dt: float, control_period: float | None = None, plant: str = "pinocchio"
@@ -151,13 +155,14 @@ class Experiment:
         info["control_period"] = control_period
         info["disturbances"] = [_describe(d) for d in self.disturbances]
         info["payloads"] = [payload.as_dict() for payload in self.payloads]
-        return Run(self, loop, clock, schedule, every, info)
+        return Run(self, loop, clock, schedule, every, info, StepError(self.cell.n, self.cell.nv))
 
 
 class Run(NamedTuple):
     """A run that is about to start.
 
-    `every` is how many logged instants a sample of sampled control lasts, or None.
+    `every` is how many logged instants a sample of sampled control lasts, or None; `step_error` learns what
+    the worst step was.
     """
 
     experiment: Experiment
@@ -166,6 +171,7 @@ class Run(NamedTuple):
     schedule: DisturbanceSchedule
     every: int | None
     info: dict[str, Any]
+    step_error: StepError
 
     def check(self) -> None:
         """Look ahead, before anything runs.
@@ -234,9 +240,10 @@ def _collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> 
 
 def run_reference(run: Run, progress: Progress | None = None) -> Result:
     """A planned run by the reference engine and the fixed-step integrator."""
+    plan = run.loop, run.clock, run.schedule
     if run.every is not None:
-        return _collect(run, sampled_rk4(run.loop, run.clock, run.schedule, run.every), progress)
-    return _collect(run, rk4(run.loop, run.clock, run.schedule), progress)
+        return _collect(run, sampled_rk4(*plan, run.every, run.step_error), progress)
+    return _collect(run, rk4(*plan, run.step_error), progress)
 
 
 def run_compiled(
@@ -255,7 +262,9 @@ def run_compiled(
     return _finish(
         run,
         recorder,
-        lambda: advance(program, run.clock, run.schedule, recorder, run.every, progress, tables),
+        lambda: advance(
+            program, run.clock, run.schedule, recorder, run.step_error, run.every, progress, tables
+        ),
     )
 
 
@@ -265,9 +274,15 @@ def _finish(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:
         try:
             log()
         except SimulationError as error:
+            _note_step_error(run, recorder)
             error.result = recorder.result(f"stopped: {error}", run.info, run.experiment)
             raise
+        _note_step_error(run, recorder)
     return recorder.result("completed", run.info, run.experiment)
+
+
+def _note_step_error(run: Run, recorder: Recorder) -> None:
+    run.info["step_error"] = step_report(run.step_error, run.loop, recorder.logged(), run.info)
 
 
 def _describe(disturbance: Disturbance) -> dict[str, Any]:

@@ -10,14 +10,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...errors import OrientationError, SimulationError
 from ...tasks.cell import Cell
 from ..clock import Clock
 from ..disturbances import DisturbanceSchedule
-from ..guard import fastest, not_finite, run_away, singular
+from ..guard import CHECKS, Finding, stopped
 from ..recorder import Recorder
+from ..step_error import StepError
 from .program import Program
-from .structs import LogStruct, ReferenceStruct, ReportStruct
+from .structs import LogStruct, ReferenceStruct, ReportStruct, StepErrorStruct
 
 #: bytes of references that one block of steps may need
 BLOCK_BYTES = 32_000_000
@@ -71,6 +71,7 @@ def advance(
     clock: Clock,
     schedule: DisturbanceSchedule,
     recorder: Recorder,
+    step_error: StepError,
     every: int | None = None,
     progress: Callable[[float], Any] | None = None,
     tables: Tables | None = None,
@@ -82,6 +83,7 @@ def advance(
         clock: its instants.
         schedule: disturbances.
         recorder: where logged instants go; after a failure it has those before it.
+        step_error: told what the worst step was.
         every: with sampled control, how many logged instants one sample lasts.
         progress: called with the time reached, s, after every block.
         tables: those of earlier runs.
@@ -89,8 +91,8 @@ def advance(
     Raises:
         NonFiniteError, SingularJacobianError, OrientationError: as the reference engine.
     """
-    y = program.loop.initial_state()
-    steps = _Steps(program, clock, schedule, every)
+    y = recorder.state
+    steps = _Steps(program, clock, schedule, step_error, every)
     for block in blocks(program, clock) if tables is None else tables.blocks(program, clock):
         steps.advance(block, y, recorder)
         if progress is not None:
@@ -101,21 +103,34 @@ def advance(
 class _Steps:
     """The library's `advance` with everything it needs for one run."""
 
-    def __init__(self, program: Program, clock: Clock, schedule: DisturbanceSchedule, every: int | None):
+    def __init__(
+        self,
+        program: Program,
+        clock: Clock,
+        schedule: DisturbanceSchedule,
+        step_error: StepError,
+        every: int | None,
+    ):
         self._program, self._clock, self._every = program, clock, every
+        v0 = program.loop.cell.v0
+        self._before = np.zeros((2, 2, v0.size))
+        buffers = (part.ctypes.data for part in self._before)
+        self._step_error, self._worst = step_error, StepErrorStruct(0, np.abs(v0).max(), 0, 0, 0, *buffers)
+        program.work.step_error = ctypes.addressof(self._worst)
         self._middles = 0.5 * (clock.times[:-1] + clock.times[1:])
         self._window = schedule.windows(self._middles).astype(np.intc)
         self._torques = np.ascontiguousarray(schedule.torques)
         self._logged = np.isin(clock.times, clock.logged)
         index = np.cumsum(self._logged) - 1
-        self._due = self._logged & (index % (every or 1) == 0)
+        due, joined = self._logged & (index % (every or 1) == 0), clock.joined
+        self._marks = joined if every is None else due
         ctypes.memset(program.work.sign, 0, 8 * program.loop.cell.n)
 
     def advance(self, block: Block, y: np.ndarray, recorder: Recorder) -> None:
         """Move y through a block, in place."""
         steps = slice(block.first, block.last)
         times = np.ascontiguousarray(self._clock.times[block.first : block.last + 1])
-        self._call(block, times, self._logged[steps], self._due[steps], self._window[steps], y, recorder)
+        self._call(block, times, self._logged[steps], self._marks[steps], self._window[steps], y, recorder)
 
     def finish(self, y: np.ndarray, recorder: Recorder) -> None:
         """Log the end of the run: one step of no length."""
@@ -129,7 +144,7 @@ class _Steps:
         block: Block,
         times: np.ndarray,
         logged: np.ndarray,
-        due: np.ndarray,
+        marks: np.ndarray,
         window: np.ndarray,
         y: np.ndarray,
         recorder: Recorder,
@@ -141,9 +156,7 @@ class _Steps:
         )
         rows = recorder.rows_ahead()
         log, report = LogStruct(*(row.ctypes.data for row in rows[1:])), ReportStruct()
-        arrays = [times, logged, due, np.ascontiguousarray(window), self._torques, y]
-        if self._every is None:
-            del arrays[2]
+        arrays = [times, logged, marks, np.ascontiguousarray(window), self._torques, y]
         call = library.advance if self._every is None else library.advance_sampled
         call.restype = ctypes.c_long
         count = call(
@@ -153,8 +166,11 @@ class _Steps:
             *(ctypes.byref(struct) for struct in (log, program.work, report)),
         )
         recorder.advance(times[:-1][logged][:count])
+        worst = self._worst
+        self._step_error.note(worst.largest, worst.speed, worst.at, worst.time)
         if report.status:
-            raise _failure(program, float(times[report.step]), report, y, recorder.last("v"))
+            found = Finding(CHECKS[report.status - 1], report.robot, report.value)
+            raise stopped(program.loop, float(times[report.step]), y, recorder.last("v"), found)
 
 
 def _tables(cell: Cell, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -169,24 +185,3 @@ def _tables(cell: Cell, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             desired[:, i, k] = part
     parts = cell.coupling.weights(flat[:1] if cell.coupling.is_constant else flat, cell.m)
     return desired, np.stack(parts, axis=2)  # as one row of instants after the other
-
-
-def _failure(
-    program: Program, t: float, report: ReportStruct, y: np.ndarray, v: np.ndarray
-) -> SimulationError:
-    loop, cell = program.loop, program.loop.cell
-    if report.status == 1 and report.robot < loop.size:  # an entry of the state, or of the torques after it
-        return run_away(loop, t, y, v)
-    if report.status == 1:
-        return not_finite(cell, t, fastest(np.arange(cell.n), loop.split(y)[1]), "torque")
-    i, name = report.robot, cell.names[report.robot]
-    if report.status == 4:
-        return OrientationError(
-            f"the orientation error of {name} is {report.value:.3g} rad at t = {t:g} s; at pi its direction "
-            "is not defined: start closer to the desired orientation, or turn more slowly",
-            time=t,
-            robot=i,
-        )
-    if report.status == 3:
-        return singular(cell, t, i, "its determinant changed sign since the instant before")
-    return singular(cell, t, i, f"its condition number is {report.value:.3g}")
