@@ -17,6 +17,7 @@ from ..tasks.cell import Cell
 from ..tasks.reachability import check_reachable
 from .clock import Clock, make_clock
 from .closed_loop import ClosedLoop
+from .diagnosis import diagnosed
 from .disturbances import Disturbance, DisturbanceSchedule
 from .guard import Guard
 from .integrators import ADAPTIVE, Sample, adaptive, rk4
@@ -230,6 +231,7 @@ def _collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> 
 
     def log() -> None:
         for sample in samples:
+            recorder.state = sample.y
             guard.check(sample)
             recorder.add(sample)
             if progress is not None:
@@ -273,10 +275,12 @@ def _finish(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:
     with np.errstate(all="ignore"):  # overflow is found and named by the guard
         try:
             log()
-        except SimulationError as error:
+        except SimulationError as stopped:
             _note_step_error(run, recorder)
+            seen = recorder.logged(), recorder.state
+            error = diagnosed(stopped, run.loop, run.schedule, *seen, run.info)
             error.result = recorder.result(f"stopped: {error}", run.info, run.experiment)
-            raise
+            raise error from None
         _note_step_error(run, recorder)
     return recorder.result("completed", run.info, run.experiment)
 
