@@ -35,6 +35,7 @@ from synctrl.simulation.compiled import program
 from synctrl.simulation.plant import Plant
 from synctrl.simulation.prepared import Prepared
 from synctrl.sweep import Sweep, Uniform, gain
+from synctrl.tasks.redundancy import Pseudoinverse
 from synctrl.tune import tune
 
 pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
@@ -123,6 +124,10 @@ class Shifted(CartesianSpace):
 
 
 class Curled(Redundancy):
+    pass
+
+
+class Leaning(Pseudoinverse):
     pass
 
 
@@ -224,6 +229,18 @@ REPLACED = {
     "the law of one controller": (
         lambda: with_own(lambda loop: loop.controller, "_command", print),
         "law of the controller",
+    ),
+    "the options of one controller": (
+        lambda: with_own(lambda loop: loop.controller, "k_r_space", "task"),
+        "damping",
+    ),
+    "a gain of one controller": (
+        lambda: with_own(lambda loop: loop.controller, "Lambda", np.full(2, 7.0)),
+        "Lambda was changed",
+    ),
+    "the inverse map of one space": (
+        lambda: with_own(lambda loop: loop.cell.task, "_inverse", Leaning(np.ones((2, 2)), 0, 0)),
+        "Leaning",
     ),
     "a method of one plant": (
         lambda: with_own(lambda loop: loop.plant, "friction", lambda v: 3 * v),

@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from types import FunctionType, MethodType
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ...control import law
 from ...control.commands import REFERENCE_ACCELERATIONS, ConstantWeights, MovingWeights
 from ...control.controller import Controller
@@ -25,8 +27,9 @@ from ...robots.robot import Robot
 from ...tasks.cell import Cell
 from ...tasks.coupling import Coupling
 from ...tasks.pose import BoundPoseSpace, PoseSpace
-from ...tasks.redundancy import Redundancy
+from ...tasks.redundancy import DampedInverse, Inverse, Pseudoinverse, Redundancy
 from ...tasks.spaces import BoundCartesianSpace, BoundJointSpace, CartesianSpace, JointSpace
+from ...tasks.tips import Tips
 from ..closed_loop import ClosedLoop
 from ..plant import Plant
 
@@ -35,6 +38,7 @@ WAY_OUT = "use engine='pinocchio'"
 SPACES = (JointSpace, CartesianSpace, PoseSpace)
 BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace)
 RIGID = (FullParameters, LinearParameters, BaseParameters)
+INVERSES = (Inverse, Pseudoinverse, DampedInverse)
 LAWS = (FoldedWeights, ConstantWeights, MovingWeights)
 
 
@@ -58,6 +62,7 @@ def check_known(loop: ClosedLoop) -> None:
     for part in _parts(loop):
         _check_type(part)
         _check_own_methods(part)
+    _check_controller(loop.controller)
     _check_plant(loop)
 
 
@@ -79,6 +84,7 @@ def check_untouched(loop: ClosedLoop) -> None:
 
 def _parts(loop: ClosedLoop) -> Iterator[Part]:
     controller, cell = loop.controller, loop.controller.cell
+    task: Any = cell.task
     yield Part("closed loop", loop, (ClosedLoop,))
     yield Part("plant", loop.plant, (Plant,))
     yield Part("controller", controller, (Controller,))
@@ -87,9 +93,12 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     yield Part("cell", cell, (Cell,))
     yield Part("coupling", cell.coupling, (Coupling,))
     yield Part("space", cell.space, SPACES)
-    yield Part("space bound to the robots", cell.task, BOUND)
+    yield Part("space bound to the robots", task, BOUND)
     if not isinstance(cell.space, JointSpace):
-        yield Part("redundancy", cell.space.redundancy, (Redundancy,))  # type: ignore[attr-defined]
+        space: Any = cell.space
+        yield Part("redundancy", space.redundancy, (Redundancy,))
+        yield Part("tips of the robots", task._tips, (Tips,))
+        yield Part("way from the task to the joints", task._inverse, INVERSES)
     for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True):
         yield Part(f"model of {name}", robot, (Robot,))
         yield Part(f"parameters of {name}", parameters, (*RIGID, FrictionParameters))
@@ -104,7 +113,6 @@ def _functions(controller: Controller) -> Iterator[tuple[str, Any, str]]:
             yield f"line '{name}' of the law", function, law.__name__
     acceleration = REFERENCE_ACCELERATIONS[controller.reference_acceleration]
     yield "reference acceleration", acceleration, law.__name__
-    yield "damping of the controller", controller._damping, Controller.__module__
 
 
 def _check_type(part: Part) -> None:
@@ -132,6 +140,20 @@ def _check_class(kind: type) -> None:
             ours = getattr(function, "__module__", None) == base.__module__
             if callable(function) and not ours and (name == "__call__" or not name.startswith("__")):
                 raise _replaced(f"{base.__name__}.{name}", function)
+
+
+def _check_controller(controller: Controller) -> None:
+    """Refuse a controller whose parts no longer say what it does: it made some of them into others."""
+    damping = controller._joint_damping if controller.k_r_space == "joint" else controller._task_damping
+    if controller._damping != damping:
+        raise _replaced("damping of the controller", controller._damping)
+    for name in ("Lambda", "beta", "K_eps"):
+        now, then = getattr(controller, name), getattr(controller.gains, name)
+        if not np.array_equal(now, np.broadcast_to(then, now.shape)):
+            raise InputError(
+                f"engine='compiled' does not have a controller whose {name} was changed after its law was "
+                f"made of it; make another one of changed gains, or {WAY_OUT}"
+            )
 
 
 def _check_plant(loop: ClosedLoop) -> None:
