@@ -9,6 +9,7 @@ base. Desired motions, weights and disturbances may be anything: they are called
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from types import FunctionType, MethodType
 from typing import Any, NamedTuple
 
@@ -126,10 +127,11 @@ def _check_type(part: Part) -> None:
 
 def _check_own_methods(part: Part) -> None:
     """Refuse an object that has a method of its own in place of its class's."""
-    kind = type(part.value)
-    for name, own in vars(part.value).items():
-        if isinstance(getattr(kind, name, None), (FunctionType, MethodType, property)):
-            raise _replaced(f"{part.role}, {kind.__name__}.{name}", own)
+    kind: Any = type(part.value)
+    own, methods = vars(part.value), _methods(kind)
+    if not methods.isdisjoint(own):
+        name = next(name for name in own if name in methods)
+        raise _replaced(f"{part.role}, {kind.__name__}.{name}", own[name])
 
 
 def _check_class(kind: type) -> None:
@@ -149,7 +151,7 @@ def _check_controller(controller: Controller) -> None:
         raise _replaced("damping of the controller", controller._damping)
     for name in ("Lambda", "beta", "K_eps"):
         now, then = getattr(controller, name), getattr(controller.gains, name)
-        if not np.array_equal(now, np.broadcast_to(then, now.shape)):
+        if np.shape(now) != (controller.cell.m,) or not (now == then).all():
             raise InputError(
                 f"engine='compiled' does not have a controller whose {name} was changed after its law was "
                 f"made of it; make another one of changed gains, or {WAY_OUT}"
@@ -180,6 +182,16 @@ def _name(thing: Any) -> str:
     """What a class or function is called, with its module."""
     kind = thing if hasattr(thing, "__qualname__") else type(thing)
     return f"{kind.__module__}.{kind.__qualname__}"
+
+
+@cache
+def _methods(kind: Any) -> frozenset[str]:
+    """Names of the methods and computed attributes of a class, without those that are kept once computed."""
+    return frozenset(
+        name
+        for name in dir(kind)
+        if isinstance(getattr(kind, name, None), (FunctionType, MethodType, property))
+    )
 
 
 def _unwrapped(method: Any) -> Any:
