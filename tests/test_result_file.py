@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synctrl import Cell, Disturbance, Experiment, Result
-from synctrl.errors import InputError, ResultError
+from synctrl.errors import InputError, ResultError, SimulationError
 from synctrl.show.plots import common_limits, save, tracking_errors
 from synctrl.simulation.result import LAYOUT
 
@@ -410,3 +410,25 @@ def test_a_damaged_file_is_a_valid_result_or_a_result_error(data, tmp_path_facto
         return
     path.unlink()
     assert Result.load(loaded.save(path)) == loaded
+
+
+# -- runs that stopped ------------------------------------------------------------------------------------
+
+ASTRAY = {
+    "step": {"gains": SMALL_GAINS.replace(Lambda=1e5)},
+    "adaptation": {"gains": SMALL_GAINS.replace(Gamma=1e9)},
+    "push": {"disturbances": [Disturbance(0, 1e300, 0.01, 0.03)]},
+    "strong push": {"disturbances": [Disturbance(1, 1e12, 0.01, 0.03)]},
+}
+
+
+@pytest.mark.parametrize("options", [{}, {"control_period": 1e-2}, {"engine": "compiled"}])
+@pytest.mark.parametrize("cause", [*ASTRAY])
+def test_whatever_a_run_that_stopped_hands_over_can_be_saved_and_loaded(experiment, tmp_path, cause, options):
+    if "engine" in options:
+        pytest.importorskip("casadi")
+    try:
+        run = replace(experiment, **ASTRAY[cause]).simulate(0.1, dt=5e-3, **options)
+    except SimulationError as error:
+        run = error.result
+    assert Result.load(run.save(tmp_path / "run.npz")) == run
