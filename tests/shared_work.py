@@ -153,8 +153,8 @@ def runs(kind: Kind, duration: float, **more: Any) -> Work:
 
 def evaluations(kind: Kind) -> Work:
     """One closed loop at random states, with the payloads of different instants."""
-    loop = kind.make().closed_loop()
-    cell, y0 = loop.cell, kind.make().closed_loop().initial_state()
+    loop = kind.make().closed_loop(kind.options.get("plant", "pinocchio"))
+    cell, y0 = loop.cell, loop.initial_state()
 
     def work(k: int) -> Sequence[Any]:
         rng = np.random.default_rng(k)
