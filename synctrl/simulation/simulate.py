@@ -14,6 +14,7 @@ from ..control.controller import Controller
 from ..control.gains import Gains
 from ..errors import InputError, SimulationError
 from ..tasks.cell import Cell
+from ..tasks.motion_checks import check_motions
 from ..tasks.reachability import check_reachable
 from .clock import Clock, make_clock
 from .closed_loop import ClosedLoop
@@ -171,12 +172,14 @@ class Run(NamedTuple):
         """Look ahead, before anything runs.
 
         Raises:
+            TrajectoryError: a desired velocity or acceleration that does not fit the motion.
             UnreachableError: a robot cannot reach its desired positions.
-            CouplingError: a weight loses its inverse on the way.
+            CouplingError: a weight loses its inverse on the way, or its derivatives do not fit.
             MissingDependencyError, InputError: a library cannot compute the plant, or refuses a robot.
         """
         cell = self.experiment.cell
         self.loop.plant.prepare()
+        check_motions(cell, self.clock.logged)
         check_reachable(cell, self.clock.logged)
         cell.coupling.check_weights(self.clock.logged, cell.m)
 
