@@ -8,9 +8,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array
+from ..checks import finite_array, positive_number
 from ..errors import CouplingError, InputError
-from .chebyshev import ACCURACY, SmoothFunction
+from .chebyshev import ACCURACY, NotSmoothError, SmoothFunction, certify
 from .derivatives import difference, find_misfit, look_at
 
 #: A condition number above this counts as "no inverse".
@@ -126,6 +126,32 @@ class SmoothWeights:
         self._c, self._factor = c, factor
         self.robots = c.shape[0]
 
+    @classmethod
+    def from_function(cls, c: Callable[[float], ArrayLike], duration: float, m: int) -> SmoothWeights:
+        """Weights from a function that returns c alone; their derivatives are found, and certified.
+
+        Args:
+            c: t -> a number per robot, (n,), diagonals, (n, m), or matrices, (n, m, m).
+            duration: they can be used from 0 to this time, s.
+            m: dimension of the task.
+
+        Raises:
+            InputError: the function returns something else.
+            CouplingError: it is not smooth enough for a relative error of 1e-8.
+        """
+        try:
+            smooth = certify(
+                lambda t: as_matrices(finite_array(f"c at t = {t:g} s", c(t)), m),
+                positive_number("duration", duration),
+            )
+        except NotSmoothError as error:
+            raise CouplingError(
+                f"the weight of the robot at index {error.row} cannot be differentiated with a relative "
+                f"error below {ACCURACY:g}: near t = {error.time:g} s derivative {error.order} is off by "
+                f"{ACCURACY * error.error:.2g}; expected a smooth function of time that is not noisy"
+            ) from None
+        return cls(smooth)
+
     def at(self, times: np.ndarray, m: int) -> Weights:
         end = self._c.duration
         outside = (times < -ACCURACY * end) | (times > (1 + ACCURACY) * end)
@@ -164,7 +190,7 @@ def as_source(robots: int, c: ArrayLike | WeightFunction | WeightSource) -> Weig
 
 def as_matrices(c: np.ndarray, m: int) -> np.ndarray:
     """Numbers, (n,), diagonals, (n, m), or matrices, (n, m, m), as matrices, (n, m, m)."""
-    n = len(c)
+    n = c.shape[0] if c.ndim else 0
     if c.ndim == 1:
         return c[:, None, None] * np.eye(m)
     if c.shape == (n, m):
