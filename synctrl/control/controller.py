@@ -7,15 +7,16 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..checks import choice, instance
+from ..checks import choice, finite_array, instance
 from ..robots.regressors import RegressorBlocks, regressors
 from ..tasks.cell import Cell, Reference
 from ..tasks.spaces import Measurement
 from . import law
 from .commands import REFERENCE_ACCELERATIONS, Command, ConstantWeights, Law, MovingWeights
 from .folded import folded
-from .gains import Gains, spread
+from .gains import Gains, spread, spread_rows
 
 
 @dataclass(slots=True)
@@ -72,7 +73,7 @@ class Controller:
     ):
         instance("cell", cell, Cell, "a Cell")
         instance("gains", gains, Gains, "Gains")
-        n, m, nv = cell.n, cell.m, cell.nv
+        m = cell.m
         self.cell = cell
         self.gains = gains
         self.reference_acceleration = choice(
@@ -82,8 +83,9 @@ class Controller:
         self.Lambda = spread("Lambda", gains.Lambda, (m,))
         self.beta = spread("beta", gains.beta, (m,))
         self.K_eps = spread("K_eps", gains.K_eps, (m,))
-        self.K_r = spread("K_r", gains.K_r, (n, nv if k_r_space == "joint" else m))
-        self.Gamma = spread("Gamma", gains.Gamma, cell.theta.shape)
+        joints = [robot.nv if k_r_space == "joint" else m for robot in cell.robots]
+        self.K_r = spread_rows("K_r", gains.K_r, joints)
+        self.Gamma = spread_rows("Gamma", gains.Gamma, [p.theta.size for p in cell.parameters])
         self._damping = self._joint_damping if k_r_space == "joint" else self._task_damping
         if cell.coupling.is_constant:
             self._command: Law = folded(cell, ConstantWeights(cell, self.Lambda, self.beta, self.K_eps))
@@ -96,16 +98,37 @@ class Controller:
         return regressors(self.cell.parameters, [robot.nv for robot in self.cell.robots])
 
     def evaluate(
-        self, reference: Reference, motion: np.ndarray, theta_hat: np.ndarray, integral: np.ndarray
+        self, reference: Reference, motion: ArrayLike, theta_hat: ArrayLike, integral: ArrayLike
     ) -> Signals:
         """The law at one instant.
 
         Args:
-            reference: desired motion and weights.
+            reference: desired motion, (3, n, m), and weights, (n, m, m) each.
             motion: joint positions and velocities, (2, n, nv).
             theta_hat: estimates, (n, P).
             integral: integrals of the synchronization errors, (p, m).
+
+        Raises:
+            InputError: another size, or numbers that are not finite.
         """
+        cell = self.cell
+        check_reference(reference, cell.n, cell.m)
+        return self.signals(
+            reference,
+            finite_array("motion", motion, (2, cell.n, cell.nv)),
+            finite_array("theta_hat", theta_hat, cell.theta.shape),
+            finite_array("integral", integral, (cell.coupling.pairs, cell.m)),
+        )
+
+    @property
+    def unchecked(self) -> Callable[[Reference, np.ndarray, np.ndarray, np.ndarray], Signals]:
+        """What a simulation calls: `signals`, or the `evaluate` of a subclass that has one of its own."""
+        return self.signals if type(self).evaluate is Controller.evaluate else self.evaluate
+
+    def signals(
+        self, reference: Reference, motion: np.ndarray, theta_hat: np.ndarray, integral: np.ndarray
+    ) -> Signals:
+        """`evaluate` without its checks, for many evaluations: numbers that are not finite go through."""
         space = self.cell.task
         task = space.measure(motion, reference.desired)
         command = self._command(task, reference, integral)
@@ -128,3 +151,15 @@ class Controller:
     ) -> np.ndarray:
         r = law.coupled_velocity_error(command.u[0], reference.c, task.x_dot)
         return self.cell.task.to_torque(task, self.K_r * law.times(reference.c_inv, r))
+
+
+def check_reference(reference: Reference, n: int, m: int) -> None:
+    """Refuse what is no desired motion and weights of n robots at one instant.
+
+    Raises:
+        InputError: another kind or size, or numbers that are not finite.
+    """
+    instance("reference", reference, Reference, "a Reference, for example of Cell.references")
+    finite_array("reference: xd, xd' and xd''", reference.desired, (3, n, m))
+    for name, weight in zip(("c", "c'", "c''", "c^-1"), reference.weights, strict=True):
+        finite_array(f"reference: {name}", weight, (n, m, m))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import RunInterrupted, SimulationError, SynctrlError
+from ..tasks.motion_checks import check_motions
 from ..tasks.reachability import SAMPLES, check_reachable
 from .clock import Clock
 from .closed_loop import ClosedLoop
@@ -51,8 +52,9 @@ class Run(NamedTuple):
         """Look ahead, before anything runs.
 
         Raises:
+            TrajectoryError: a desired velocity or acceleration that does not fit the motion.
             UnreachableError: a robot cannot reach its desired positions.
-            CouplingError: a weight loses its inverse on the way.
+            CouplingError: a weight loses its inverse on the way, or its derivatives do not fit.
             MissingDependencyError, InputError: a library cannot compute the plant, or refuses a robot.
             SimulationError: a function of the user's fails.
             RunInterrupted: by Ctrl-C.
@@ -60,6 +62,7 @@ class Run(NamedTuple):
         cell = self.loop.cell
         with _before_the_start(self):
             self.loop.plant.prepare()
+            check_motions(cell, np.array([0.0, self.clock.end]))
             check_reachable(cell, self.clock.spread(SAMPLES))
             cell.coupling.check_weights(self.clock.spread(WEIGHT_SAMPLES), cell.m)
 
