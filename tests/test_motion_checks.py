@@ -95,8 +95,9 @@ def test_a_motion_that_is_not_finite_later_on_is_named() -> None:
             t = np.asarray(t, dtype=float)[..., None] * np.ones(2)
             return Motion(np.where(t > 1, np.nan, 0 * t), 0 * t, 0 * t)
 
-    with pytest.raises(TrajectoryError, match=r"^left, trajectory, position: expected finite"):
+    with pytest.raises(NonFiniteError, match="desired motion of left is not finite") as caught:
         check_motions(cell_with(Own()), TIMES)
+    assert caught.value.robot == 0 and caught.value.time > 1
 
 
 def test_jumps_pass_where_breaks_are_named_and_the_derivatives_fit_in_between() -> None:
