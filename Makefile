@@ -3,23 +3,29 @@
 # make stress:    the long ones
 #
 # Everything is installed into .venv, in the versions of constraints.txt. What was installed is remembered in
-# .venv/.installed-*; only a change of pyproject.toml or constraints.txt installs again.
+# .venv/.installed-*; only a change of pyproject.toml or constraints.txt installs again. `make test-lowest` has an
+# environment of its own, .venv-lowest, with the oldest versions that pyproject.toml allows.
 
 VENV := .venv
 PY := $(VENV)/bin/python
+LOWEST := .venv-lowest
+# What meets every library where its versions differ.
+LOWEST_TESTS := $(addprefix tests/test_,documents.py frozen.py gain_condition.py integrators.py mujoco.py panels.py \
+                  scene.py sweep.py sweep_folder.py symbolic.py tune.py)
 WORKERS ?= 2
 
 export MPLBACKEND := Agg
 # One thread per process: the matrices are small, and the workers use the cores already.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help reproduce test stress lint clean
+.PHONY: help reproduce test test-lowest stress lint clean
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 
 help:
 	@echo "make reproduce   run every experiment of the paper and write out/index.html"
 	@echo "make test        run all tests (WORKERS=$(WORKERS) at a time)"
+	@echo "make test-lowest run those that depend on libraries with the oldest versions allowed"
 	@echo "make stress      run the long versions of tests, and print what they found (docs/reliability.md)"
 	@echo "make lint        check style (ruff) and types (mypy)"
 	@echo "make clean       remove out/, built packages and caches; .venv stays"
@@ -31,6 +37,9 @@ reproduce: $(VENV)/.installed-core
 test: $(VENV)/.installed-test
 	@$(PY) -m pytest -q -n $(WORKERS) --dist loadfile
 
+test-lowest: $(LOWEST)/.installed-lowest
+	@$(LOWEST)/bin/python -m pytest -q -n $(WORKERS) --dist loadfile $(LOWEST_TESTS)
+
 stress: $(VENV)/.installed-test
 	@$(PY) -m pytest -q -n $(WORKERS) -m stress tests/stress
 
@@ -41,19 +50,28 @@ lint: $(VENV)/.installed-dev
 
 clean:
 	rm -rf out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
-	find . -path ./$(VENV) -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +
+	find . -path "./$(VENV)*" -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)/.installed-core: WHAT := .[mujoco]
-$(VENV)/.installed-test: WHAT := .[test,notebooks,compiled,mujoco,sweep,tune]
+$(VENV)/.installed-test: WHAT := .[test,notebooks,compiled,mujoco,sweep]
 $(VENV)/.installed-dev:  WHAT := .[dev]
+$(LOWEST)/.installed-lowest: WHAT := .[test,compiled,mujoco,sweep]
 
 $(VENV)/.installed-%: $(VENV)/.made pyproject.toml constraints.txt
-	@echo "Installing $(WHAT) into $(VENV): once, a minute or two."
-	@$(PY) -m pip install -qq --disable-pip-version-check -c constraints.txt -e '$(WHAT)'
+	$(call install,$(VENV),$(WHAT),constraints.txt)
+
+$(LOWEST)/.installed-%: $(LOWEST)/.made pyproject.toml constraints-lowest.txt
+	$(call install,$(LOWEST),$(WHAT),constraints-lowest.txt)
+
+# $(call install,ENVIRONMENT,WHAT,VERSIONS)
+define install
+	@echo "Installing $(2) into $(1): once, a minute or two."
+	@$(1)/bin/python -m pip install -qq --disable-pip-version-check -c $(3) -e '$(2)'
 	@touch $@
+endef
 
 # PYTHON, or the first of these that runs and is new enough; then it must be able to make an environment.
-$(VENV)/.made:
+$(VENV)/.made $(LOWEST)/.made:
 	@for python in $(or $(PYTHON),python3.11 python3); do \
 	    if "$$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
 	        found=$$python; break; \
@@ -67,6 +85,6 @@ $(VENV)/.made:
 	    echo "$$found cannot make a virtual environment: its modules venv and ensurepip are missing" \
 	         "(on Debian: apt-get install python3-venv)." >&2; exit 1; \
 	fi; \
-	echo "Making $(VENV) with $$("$$found" --version)."; \
-	"$$found" -m venv $(VENV)
+	echo "Making $(@D) with $$("$$found" --version)."; \
+	"$$found" -m venv $(@D)
 	@touch $@

@@ -20,6 +20,7 @@ from .tasks.pose import PoseSpace
 from .tasks.poses import Attached, AxisRotation, FunctionOrientation, PoseTrajectory
 from .tasks.reachability import inverse_kinematics
 from .tasks.redundancy import Damping, Redundancy
+from .tasks.smooth import SmoothOrientation, SmoothTrajectory
 from .tasks.spaces import CartesianSpace, JointSpace
 from .tasks.synchronization import SynchronizationFunction
 from .tasks.trajectories import Circle, Cubic, ExponentialApproach, FunctionTrajectory, Hold
@@ -55,6 +56,8 @@ __all__ = [
     "Redundancy",
     "Result",
     "Robot",
+    "SmoothOrientation",
+    "SmoothTrajectory",
     "SynchronizationFunction",
     "SynctrlError",
     "inverse_kinematics",

@@ -23,7 +23,7 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | No
         if value is None or np.asarray(value).dtype.kind in "USc":  # neither "1" nor 1j is a number here
             raise TypeError
         array = np.array(value, dtype=float)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{name}: expected numbers, found {value!r}") from error
     if shape is not None and not _fits(array.shape, shape):
         raise InputError(f"{name}: expected shape {_show(shape)}, found {_show(array.shape)}")
@@ -56,6 +56,14 @@ def non_negative_number(name: str, value: object) -> float:
     if number < 0:
         raise InputError(f"{name}: expected a number of at least 0, found {number:g}")
     return number
+
+
+def count(name: str, value: object, least: int = 1) -> int:
+    """`value` as a whole number of at least `least`."""
+    instance(name, value, int, "a whole number")
+    if isinstance(value, bool) or value < least:  # type: ignore[operator]
+        raise InputError(f"{name}: expected a whole number of at least {least}, found {value!r}")
+    return int(value)  # type: ignore[call-overload]
 
 
 def boolean(name: str, value: object) -> bool:

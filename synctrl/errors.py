@@ -88,6 +88,9 @@ class SimulationError(SynctrlError):
         result: a `Result` with everything computed until then, or None if nothing was.
         time: simulated time of the failure, in s.
         robot: index of the robot concerned, counted from 0, or None.
+        joint: index of its joint, counted from 0, or None if it is not about one.
+        cause: why, as one word: "disturbance", "step", "period", "Lambda", "beta", "K_r", "K_eps", "Gamma",
+            "friction", "start", "singular", "orientation", "unstable"; None if it is of another kind.
     """
 
     def __init__(
@@ -97,13 +100,16 @@ class SimulationError(SynctrlError):
         time: float | None = None,
         robot: int | None = None,
         result: Any = None,
+        joint: int | None = None,
+        cause: str | None = None,
     ):
         self.time, self.robot, self.result = time, robot, result
+        self.joint, self.cause = joint, cause
         super().__init__(message)
 
 
 class NonFiniteError(SimulationError):
-    """The state became infinite or not a number."""
+    """The state became infinite or not a number, or the closed loop was running away to there."""
 
 
 class SingularJacobianError(SimulationError):
@@ -131,12 +137,20 @@ class SaturationWarning(UserWarning):
     """Torque was cut off at its limits, while the controller adapted and integrated as if it were not."""
 
 
+class StepWarning(UserWarning):
+    """A run whose step was too long: its own estimate of the error is above what is trusted."""
+
+
 class ResultError(SynctrlError):
     """A result file that is missing, damaged, or of another kind."""
 
 
 class SweepError(SynctrlError):
     """A sweep that cannot go on; runs that were finished are kept."""
+
+
+class SweepFileError(SweepError, ResultError):
+    """A line in the folder of a sweep that cannot be of that sweep."""
 
 
 class CompilationError(SynctrlError):

@@ -10,22 +10,24 @@ from typing import Any
 
 import numpy as np
 
-from .checks import choice, instance, positive_number
+from .checks import choice, count, instance, positive_number
 from .control.gains import Gains
 from .errors import InputError, SweepError
 from .simulation.simulate import Experiment
 from .sweep.distributions import LogUniform, Uniform
-from .sweep.evaluation import Evaluation, count, progress_bar
+from .sweep.draws import Generations
+from .sweep.evaluation import Evaluation, progress_bar
 from .sweep.factors import Factor, gain
 from .sweep.journal import Journal
 from .sweep.measures import MEASURES
+from .sweep.rows import COMPLETED, columns
 from .sweep.study import Study
-from .sweep.worker import COMPLETED, Job, Task, columns
+from .sweep.worker import Job, Task
 
 Range = Uniform | LogUniform
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Tuned:
     """What tuning has found.
 
@@ -45,6 +47,13 @@ class Tuned:
     def gains(self) -> Gains:
         """The gains of the best run."""
         return self.experiment.gains
+
+    def __repr__(self) -> str:
+        values, measured = (
+            ", ".join(f"{name} = {value:.4g}" for name, value in numbers.items() if value is not None)
+            for numbers in (self.values, self.measures)
+        )
+        return f"Tuned: the best of {len(self.history)} runs\n  values: {values}\n  measures: {measured}"
 
 
 def tune(
@@ -88,16 +97,22 @@ def tune(
 
     Raises:
         InputError: a value of the wrong kind.
+        ResultError: another process has the folder, or it holds another search, is damaged, or cannot be
+            written.
+        SweepFileError: a line in the folder cannot be of this search.
         SweepError: no run stayed below the torque limit and ran to its end.
     """
     study = Study(experiment, _factors(search), seed, duration, dt, engine, control_period, bands)
     finder = _Search(study, minimize, torque_limit, population)
-    job = study.job(folder)
+    count("generations", generations)
     with contextlib.ExitStack() as stack:
-        journal = None if folder is None else stack.enter_context(Journal(folder, finder.about(job)))
+        journal = None if folder is None else stack.enter_context(Journal(folder))
+        job = study.job(None if journal is None else journal.known())
+        if journal is not None:
+            journal.begin(finder.about(job), finder.runs)
         evaluation = Evaluation(job, journal, workers, backend, client)
         stack.enter_context(evaluation.open())
-        runs = population * (1 + count("generations", generations))
+        runs = population * (1 + generations)
         bar = stack.enter_context(progress_bar(runs, 0, progress))
         finder.run(generations, evaluation, bar)
         if journal is not None:
@@ -112,7 +127,8 @@ class _Search:
         self.study, self.minimize = study, choice("minimize", minimize, MEASURES)
         self.limit = np.inf if torque_limit is None else positive_number("torque_limit", torque_limit)
         self.population = count("population", population, least=5)
-        self.columns = columns(study.factors)
+        self.columns = columns(factor.name for factor in study.factors)
+        self.runs = Generations({factor.name: factor.values for factor in study.factors}, self.population)
         self.history: list[dict[str, Any]] = []
 
     def about(self, job: Job) -> dict[str, Any]:

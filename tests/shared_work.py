@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +17,7 @@ from synctrl import (
     BaseParameters,
     CartesianSpace,
     Cell,
+    Coupling,
     Damping,
     Experiment,
     Friction,
@@ -36,6 +39,7 @@ from synctrl.experiments import (
 )
 from synctrl.experiments.circles import circle_cell
 from synctrl.experiments.mixed_four import STATIONS
+from synctrl.show.plots import joint_trajectories, save, sync_errors, tracking_errors
 from synctrl.simulation.payloads import Payload
 from synctrl.simulation.prepared import Prepared
 from synctrl.simulation.result import LAYOUT
@@ -148,15 +152,15 @@ def runs(kind: Kind, duration: float, **more: Any) -> Work:
 
 
 def evaluations(kind: Kind) -> Work:
-    """The closed loop at random states."""
-    loop = kind.make().closed_loop()
-    cell, y0 = loop.cell, kind.make().closed_loop().initial_state()
+    """One closed loop at random states, with the payloads of different instants."""
+    loop = kind.make().closed_loop(kind.options.get("plant", "pinocchio"))
+    cell, y0 = loop.cell, loop.initial_state()
 
     def work(k: int) -> Sequence[Any]:
         rng = np.random.default_rng(k)
         y = y0 + 0.05 * rng.uniform(-1, 1, y0.size)
         reference = cell.references(np.array([1e-3 * k]))[0]
-        y_dot, s = loop.evaluate(reference, y, rng.uniform(-1, 1, (cell.n, cell.nv)))
+        y_dot, s = loop.at(1e-3 * (k % 20)).evaluate(reference, y, rng.uniform(-1, 1, (cell.n, cell.nv)))
         return [y_dot, s.tau, s.Y, s.v_ref, s.a_ref, s.task.x, s.u, s.e_star]
 
     return work
@@ -224,6 +228,33 @@ def margins(kind: Kind) -> Work:
     def work(k: int) -> Sequence[Any]:
         found = gain_condition_in_box(experiment, q0 - 0.1, q0 + 0.1, samples=4 + k % 2)
         return [found.margin, found.q, found.time]
+
+    return work
+
+
+def loading(names: Sequence[str]) -> Work:
+    """Robots read from their files, and couplings."""
+
+    def work(k: int) -> Sequence[Any]:
+        robot = load_robot(names[k % len(names)])
+        coupling = Coupling.ring(4).normalized().weighted([1.0, 2.0, 3.0, 4.0])
+        return [
+            robot.inertial_parameters,
+            robot.placed((1, 0, 0)).gravity(np.ones(robot.nv)),
+            coupling.matrix,
+        ]
+
+    return work
+
+
+def figures(kind: Kind, folder: Path) -> Work:
+    """Figures of one result, as the bytes of their files."""
+    result = kind.make().simulate(duration=0.02)
+
+    def work(k: int) -> Sequence[Any]:
+        figure = (tracking_errors, sync_errors, partial(joint_trajectories, robot=0))[k % 3](result)
+        files = save(figure, folder / f"figure {k}")
+        return [np.frombuffer(file.read_bytes(), dtype=np.uint8) for file in files]
 
     return work
 

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from cells import SMALL_GAINS, small_cell
 
 from synctrl import Disturbance, Experiment
+from synctrl.errors import ResultError
 from synctrl.sweep import Factor, Grid, LogUniform, Sweep, Uniform, gain, model_error
 from synctrl.sweep.journal import Journal
 
-__all__ = ["DT", "Grid", "Journal", "base", "die", "die_once", "quiet", "slow_sweep", "small_sweep"]
+__all__ = ["DT", "Grid", "Journal", "base", "begun", "die", "die_once", "quiet", "slow_sweep", "small_sweep"]
 
 DT = 2e-3
 
@@ -29,6 +32,13 @@ def small_sweep(samples=5, seed=3, start=None, **options) -> Sweep:
     factors = [gain("beta", LogUniform(1, 100)), model_error(Uniform(-1, 1))]
     options = {"engine": "pinocchio", "dt": DT, **options}
     return Sweep(start or base(), factors, samples=samples, seed=seed, **options)
+
+
+def begun(sweep, folder) -> Journal:
+    """The folder of a sweep that has begun."""
+    journal = Journal(folder)
+    journal.begin(sweep.about(sweep.study.job(journal.known())), sweep._draws)
+    return journal
 
 
 def slow_sweep(pause: float) -> Sweep:
@@ -66,3 +76,54 @@ def die(experiment, value):
     if value == 2:
         os.kill(os.getpid(), signal.SIGKILL)
     return experiment
+
+
+def interrupted_once(flag) -> Sweep:
+    """Four runs, the third of which is interrupted the first time."""
+    factor = Factor("number", Grid(range(4)), partial(interrupt, flag=str(flag)))
+    return Sweep(base(), [factor], dt=DT, engine="pinocchio")
+
+
+def interrupt(experiment, value, flag):
+    """Send this process what Ctrl-C sends it, the first time a run comes to value 2."""
+    if value == 2 and not Path(flag).exists():
+        Path(flag).touch()
+        signal.raise_signal(signal.SIGINT)
+    return experiment
+
+
+def take(folder, processes, rounds):
+    """What each of some processes is told that take a fresh folder at the same moment, round by round."""
+    context = multiprocessing.get_context("spawn")
+    barrier, answers = context.Barrier(processes), context.Queue()
+    crew = [
+        context.Process(target=_take, args=(str(folder), rounds, barrier, answers)) for _ in range(processes)
+    ]
+    for process in crew:
+        process.start()
+    try:
+        told = [answers.get(timeout=600) for _ in range(rounds * processes)]
+    finally:
+        for process in crew:
+            process.join(60)
+            process.kill()
+    return [[answer for k, answer in told if k == number] for number in range(rounds)]
+
+
+def _take(folder, rounds, barrier, answers):
+    sweep = small_sweep(bands={"tracking_error": 1e-3, "sync_error": 1e-3})
+    about = sweep.about(sweep.study.job())
+    for number in range(rounds):
+        barrier.wait()
+        journal = None
+        try:
+            journal = Journal(Path(folder) / str(number))
+            journal.begin(about, sweep._draws)
+            answer = "mine"
+        except ResultError as error:
+            answer = str(error).split(":")[0]
+        barrier.wait()  # nobody lets go before all have tried
+        answers.put((number, answer))
+        if journal is not None:
+            journal.close()
+        barrier.wait()

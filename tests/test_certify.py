@@ -12,6 +12,7 @@ from theory_cells import GAINS, coupling, experiment
 from synctrl import Cell, Disturbance, Friction, Result
 from synctrl.analysis import Certificate, certify
 from synctrl.analysis.convergence import convergence
+from synctrl.analysis.replay import replay
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, planar_four
 from synctrl.robots.friction_parameters import FrictionParameters
@@ -147,3 +148,47 @@ def test_the_errors_of_a_certified_run_vanish() -> None:
 def test_the_cells_of_the_paper_are_certified_unless_pushed_or_rubbed(run, verdict: str) -> None:
     certificate = certify(run.simulate(0.05))
     assert certificate.verdict == verdict, str(certificate)
+
+
+@pytest.mark.parametrize("thin", ["log_dt", "decimated"])
+@pytest.mark.parametrize(
+    "options", [{}, {"friction": Friction(viscous=0.5)}, {"disturbances": (PUSH,)}], ids=str
+)
+def test_a_thinned_log_is_not_certified_and_no_balance_is_claimed(thin: str, options: dict) -> None:
+    run = experiment(coupling("ring", 4, 2, "moving"), **options)
+    if thin == "log_dt":
+        result = run.simulate(0.04, 1e-3, log_dt=4e-3)
+    else:
+        result = run.simulate(0.04, 1e-3).decimated(4)
+    certificate = certify(result)
+    assert certificate.verdict == "not certified" and not certificate.certified
+    assert certificate.closes is None and certificate.as_dict()["balance"]["closes"] is None
+    assert certificate.every == 4
+    (doubt,) = certificate.doubts
+    assert "thinned, to one of 4 steps" in doubt
+    assert "balance: cannot be seen" in str(certificate)
+    assert len(certificate.outside) == len(options)
+
+
+def test_a_thinned_log_is_recognized_in_a_file_too(tmp_path) -> None:
+    run = experiment(coupling("pair", 2, 2))
+    result = run.simulate(0.02, 1e-3, log_dt=2e-3)
+    loaded = Result.load(result.save(tmp_path / "run.npz"))
+    assert certify(loaded, run).as_dict() == certify(result).as_dict()
+
+
+def test_a_log_that_has_every_step_is_not_thinned() -> None:
+    result = experiment(coupling("pair", 2, 2)).simulate(0.0203, 1e-3, log_dt=1e-3).decimated(1)
+    certificate = certify(result)
+    assert certificate.certified and certificate.every == 1 and certificate.closes is True
+
+
+@pytest.mark.parametrize("log_dt", [1e-3, 5e-3])
+def test_a_push_between_two_logged_instants_is_known_from_the_left(log_dt: float) -> None:
+    push = Disturbance(robot=0, torque=2.0, start=0.0095, stop=0.01)
+    run = experiment(coupling("pair", 2, 2), disturbances=(push,))
+    gone_through = replay(run.simulate(0.02, 1e-3, log_dt=log_dt))
+    k = round(0.01 / log_dt)
+    left, right = gone_through.logged[k] - 1, gone_through.logged[k]
+    np.testing.assert_array_equal(gone_through.rows.disturbance[left, 0], 2.0)
+    np.testing.assert_array_equal(gone_through.rows.disturbance[right, 0], 0.0)

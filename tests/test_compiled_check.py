@@ -63,9 +63,10 @@ def mixed() -> Experiment:
     for i in range(4):
         robot = robots[i % 2].placed((0.5 * i, 0.1, 0.2), (0, 0, 0.4 * i))
         q0 = np.array([0.4, 1.1, 0.3])[: robot.nv]
-        parameters = FrictionParameters(robot, Friction(0.2, 0.1), armature=True)
+        friction = Friction(0.2, 0.1)
+        parameters = FrictionParameters(robot, friction, armature=True)
         members.append(
-            Member(robot, Hold(robot.tip_position(q0)[:2]), q0, parameters=parameters, friction=Friction(0.2))
+            Member(robot, Hold(robot.tip_position(q0)[:2]), q0, parameters=parameters, friction=friction)
         )
     space = CartesianSpace("xy", redundancy=Redundancy([np.zeros(robots[i % 2].nv) for i in range(4)]))
     gains = Gains(4.0, 4.0, 1.0, 2.0, 0.2)

@@ -35,6 +35,7 @@ from synctrl.simulation.compiled import program
 from synctrl.simulation.plant import Plant
 from synctrl.simulation.prepared import Prepared
 from synctrl.sweep import Sweep, Uniform, gain
+from synctrl.tasks.redundancy import Pseudoinverse
 from synctrl.tune import tune
 
 pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
@@ -62,7 +63,7 @@ def plain(**options) -> Experiment:
 
 def rebuilt(cell: Cell, kind: type[Cell] = Cell, **changes) -> Cell:
     """The same cell with some of its parts exchanged."""
-    member = {key: changes.pop(key) for key in ("robot", "parameters") if key in changes}
+    member = {key: changes.pop(key) for key in ("robot", "parameters", "friction") if key in changes}
     members = [replace(m, **{key: make(m) for key, make in member.items()}) for m in cell.members]
     parts = {"coupling": cell.coupling, "space": cell.space, **changes}
     return kind(members, parts["coupling"], parts["space"])
@@ -90,28 +91,29 @@ class Sticky(Plant):
         return 3 * np.sign(v)
 
 
-class Doubled(FullParameters):
-    def regressor(self, *motion):
-        return 2 * super().regressor(*motion)
+class Scaled:
+    """A regressor of a user's own; at this scale it is true, as a cell may ask."""
 
-
-class ScaledMap(LinearParameters):
     scale = 1.0
 
     def regressor(self, *motion):
         return self.scale * super().regressor(*motion)
 
 
-class ScaledBase(BaseParameters):
-    scale = 1.0
-
-    def regressor(self, *motion):
-        return self.scale * super().regressor(*motion)
+class ScaledFull(Scaled, FullParameters):
+    pass
 
 
-class StickyParameters(FrictionParameters):
-    def regressor(self, *motion):
-        return 2 * super().regressor(*motion)
+class ScaledMap(Scaled, LinearParameters):
+    pass
+
+
+class ScaledBase(Scaled, BaseParameters):
+    pass
+
+
+class ScaledFriction(Scaled, FrictionParameters):
+    pass
 
 
 class Shifted(CartesianSpace):
@@ -123,6 +125,10 @@ class Shifted(CartesianSpace):
 
 
 class Curled(Redundancy):
+    pass
+
+
+class Leaning(Pseudoinverse):
     pass
 
 
@@ -202,16 +208,19 @@ REPLACED = {
     "a redundancy": (lambda: in_cell(space=CartesianSpace("xy", redundancy=Curled())), "Curled"),
     "a coupling": (lambda: in_cell(coupling=Squared.pair()), "Squared"),
     "gains": (lambda: replace(plain(), gains=Growing(**SMALL_GAINS.as_dict())), "Growing"),
-    "full parameters": (lambda: in_cell(parameters=lambda m: Doubled(m.robot)), "Doubled"),
+    "full parameters": (lambda: in_cell(parameters=lambda m: ScaledFull(m.robot)), "ScaledFull"),
     "base parameters": (lambda: in_cell(parameters=lambda m: ScaledBase(m.robot)), "ScaledBase"),
     "a map": (lambda: in_cell(parameters=lambda m: mapped(ScaledMap, m.robot)), "ScaledMap"),
     "parameters with friction": (
-        lambda: in_cell(parameters=lambda m: StickyParameters(m.robot, FRICTION)),
-        "StickyParameters",
+        lambda: in_cell(parameters=lambda m: ScaledFriction(m.robot, FRICTION), friction=lambda m: FRICTION),
+        "ScaledFriction",
     ),
     "parameters beside friction": (
-        lambda: in_cell(parameters=lambda m: FrictionParameters(m.robot, FRICTION, Doubled(m.robot))),
-        "Doubled",
+        lambda: in_cell(
+            parameters=lambda m: FrictionParameters(m.robot, FRICTION, ScaledFull(m.robot)),
+            friction=lambda m: FRICTION,
+        ),
+        "ScaledFull",
     ),
     "a method of one controller": (
         lambda: with_own(lambda loop: loop.controller, "evaluate", Damped.evaluate),
@@ -224,6 +233,18 @@ REPLACED = {
     "the law of one controller": (
         lambda: with_own(lambda loop: loop.controller, "_command", print),
         "law of the controller",
+    ),
+    "the options of one controller": (
+        lambda: with_own(lambda loop: loop.controller, "k_r_space", "task"),
+        "damping",
+    ),
+    "a gain of one controller": (
+        lambda: with_own(lambda loop: loop.controller, "Lambda", np.full(2, 7.0)),
+        "Lambda was changed",
+    ),
+    "the inverse map of one space": (
+        lambda: with_own(lambda loop: loop.cell.task, "_inverse", Leaning(np.ones((2, 2)), 0, 0)),
+        "Leaning",
     ),
     "a method of one plant": (
         lambda: with_own(lambda loop: loop.plant, "friction", lambda v: 3 * v),

@@ -9,8 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import random_robot, seeds
+from theory_cells import planar_arm
 
-from synctrl import CartesianSpace, Cell, Coupling, Cubic, Gains, Member, Robot, load_robot
+from synctrl import CartesianSpace, Cell, Coupling, Cubic, Gains, Member, Robot, load_robot, simulate
+from synctrl.analysis.certify import certify
 from synctrl.control.commands import ConstantWeights, Lines
 from synctrl.control.controller import Controller
 from synctrl.control.folded import FoldedWeights
@@ -267,3 +269,23 @@ def test_the_law_as_a_matrix_is_the_law_line_by_line(seed: int, graph: tuple[str
     for name in Lines._fields:
         one, other = np.array(getattr(found, name)), np.array(getattr(expected, name))
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-11 * (1 + np.abs(other).max()))
+
+
+@pytest.mark.parametrize("order", [(0, 2, 1, 3), (3, 1, 0, 2)])
+def test_a_run_with_robots_in_another_order_is_the_same_run(order: tuple[int, ...]) -> None:
+    rng, members = np.random.default_rng(0), []
+    for joints in (2, 2, 3, 3):
+        arm, q0 = planar_arm(joints, gravity=3.0), np.array([0.4, 1.1, 0.7])[:joints] + rng.uniform(-0.1, 0.1)
+        start = arm.tip_position(q0)[:2]
+        members.append(Member(arm, Cubic(start, start + 0.05, 1.0), q0, friction=Friction(0.1, 0.2)))
+    gains, runs = Gains(4.0, 3.0, 2.0, 1.5, 0.02), []
+    for some in (members, [members[i] for i in order]):
+        cell = Cell(some, Coupling.complete(4), CartesianSpace("xy"))
+        runs.append(simulate(cell, gains, 0.03))
+    one, other = runs
+    for name in ("q", "v", "tau", "tracking_error", "theta_hat"):
+        expected = getattr(one, name)[:, list(order)]
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(getattr(other, name), expected, rtol=0, atol=1e-10 * size)
+    V, V_other = (certify(run).lyapunov.V for run in runs)
+    np.testing.assert_allclose(V_other, V, rtol=1e-9)

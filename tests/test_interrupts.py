@@ -351,6 +351,17 @@ def test_bits_do_not_depend_on_the_blocks_in_which_a_run_is_made(engine, control
         assert run.simulate(**options) == expected
 
 
+@given(per_step=st.floats(1e-7, 0.02), count=st.integers(1, 5000))
+def test_the_library_is_back_within_its_time_at_any_speed(per_step, count):
+    pace, steps = compiled.Pace(), 0
+    for first, last in pace.parts(count):
+        assert first == steps < last
+        assert (last - first) * per_step <= compiled.AWAY
+        pace.learn(last - first, (last - first) * per_step)
+        steps = last
+    assert steps == count
+
+
 @given(first=st.integers(0, 50), length=st.integers(1, 70), fault=st.integers(0, 120))
 def test_what_is_made_ends_right_before_the_step_that_fails(first, length, fault):
     def make(start, stop):

@@ -227,10 +227,8 @@ def test_a_step_that_is_too_long_is_found_by_the_balance_that_does_not_close() -
 def test_forces_the_model_does_not_know_appear_as_other_power() -> None:
     run = experiment(coupling("pair", 2, 2))
     result = run.simulate(0.02, 1e-3)
-    heavier = [replace(m, parameters=FullParameters(m.robot)) for m in run.cell.members]
-    for member in heavier:
-        member.parameters.theta = 1.1 * member.parameters.theta  # what the plant does not have
-    claimed = replace(run, cell=Cell(heavier, run.cell.coupling))
+    claimed = replace(run, cell=Cell(run.cell.members, run.cell.coupling))
+    claimed.cell.theta = 1.1 * claimed.cell.theta  # what the plant does not have, and no cell would take
     record = lyapunov(result, claimed)
     assert (np.abs(record.power["other"]) > record.rounding).any()
 

@@ -6,6 +6,7 @@ import sys
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from synctrl import (
@@ -25,8 +26,8 @@ from synctrl.errors import InputError, MissingDependencyError
 from synctrl.experiments import a460_pair, planar_four
 from synctrl.robots.documents import planar_arm
 from synctrl.robots.urdf import describe
-from synctrl.robots.urdf_document import Document, Inertial
-from synctrl.simulation.mujoco_plant import MujocoArm
+from synctrl.robots.urdf_document import Document, Inertial, Pose
+from synctrl.simulation.mujoco_plant import MujocoArm, _for_mujoco
 from synctrl.simulation.plant import PHYSICS
 
 #: equal accelerations up to rounding in chains of seven bodies
@@ -107,10 +108,65 @@ def heavier(document: Document) -> Document:
 
 
 def test_mujoco_reads_the_urdf_and_not_pinocchios_model() -> None:
+    """A model and a URDF that describe different robots: a judge would blame the law, so it is refused."""
     robot = load_robot("a460")
     other = Robot(robot.model, robot.tip, document=heavier(robot.document))
-    q, v, tau = np.random.default_rng(1).uniform(-1, 1, (3, robot.nv))
-    assert np.abs(MujocoArm(other).acceleration(q, v, tau) - robot.forward_dynamics(q, v, tau)).max() > 1e-3
+    with pytest.raises(InputError, match=r"robot 'a460' has another mass matrix .* joint 'joint3'"):
+        MujocoArm(other)
+    cell = Cell([Member(each, Hold(np.zeros(3))) for each in (robot, other)], Coupling.pair())
+    run = Experiment(cell, Gains(1, 1, 1, 1, 1), 0.1).plan(None, 1e-3, plant="mujoco")
+    with pytest.raises(InputError, match="another mass matrix"):
+        run.check()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_mujoco_and_pinocchio_compute_the_same_mass_matrix(name: str) -> None:
+    robot = load_robot(name).placed((0.1, 0.2, 0.3), (0.4, 0.5, 0.6)).with_armature(0.02)
+    arm = MujocoArm(robot)
+    for q in np.random.default_rng(3).uniform(-3, 3, (5, robot.nv)):
+        expected = robot.mass_matrix(q)
+        np.testing.assert_allclose(arm.mass_matrix(q), expected, rtol=0, atol=SAME * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_mujoco_gets_inertias_in_the_axes_of_their_links(name: str) -> None:
+    """Versions before 4.0 overlook other axes, silently."""
+    document = load_robot(name).document
+    inertials = [link.inertial for link in _for_mujoco(document).links]
+    assert all(inertial is None or inertial.origin.rpy == (0, 0, 0) for inertial in inertials)
+    place = pin.SE3.Random()
+    for link, inertial in zip(document.links, inertials, strict=True):
+        if inertial is not None:
+            expected = link.inertial.parameters(place)
+            np.testing.assert_allclose(inertial.parameters(place), expected, atol=1e-14 * link.inertial.mass)
+
+
+def test_a_robot_with_inertias_in_turned_axes_moves_as_its_model_does() -> None:
+    document = load_robot("ur5").document
+    turned = [
+        link.inertial and replace(link.inertial, origin=Pose(link.inertial.origin.xyz, (0.4, -0.5, 0.6)))
+        for link in document.links
+    ]
+    links = tuple(replace(link, inertial=i) for link, i in zip(document.links, turned, strict=True))
+    description = describe(replace(document, links=links))
+    robot = Robot(description.model, description.tip, document=description.document)
+    q, v, tau = np.random.default_rng(4).uniform(-2, 2, (3, robot.nv))
+    expected = robot.forward_dynamics(q, v, tau)
+    assert np.abs(MujocoArm(robot).acceleration(q, v, tau) - expected).max() <= SAME * np.abs(expected).max()
+
+
+def test_inertias_in_turned_axes_are_turned() -> None:
+    turned = Inertial(2.0, (1.0, 0.1, 0.2, 2.0, 0.3, 2.5), Pose((0.1, 0.2, 0.3), (0.4, -0.5, 0.6)))
+    place = pin.SE3(pin.exp3(np.array([0.3, 0.2, 0.1])), np.array([1.0, 2.0, 3.0]))
+    np.testing.assert_allclose(turned.in_link_axes.parameters(place), turned.parameters(place), rtol=1e-13)
+    assert turned.in_link_axes.origin == Pose((0.1, 0.2, 0.3))
+
+
+def test_a_mujoco_that_reads_inertias_wrongly_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo is an extra: pip install 'synctrl[mujoco]'")
+    monkeypatch.setattr(mujoco, "__version__", "3.12.0")
+    with pytest.raises(MissingDependencyError, match=r"needs MuJoCo 4\.0 or newer, found 3\.12\.0"):
+        pair("a460").simulate(0.01, plant="mujoco")
 
 
 def test_mujoco_obeys_no_joint_limits_and_no_damping_of_its_own() -> None:

@@ -133,6 +133,22 @@ def test_square_robots_use_the_accurate_direct_inverse():
     assert isinstance(inverse_map([UR5, UR5], 6, Redundancy(), None), Inverse)
 
 
+@pytest.mark.parametrize("elbow", [0.01, 1.2], ids=["nearly straight", "bent"])
+@pytest.mark.parametrize("what", ["posture", "weights"])
+def test_with_damping_posture_and_weights_act_on_square_robots_near_singular_configurations_only(what, elbow):
+    """Far away, where 1 - J# J is zero, a square robot moves as without them."""
+    given, damping = {"posture": [1.0, -1.0], "weights": [1.0, 1.5]}[what], Damping(0.05, 0.05)
+    q = np.array([[0.3, elbow]] * 2)
+    moved = []
+    for redundancy in (None, Redundancy(**{what: given})):
+        bound = CartesianSpace("xy", singularity=damping, redundancy=redundancy).bind([PLANAR] * 2)
+        task = bound.measure(np.stack((q, 0 * q)), np.zeros((3, 2, 2)))
+        assert (task.inversion.damping > 0).all() == (elbow < 0.1)
+        moved.append(bound.to_joints(task, np.ones((2, 2)), np.zeros((2, 2)))[0])
+    assert (np.abs(moved[0] - moved[1]).max() > 0.01) == (elbow < 0.1)
+    assert elbow < 0.1 or np.abs(moved[0] - moved[1]).max() < 1e-12
+
+
 @settings(max_examples=20)
 @given(seed=seeds)
 def test_damping_is_zero_above_its_threshold_and_the_reference_is_then_followed_exactly(seed):

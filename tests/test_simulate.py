@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+
 import numpy as np
 import pytest
 from cells import SMALL_GAINS, small_cell
@@ -17,9 +19,11 @@ from synctrl import (
     Friction,
     Gains,
     Member,
+    Payload,
     load_robot,
     simulate,
 )
+from synctrl.errors import InputError, SingularJacobianError
 from synctrl.experiments import a460_pair, planar_four
 from synctrl.robots.parameters import planar_two_link_parameters
 from synctrl.simulation.result import LAYOUT
@@ -149,11 +153,90 @@ def test_progress_is_told_every_logged_instant():
         np.testing.assert_array_equal(told, run.t)
 
 
+def test_a_function_and_an_experiment_run_the_same_with_every_option():
+    options = {"payloads": [Payload(0, 0.5)], "saturate": True, "title": "both", "disturbances": []}
+    run = {"dt": 5e-3, "control_period": 1e-2, "log_dt": 2e-2, "rtol": 1e-6, "atol": 1e-8}
+    by_function = simulate(small_cell(), SMALL_GAINS, 0.05, **options, **run)
+    assert by_function == Experiment(small_cell(), SMALL_GAINS, 0.05, **options).simulate(**run)
+    assert by_function.info["title"] == "both" and by_function.info["payloads"]
+
+
 def test_a_function_and_an_experiment_run_the_same():
     by_function = simulate(small_cell(), SMALL_GAINS, 0.05, dt=5e-3, reference_acceleration="paper")
     experiment = Experiment(small_cell(), SMALL_GAINS, 0.05, reference_acceleration="paper")
     assert by_function == experiment.simulate(dt=5e-3)
     assert experiment.simulate(dt=5e-3).experiment is experiment
+
+
+OPTIONS = {
+    "continuous": {},
+    "sampled": {"control_period": 6e-3},
+    "DOP853": {"integrator": "DOP853"},
+    "RK45": {"integrator": "RK45"},
+    "LSODA": {"integrator": "LSODA"},
+    "compiled": {"engine": "compiled"},
+    "compiled, sampled": {"engine": "compiled", "control_period": 6e-3},
+}
+
+
+@pytest.mark.parametrize("name", OPTIONS)
+@pytest.mark.parametrize("duration", [0.06, 0.0617])
+def test_a_log_at_longer_intervals_is_a_part_of_the_whole_log(name, duration):
+    if "compiled" in name:
+        pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    push = [Disturbance(0, 0.3, 0.0203, 0.0451)]
+    experiment = Experiment(small_cell(), SMALL_GAINS, duration, push)
+    whole = experiment.simulate(dt=2e-3, **OPTIONS[name])
+    for every in (1, 4, 7, 100):
+        thin = experiment.simulate(dt=2e-3, log_dt=every * 2e-3, **OPTIONS[name])
+        assert thin.info["log_dt"] == every * 2e-3 and thin.info["dt"] == whole.info["log_dt"] == 2e-3
+        assert_same(thin, whole.decimated(every))
+
+
+def test_a_run_stops_at_the_same_instant_whatever_is_logged():
+    strict = Cell(small_cell().members, Coupling.pair(), CartesianSpace("xy", max_condition=5))
+    experiment = Experiment(strict, SMALL_GAINS, 1.0, [Disturbance(1, (0.0, -8.0), 0.1, 0.4)])
+    stops = []
+    for every in (1, 10):
+        with pytest.raises(SingularJacobianError) as stop:
+            experiment.simulate(dt=5e-3, log_dt=every * 5e-3)
+        stops.append(stop.value)
+    whole, thin = stops
+    assert str(thin) == str(whole) and thin.time == whole.time
+    np.testing.assert_array_equal(thin.result.q, whole.result.q[::10])
+
+
+@pytest.mark.parametrize(("log_dt", "found"), [(0, "0"), (-1.0, "-1"), (1.5e-3, "0.0015"), (np.nan, "nan")])
+def test_an_interval_that_is_no_multiple_of_the_step_is_refused(log_dt, found):
+    with pytest.raises(InputError, match=f"log_dt: expected .*found {found}"):
+        planar_four().simulate(0.1, log_dt=log_dt)
+
+
+@pytest.mark.parametrize("engine", ["pinocchio", "compiled"])
+@pytest.mark.parametrize(("duration", "due"), [(0.012, True), (0.014, False), (0.0113, False)])
+def test_a_torque_of_sampled_control_acts_from_its_instant_on(engine, duration, due):
+    options = {"dt": 1e-3, "control_period": 4e-3, "engine": engine}
+    run = simulate(small_cell(), SMALL_GAINS, duration, **options)
+    longer = simulate(small_cell(), SMALL_GAINS, 0.04, **options)
+    held = np.repeat(longer.tau[::4], 4, axis=0)
+    np.testing.assert_array_equal(longer.tau, held[: len(longer.tau)])
+    last = 12 if duration > 0.0115 else 11
+    np.testing.assert_array_equal(run.tau[:last], longer.tau[:last])
+    # at the end, too, it is the torque that would act from then on
+    if due:
+        np.testing.assert_array_equal(run.tau[-1], longer.tau[12])
+        assert (run.tau[-1] != run.tau[-2]).any()
+    else:
+        np.testing.assert_array_equal(run.tau[-1], run.tau[-2])
+
+
+def test_the_function_takes_whatever_an_experiment_and_its_run_take():
+    function = inspect.signature(simulate).parameters
+    fields = {**inspect.signature(Experiment).parameters, **inspect.signature(Experiment.simulate).parameters}
+    options = {name: option for name, option in fields.items() if name not in ("self", "duration")}
+    assert function.keys() == {*options, "duration"}
+    for name, option in options.items():
+        assert function[name].default == option.default, name
 
 
 # -- laws of the closed loop ------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ import pytest
 from cells import SMALL_GAINS, small_cell
 from hypothesis import given
 from hypothesis import strategies as st
-from sweeps import DT, base, die, die_once, quiet, slow_sweep, small_sweep
+from sweeps import DT, base, begun, die, die_once, quiet, slow_sweep, small_sweep
 
 from synctrl import Experiment
 from synctrl.errors import InputError, ResultError, SweepError
@@ -50,7 +50,7 @@ from synctrl.sweep import (
     true_parameters,
     weights,
 )
-from synctrl.sweep.journal import Journal, difference
+from synctrl.sweep.description import difference
 
 pytest.importorskip("pandas", reason="tables are read with pandas: pip install 'synctrl[sweep]'")
 TESTS = Path(__file__).parent
@@ -105,6 +105,7 @@ def test_a_choice_draws_every_value_and_no_other():
         lambda: true_parameters(Uniform(0, 1), robot=-1),
         lambda: Factor("", Uniform(0, 1), lambda e, v: e),
         lambda: Factor("f", Uniform(0, 1), None),
+        lambda: Factor("f", np.random.default_rng(0), lambda e, v: e),
         lambda: Sweep(base(), []),
         lambda: Sweep(base(), [gain("beta", Uniform(0, 1))] * 2),
         lambda: Sweep(base(), [Factor("status", Uniform(0, 1), lambda e, v: e)]),
@@ -408,12 +409,30 @@ def test_a_table_is_read_by_pandas_as_it_is_loaded(serial_table, tmp_path):
     import pandas as pd
 
     quiet(small_sweep(), tmp_path, backend="serial")
-    read = pd.read_csv(tmp_path / "table.csv", index_col="run")
+    read = pd.read_csv(tmp_path / "table.csv", index_col="run", dtype=str)
     loaded = load(tmp_path)
     for name in loaded.columns:
         if name not in ("status", "cause"):
             np.testing.assert_array_equal(read[name].astype(float), loaded[name])
     assert loaded.attrs["measures"]["sync_rms"]["unit"] == "m"
+
+
+def test_a_table_becomes_a_dataset_of_xarray(serial_table, tmp_path):
+    pytest.importorskip("xarray", reason="pip install 'synctrl[sweep]'")
+    quiet(small_sweep(), tmp_path, backend="serial")
+    table = load(tmp_path)
+    dataset = table.to_xarray()
+    assert dict(dataset.sizes) == {"run": len(table)}
+    np.testing.assert_array_equal(dataset["sync_rms"], table["sync_rms"])
+
+
+def test_what_is_made_here_is_shown_in_a_few_lines():
+    sweep = Sweep(base(), [gain("beta", Grid(np.linspace(1, 2, 1000))), model_error(Uniform(-1, 1))], dt=DT)
+    job = sweep.study.job()
+    for thing in (sweep, sweep.study, sweep.study.base, *sweep.study.factors, job, sweep._task(0)):
+        assert len(repr(thing)) < 400
+        assert repr(thing).count("\n") < 6
+    assert "beta: Grid(1000 values from 1.0 to 2.0)" in repr(sweep)
 
 
 # -- nothing is lost but runs in flight -------------------------------------------------------------------
@@ -467,11 +486,10 @@ def wait_for_lines(path: Path, count: int, process: subprocess.Popen) -> None:
 
 FULL_DISK = """
 import resource
-from sweeps import Journal, quiet, small_sweep
+from sweeps import begun, quiet, small_sweep
 from synctrl.errors import ResultError
 sweep = small_sweep()
-about = sweep.study.about(sweep.study.job(), samples=5, runs=5, keep_every=None)
-Journal({folder!r}, about).close()
+begun(sweep, {folder!r}).close()
 resource.setrlimit(resource.RLIMIT_FSIZE, ({room}, {room}))
 try:
     quiet(sweep, {folder!r}, backend="serial", batch=1)
@@ -533,8 +551,7 @@ def test_descriptions_differ_exactly_if_a_difference_is_found(a, b):
 def test_two_processes_cannot_write_one_sweep(tmp_path):
     pytest.importorskip("fcntl", reason="this system has no locks of this kind")
     sweep = small_sweep()
-    about = sweep.study.about(sweep.study.job(), samples=5, runs=5, keep_every=None)
-    with Journal(tmp_path, about), pytest.raises(ResultError, match="another process"):
+    with begun(sweep, tmp_path), pytest.raises(ResultError, match="another process"):
         quiet(sweep, tmp_path, backend="serial")
     quiet(sweep, tmp_path, backend="serial")
 

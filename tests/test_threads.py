@@ -11,6 +11,7 @@ import warnings
 import weakref
 from concurrent.futures import ThreadPoolExecutor
 
+import matplotlib
 import numpy as np
 import pytest
 import scipy
@@ -21,6 +22,8 @@ from shared_work import (
     base_parameters,
     certificates,
     evaluations,
+    figures,
+    loading,
     margins,
     questions,
     reaching,
@@ -55,7 +58,7 @@ def test_compiled_runs_of_one_experiment_in_threads_are_those_of_one_thread(kind
     assert differing(lambda: runs(KINDS[kind], SHORT, engine="compiled"), 8) == []
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if not KINDS[kind].options])
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if KINDS[kind].options.keys() <= {"plant"}])
 def test_threads_may_share_a_closed_loop(kind):
     assert differing(lambda: evaluations(KINDS[kind]), 32) == []
 
@@ -63,6 +66,10 @@ def test_threads_may_share_a_closed_loop(kind):
 @pytest.mark.parametrize("name", ["planar2r", "ur5", "panda", "random"])
 def test_threads_may_ask_one_robot(name):
     assert differing(lambda: questions(name), 400) == []
+
+
+def test_threads_may_load_robots_and_make_couplings():
+    assert differing(lambda: loading(["planar2r", "a460"]), 8) == []
 
 
 @pytest.mark.parametrize(
@@ -129,6 +136,12 @@ def test_couplings_made_in_threads_leave_the_filters_of_warnings_alone():
     before = list(warnings.filters)
     at_once(lambda k: [ring.normalized().matrix, ring.weighted([1.0, 2.0, 3.0]).matrix], 400)
     assert list(warnings.filters) == before
+
+
+def test_figures_drawn_in_threads_are_those_of_one_thread_and_leave_matplotlib_as_it_was(tmp_path):
+    before = matplotlib.rcParams.copy()
+    assert differing(lambda: figures(KINDS["joints"], tmp_path), 3, threads=3) == []
+    assert matplotlib.rcParams == before
 
 
 def test_lsoda_of_an_older_scipy_is_for_the_main_thread_only(monkeypatch):

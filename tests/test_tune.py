@@ -34,6 +34,12 @@ def test_the_best_run_has_the_smallest_measure_of_all(free):
     assert len(free.history) == 3 * 6
 
 
+def test_what_was_found_is_shown_in_a_few_lines(free):
+    shown = repr(free)
+    assert len(shown) < 500 and shown.count("\n") < 5
+    assert "best of 18 runs" in shown and f"beta = {free.values['beta']:.4g}" in shown
+
+
 def test_the_experiment_it_returns_is_the_best_run(free):
     assert free.gains == SMALL_GAINS.replace(**free.values)
     torque = np.abs(free.experiment.simulate(dt=DT).tau).max()

@@ -6,7 +6,7 @@ All metrics are per robot (or pair of robots) and axis. Units are SI; radians, n
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -130,13 +130,15 @@ def settling_bands(*results: Result, fraction: float = SETTLING_FRACTION) -> dic
 
 
 def row_names(result: Result, kind: str) -> list[str]:
-    """Names of the rows of `tracking_error` (robots) or `sync_error` (pairs of robots)."""
+    """Names of the rows of `tracking_error` (robots) or `sync_error` (pairs of robots, or all of them)."""
     instance("result", result, Result, "a Result")
     if kind == "tracking_error":
         return result.names
-    return [
-        f"{k}: {result.names[i]}, {result.names[j]}" for k, (i, j) in enumerate(result.info["pairs"], start=1)
-    ]
+    return [f"{k}: {_compared(result, row)}" for k, row in enumerate(result.info["pairs"], start=1)]
+
+
+def _compared(result: Result, robots: Sequence[int]) -> str:
+    return ", ".join(result.names[i] for i in robots) if len(robots) == 2 else f"all {len(robots)} robots"
 
 
 def as_data(result: Result, computed: Metrics) -> dict[str, Any]:

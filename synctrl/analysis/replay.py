@@ -17,7 +17,7 @@ from ..simulation.clock import before
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.disturbances import DisturbanceSchedule
 from ..simulation.recorder import ADAPTATION_STATE, PLANT_STATE, own_states
-from ..simulation.result import Result
+from ..simulation.result import LAYOUT, Result
 from ..simulation.simulate import Experiment
 from ..tasks.cell import Reference
 
@@ -27,7 +27,8 @@ BLOCK = 256
 MISMATCH = 1e-6
 #: share of the model's torque from which something in Y theta counts as friction, and not as rounding
 KNOWN = 1e-9
-
+#: numbers beyond it are those of a run that went astray, and have no squares
+LARGEST = 1e100
 
 Bodies = Sequence[tuple[Rows, Forest]]
 """The robots of a cell as `forests` groups them."""
@@ -121,13 +122,14 @@ def replay(result: Result, experiment: Experiment | None = None) -> Replay:
         experiment: what made it; may be left out while the result still knows.
 
     Raises:
-        InputError: no experiment for a result loaded from a file, another than the one that made it, or a
-            plant with joints whose motion is not in the result.
+        InputError: no experiment for a result loaded from a file, another than the one that made it, numbers
+            that have no squares, or a plant with joints whose motion is not in the result.
     """
     instance("result", result, Result, "a Result")
     experiment = experiment_of(result, experiment)
     loop = experiment.closed_loop(result.info.get("plant", "pinocchio"))
     _check_sizes(result, loop)
+    _check_numbers(result)
     schedule = DisturbanceSchedule(loop.cell, experiment.disturbances)
     jumps, crossed = _jumps(result.t, loop, schedule)
     rows = Row(*(np.array(column) for column in zip(*_rows(result, loop, schedule, jumps), strict=True)))
@@ -298,6 +300,17 @@ def _check_sizes(result: Result, loop: ClosedLoop) -> None:
             raise InputError(
                 f"experiment: expected the one that made the result, with the whole state in the log; its "
                 f"output '{name}' has the shape {shape} at an instant, but the result's has {found}"
+            )
+
+
+def _check_numbers(result: Result) -> None:
+    for name in LAYOUT:
+        large = np.argwhere(~(np.abs(getattr(result, name)) <= LARGEST))
+        if len(large):
+            found = getattr(result, name)[tuple(large[0])]
+            raise InputError(
+                f"result, {name}: expected numbers up to {LARGEST:g}, found {found:g} at "
+                f"t = {result.t[large[0][0]]:g} s; the run went astray, and nothing can be said of it"
             )
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, replace
 from typing import Any
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
 from ..checks import instance
 from ..control.gains import Gains
-from ..errors import SimulationError
+from ..errors import SimulationError, StepWarning
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 
@@ -77,9 +78,12 @@ class Bench:
             return 10 * float(np.nan_to_num(np.abs(tau), nan=0.0, posinf=0.0).max(initial=1e3))
 
     def _run(self, gains: Gains) -> Trial | SimulationError:
+        """A trial of gains; those for which the step is too long are part of a search, and no news."""
         self.runs += 1
         try:
-            return measure("", replace(self.experiment, gains=gains).simulate(**self.options))
+            with catch_warnings():
+                simplefilter("ignore", StepWarning)
+                return measure("", replace(self.experiment, gains=gains).simulate(**self.options))
         except SimulationError as error:
             return error
 

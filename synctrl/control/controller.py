@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..checks import choice, instance
+from ..checks import choice, finite_array, instance
 from ..robots.regressors import RegressorBlocks, regressors
 from ..tasks.cell import Cell, Reference
 from ..tasks.spaces import Measurement
@@ -16,7 +17,7 @@ from . import law
 from .adaptation import Adaptation, Seen, chosen
 from .commands import REFERENCE_ACCELERATIONS, Command, ConstantWeights, Law, MovingWeights
 from .folded import folded
-from .gains import Gains, spread
+from .gains import Gains, spread, spread_rows
 
 
 @dataclass(slots=True)
@@ -84,7 +85,7 @@ class Controller:
     ):
         instance("cell", cell, Cell, "a Cell")
         instance("gains", gains, Gains, "Gains")
-        n, m, nv = cell.n, cell.m, cell.nv
+        m = cell.m
         self.cell = cell
         self.gains = gains
         self.reference_acceleration = choice(
@@ -94,7 +95,8 @@ class Controller:
         self.Lambda = spread("Lambda", gains.Lambda, (m,))
         self.beta = spread("beta", gains.beta, (m,))
         self.K_eps = spread("K_eps", gains.K_eps, (m,))
-        self.K_r = spread("K_r", gains.K_r, (n, nv if k_r_space == "joint" else m))
+        joints = [robot.nv if k_r_space == "joint" else m for robot in cell.robots]
+        self.K_r = spread_rows("K_r", gains.K_r, joints)
         learning = chosen(gains.Gamma, adaptation)
         self.adaptation, self.adaptation_settings = learning.bind(cell), learning.as_dict()
         self._damping = self._joint_damping if k_r_space == "joint" else self._task_damping
@@ -108,17 +110,36 @@ class Controller:
         """q, v, v_ref and a_ref, (n, nv), -> the regressors."""
         return regressors(self.cell.parameters, [robot.nv for robot in self.cell.robots])
 
-    def evaluate(
-        self, reference: Reference, motion: np.ndarray, z: np.ndarray, integral: np.ndarray
-    ) -> Signals:
+    def evaluate(self, reference: Reference, motion: ArrayLike, z: ArrayLike, integral: ArrayLike) -> Signals:
         """The law at one instant.
 
         Args:
-            reference: desired motion and weights.
+            reference: desired motion, (3, n, m), and weights, (n, m, m) each.
             motion: joint positions and velocities, (2, n, nv).
             z: state of the adaptation, (n, Z).
             integral: integrals of the synchronization errors, (p, m).
+
+        Raises:
+            InputError: another size, or numbers that are not finite.
         """
+        cell = self.cell
+        check_reference(reference, cell.n, cell.m)
+        return self.signals(
+            reference,
+            finite_array("motion", motion, (2, cell.n, cell.nv)),
+            finite_array("z", z, self.adaptation.start().shape),
+            finite_array("integral", integral, (cell.coupling.pairs, cell.m)),
+        )
+
+    @property
+    def unchecked(self) -> Callable[[Reference, np.ndarray, np.ndarray, np.ndarray], Signals]:
+        """What a simulation calls: `signals`, or the `evaluate` of a subclass that has one of its own."""
+        return self.signals if type(self).evaluate is Controller.evaluate else self.evaluate
+
+    def signals(
+        self, reference: Reference, motion: np.ndarray, z: np.ndarray, integral: np.ndarray
+    ) -> Signals:
+        """`evaluate` without its checks, for many evaluations: numbers that are not finite go through."""
         space = self.cell.task
         task = space.measure(motion, reference.desired)
         command = self._command(task, reference, integral)
@@ -143,3 +164,15 @@ class Controller:
     ) -> np.ndarray:
         r = law.coupled_velocity_error(command.u[0], reference.c, task.x_dot)
         return self.cell.task.to_torque(task, self.K_r * law.times(reference.c_inv, r))
+
+
+def check_reference(reference: Reference, n: int, m: int) -> None:
+    """Refuse what is no desired motion and weights of n robots at one instant.
+
+    Raises:
+        InputError: another kind or size, or numbers that are not finite.
+    """
+    instance("reference", reference, Reference, "a Reference, for example of Cell.references")
+    finite_array("reference: xd, xd' and xd''", reference.desired, (3, n, m))
+    for name, weight in zip(("c", "c'", "c''", "c^-1"), reference.weights, strict=True):
+        finite_array(f"reference: {name}", weight, (n, m, m))

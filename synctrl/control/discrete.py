@@ -208,7 +208,7 @@ class DiscreteController:
         reference = self.cell.references(np.array([t]))[0]
         if desired is not None:
             reference = Reference(desired, reference.weights)
-        signals = self.controller.evaluate(reference, motion, self.z, self.sync_integral)
+        signals = self.controller.unchecked(reference, motion, self.z, self.sync_integral)
         self._tau = self._commanded(t, motion[0], signals)
         self.z = self.controller.adaptation.settle(self.z + self.period * signals.z_dot)
         self.sync_integral = self.sync_integral + self.period * signals.epsilon

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
@@ -10,22 +11,24 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array
 from ..errors import InputError
+from .rows import Rows, are_ragged
 
 
 @dataclass(frozen=True, eq=False)
 class Gains:
     """Diagonal gains, each a number or a vector of diagonal entries.
 
-    K_r and Gamma may differ between robots: give one row per robot. Lambda, beta and K_eps are the same for
-    all robots of a cell, as the proof requires.
+    K_r and Gamma may differ between robots: give one row per robot, as long as the robot has joints or
+    parameters. Lambda, beta and K_eps are the same for all robots of a cell, as the proof requires.
 
     Args:
         Lambda: convergence rate on the sliding surface, (m,), 1/s, above 0.
         beta: weight of the integrated synchronization error, (m,), 1/s, 0 for independent control.
-        K_r: damping, (nv,) or (n, nv), N·m·s/rad, above 0; (m,) if it acts in task space.
+        K_r: damping, (nv,), (n, nv) or a list of n rows of different lengths, N·m·s/rad, above 0; (m,) or
+            (n, m) if it acts in task space.
         K_eps: stiffness of the coupling, (m,), N·m/rad when c has no unit, 0 for independent control.
-        Gamma: rate of the gradient adaptation (14), (P,) or (n, P), above 0; 0 switches the adaptation off.
-            None where a controller is given an adaptation of another kind.
+        Gamma: rate of the gradient adaptation (14), (P,), (n, P) or a list of n rows of different lengths; 0
+            switches the adaptation off. None where a controller is given an adaptation of another kind.
 
     Raises:
         InputError: not numbers, not finite, or of the wrong sign.
@@ -41,12 +44,12 @@ class Gains:
         for name, positive in _SIGNS.items():
             if name == "Gamma" and self.Gamma is None:
                 continue
-            array = finite_array(name, getattr(self, name))
-            low = array.min() if array.size else 0.0
+            gain = read_gain(name, getattr(self, name))
+            low = gain.min() if gain.size else 0.0
             if low < 0 or (positive and low == 0):
                 bound = "above 0" if positive else "of at least 0"
                 raise InputError(f"{name}: expected entries {bound}, found {low:g}")
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, gain)
 
     def independent(self) -> Self:
         """The same controller without synchronization, beta = K_eps = 0.
@@ -77,6 +80,19 @@ class Gains:
 
 #: which gains must be above zero; the others may be zero
 _SIGNS = {"Lambda": True, "beta": False, "K_r": True, "K_eps": False, "Gamma": False}
+#: which gains may differ between robots
+_PER_ROBOT = ("K_r", "Gamma")
+
+
+def read_gain(name: str, gain: Any) -> np.ndarray | Rows:
+    """A gain as finite numbers, or as rows where robots have different numbers of entries.
+
+    Raises:
+        InputError: not numbers, or not finite.
+    """
+    if name in _PER_ROBOT and are_ragged(gain):
+        return Rows(name, gain)
+    return finite_array(name, gain)
 
 
 def spread(name: str, gain: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
@@ -85,18 +101,46 @@ def spread(name: str, gain: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     Raises:
         InputError: the gain has other dimensions.
     """
-    fits = gain.ndim <= len(shape) and all(
-        g == s for g, s in zip(gain.shape[::-1], shape[::-1], strict=False)
-    )
-    if not fits:
-        expected = " or ".join(str(tuple(shape[k:])) for k in range(len(shape), -1, -1))
-        raise InputError(f"{name}: expected a shape of {expected}, found {gain.shape}")
+    if not _fits(gain, shape):
+        raise InputError(f"{name}: expected a shape of {_shapes(shape)}, found {gain.shape}")
     return np.broadcast_to(gain, shape).copy()
 
 
-def adaptation_gain(Gamma: ArrayLike) -> np.ndarray:
-    """An adaptation rate as an array of finite numbers that are not below 0."""
-    array = finite_array("Gamma", Gamma)
-    if array.size and array.min() < 0:
-        raise InputError(f"Gamma: expected entries of at least 0, found {array.min():g}")
-    return array
+def spread_rows(name: str, gain: np.ndarray | Rows, lengths: Sequence[int]) -> np.ndarray:
+    """A gain as an array with a row per robot, (n, longest), padded with zeros if rows are given.
+
+    Args:
+        name: of the gain.
+        gain: anything that fits (n, longest), or rows of the robots' own lengths.
+        lengths: how many entries each robot has use for, (n,).
+
+    Raises:
+        InputError: the gain has other dimensions.
+    """
+    shape, own = (len(lengths), max(lengths)), tuple(lengths)
+    if isinstance(gain, Rows):
+        if gain.lengths != own:
+            raise InputError(
+                f"{name}: expected a row for each robot, of {_listed(own)} entries, "
+                f"found rows of {_listed(gain.lengths)}"
+            )
+        return gain.padded()
+    if not _fits(gain, shape):
+        rows = "" if len(set(own)) == 1 else f", or a row for each robot, of {_listed(own)} entries"
+        raise InputError(f"{name}: expected a shape of {_shapes(shape)}{rows}, found {gain.shape}")
+    return np.broadcast_to(gain, shape).copy()
+
+
+def _fits(gain: np.ndarray, shape: tuple[int, ...]) -> bool:
+    return gain.ndim <= len(shape) and all(
+        g == s for g, s in zip(gain.shape[::-1], shape[::-1], strict=False)
+    )
+
+
+def _shapes(shape: tuple[int, ...]) -> str:
+    return " or ".join(str(tuple(shape[k:])) for k in range(len(shape), -1, -1))
+
+
+def _listed(lengths: Sequence[int]) -> str:
+    shown = [str(length) for length in lengths[:12]]
+    return ", ".join(shown) + (", ..." if len(lengths) > 12 else "")

@@ -87,8 +87,8 @@ def _member(robot: Robot, i: int, friction: Friction) -> Member:
 
 def _knowing_friction(member: Member) -> Member:
     """The member with friction among what it adapts."""
-    parameters = FrictionParameters(member.robot, member.friction)
-    return replace(member, parameters=parameters, theta_hat0=KNOWN * parameters.theta)
+    knowing = replace(member, parameters=FrictionParameters(member.robot))
+    return replace(knowing, theta_hat0=KNOWN * knowing.theta)
 
 
 def _gains(adapt_friction: bool) -> Gains:

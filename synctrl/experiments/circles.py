@@ -74,9 +74,9 @@ def circle_cell(
 
 
 def _gains(stations: Sequence[Station]) -> Gains:
-    """Gains of the cell; K_r of joints that a robot does not have is a number that acts on nothing."""
+    """Gains of the cell."""
     joints = max(len(station.K_r) for station in stations)
-    K_r = [station.K_r + (1.0,) * (joints - len(station.K_r)) for station in stations]
+    K_r = [station.K_r for station in stations]
     Gamma = np.where(np.arange(joints) < ARM_BODIES, GAMMA_ARM, GAMMA_WRIST).repeat(10)
     return Gains(Lambda=LAMBDA, beta=BETA, K_r=K_r, K_eps=K_EPS, Gamma=Gamma)
 

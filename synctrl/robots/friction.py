@@ -36,6 +36,12 @@ class Friction:
             object.__setattr__(self, name, array)
         object.__setattr__(self, "smoothing", positive_number("smoothing", self.smoothing))
 
+    def equals(self, other: Friction) -> bool:
+        """Whether another friction gives the same torques; the smoothing counts where it has a use."""
+        same_curve = self.smoothing == other.smoothing or not self.coulomb.any()
+        pairs = (self.viscous, other.viscous), (self.coulomb, other.coulomb)
+        return same_curve and all(bool(np.all(mine == its)) for mine, its in pairs)
+
     def torque(self, v: np.ndarray) -> np.ndarray:
         """Torque by which friction opposes the velocities v, (..., nv), in N·m."""
         return self.viscous * v + self.coulomb * np.tanh(v / self.smoothing)

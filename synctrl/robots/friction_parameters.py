@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from types import NoneType
+from typing import Self
+
 import numpy as np
 
+from ..checks import boolean, instance
 from ..errors import InputError
 from .friction import Friction
 from .parameters import FullParameters, Parameters
@@ -25,16 +29,21 @@ class FrictionParameters:
     turns with its joint alone, so that I_a is constant and has no share in C. V' is then what it is without
     friction, less s^T F_v s; V itself has the errors of the friction coefficients among the others.
 
+    The true friction is that of the member (`Member.friction`); it is stated there, and nowhere else.
+
     Args:
         robot: the robot.
-        friction: true friction of its joints.
+        friction: true friction of its joints; by default that of the member to which the parameters are
+            given, and until then nobody knows it. If it is given here as well it has to be the same.
         base: parameters of the rigid bodies; by default all of them.
         armature: whether the rotors are adapted too.
 
     Attributes:
+        robot: the robot.
+        friction: true friction of its joints, or None before it is known.
         base: parameters of the rigid bodies.
-        smoothing: velocity at which the Coulomb column reaches tanh(1), rad/s.
         armature: whether the rotors are adapted too.
+        names: one per parameter.
 
     Raises:
         InputError: coefficients that do not fit the robot, or parameters of another kind that have friction.
@@ -43,21 +52,48 @@ class FrictionParameters:
     def __init__(
         self,
         robot: Robot,
-        friction: Friction,
+        friction: Friction | None = None,
         base: Parameters | None = None,
         armature: bool = False,
     ):
+        instance("robot", robot, Robot, "a Robot, for example from load_robot")
+        instance("friction", friction, (Friction, NoneType), "a Friction, or none")
         if isinstance(base, FrictionParameters):
             raise InputError("base: expected parameters of the rigid bodies, found some with friction")
         self.base = FullParameters(robot) if base is None else base
-        self.smoothing, self.armature = friction.smoothing, bool(armature)
-        viscous, coulomb = (_spread(robot, name, getattr(friction, name)) for name in ("viscous", "coulomb"))
-        kinds = {"viscous": viscous, "coulomb": coulomb, **({"armature": robot.armature} if armature else {})}
-        self.theta = np.concatenate([self.base.theta, *kinds.values()])
+        self.robot, self.friction, self.armature = robot, friction, boolean("armature", armature)
+        kinds = ("viscous", "coulomb", *(("armature",) if armature else ()))
         self.names = (
             *self.base.names,
             *(f"{joint}.{kind}" for kind in kinds for joint in robot.joint_names),
         )
+        self._theta = None if friction is None else self._true_values(friction)
+
+    def with_friction(self, friction: Friction) -> Self:
+        """These parameters with the true friction of the joints."""
+        return type(self)(self.robot, friction, self.base, self.armature)
+
+    @property
+    def theta(self) -> np.ndarray:
+        """True values, (P,).
+
+        Raises:
+            InputError: the friction is not known yet.
+        """
+        if self._theta is None:
+            raise _unknown()
+        return self._theta
+
+    @property
+    def smoothing(self) -> float:
+        """Velocity at which the Coulomb column reaches tanh(1), rad/s.
+
+        Raises:
+            InputError: the friction is not known yet.
+        """
+        if self.friction is None:
+            raise _unknown()
+        return self.friction.smoothing
 
     def regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
         """[Y_b, diag(v_ref), diag(tanh(v / smoothing)), diag(a_ref)], (nv, P)."""
@@ -65,6 +101,17 @@ class FrictionParameters:
         if self.armature:
             columns.append(np.diag(a_ref))
         return np.concatenate([self.base.regressor(q, v, v_ref, a_ref), *columns], axis=1)
+
+    def _true_values(self, friction: Friction) -> np.ndarray:
+        parts = [_spread(self.robot, name, getattr(friction, name)) for name in ("viscous", "coulomb")]
+        return np.concatenate([self.base.theta, *parts, *([self.robot.armature] if self.armature else [])])
+
+
+def _unknown() -> InputError:
+    return InputError(
+        "friction: expected the true friction of the joints, found none; give these parameters to a member "
+        "that has it, whose `theta` are then the true values"
+    )
 
 
 def _spread(robot: Robot, name: str, value: np.ndarray) -> np.ndarray:

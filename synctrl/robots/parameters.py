@@ -1,7 +1,8 @@
 """What the controller may adapt: theta, and the regressor Y with Y theta = M a_ref + C v_ref + g.
 
-Every kind of parameters belongs to one robot and offers the same four things: `names`, `theta` (the true
-values), `size` and `regressor(q, v, v_ref, a_ref)`.
+Every kind of parameters belongs to one robot, as it is placed, and offers the same three things: `names`,
+`theta` (the true values) and `regressor(q, v, v_ref, a_ref)`. A cell holds them against the robot of their
+member: Y theta has to be its torque.
 """
 
 from __future__ import annotations

@@ -62,6 +62,16 @@ class Inertial:
         ixx, ixy, ixz, iyy, iyz, izz = self.inertia
         return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
 
+    @property
+    def in_link_axes(self) -> Inertial:
+        """The same with its inertia in the axes of the link, so that `origin` is not turned."""
+        if self.origin.rpy == ZERO:
+            return self
+        R = self.origin.se3.rotation
+        I = R @ self.matrix @ R.T
+        moments = (I[0, 0], I[0, 1], I[0, 2], I[1, 1], I[1, 2], I[2, 2])
+        return replace(self, inertia=tuple(map(float, moments)), origin=Pose(self.origin.xyz))
+
     def parameters(self, placement: pin.SE3) -> np.ndarray:
         """The ten inertial parameters in a frame in which the link has this placement, Pinocchio's order."""
         place = placement * self.origin.se3

@@ -9,6 +9,7 @@ from ..errors import InputError
 from ..robots.robot import Robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
+from .bars import bars
 from .runs import check_run, frame_indices, shown_experiment
 from .scene import Scene
 from .style import DESIRED, robot_color
@@ -29,10 +30,11 @@ DRAWN = "x", "x_desired", "sync_error", "q", "disturbance"
 def planar_scene(
     result: Result, experiment: Experiment | None = None, limit: float | None = None, fps: float = FPS
 ) -> Scene:
-    """Planar arms with their desired paths, and a bar between the tips of every pair that is compared.
+    """Planar arms with their desired paths, and bars between the tips of robots that are compared.
 
-    A bar grows and turns red with the synchronization error of its pair. A thin bar in the colour of its
-    robot leads from where a tip should be to where it would be if its error were `PLANAR_TIMES` as large.
+    A bar grows and turns red with the synchronization error of its robots, see `bars`. A thin bar in the
+    colour of its robot leads from where a tip should be to where it would be if its error were
+    `PLANAR_TIMES` as large.
 
     Args:
         result: a run in Cartesian space along x and y.
@@ -49,16 +51,16 @@ def planar_scene(
         raise InputError(f"result: expected tips along x and y, found {', '.join(result.info['axes'])}")
     share, limit = _share(result, limit)
     caption = (
-        f"Bars between neighbours: synchronization error, thick and red from {_shown(result, limit)}. "
+        f"Bars between compared tips: synchronization error, thick and red from {_shown(result, limit)}. "
         f"Thin bars at the tips: tracking error, {PLANAR_TIMES:g} times as large. Dark lines: desired paths."
     )
     frames = frame_indices(result, fps)
     scene, robots = _robots(result, experiment, frames, fps, caption, colored=True)
     height = float(robots[0].tip_position(result.q[0, 0, : robots[0].nv])[2])
     tips, desired = (_with_height(x[frames], height) for x in (result.x, result.x_desired))
-    for k, (a, b) in enumerate(result.info["pairs"]):
-        color, radius = _mark(share[frames, k])
-        scene.add_segment(f"error {k + 1}", tips[:, a], tips[:, b], radius, color)
+    for bar in bars(result.info["pairs"], tips, "error"):
+        color, radius = _mark(share[frames, bar.row])
+        scene.add_segment(bar.name, bar.start, bar.end, radius, color)
     _add_tracking(scene, result, desired, tips, PLANAR_TIMES)
     _add_disturbances(scene, result, robots, frames)
     return scene

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -79,8 +80,9 @@ def _draw_cell(panel: Axes, result: Result, robots: tuple[Robot, ...]) -> None:
             color=robot_color(i),
         )
         bases.append(base)
-    for i, j in result.info["pairs"]:
-        _draw_distance(panel, result.x[-1, i], result.x[-1, j])
+    for compared in result.info["pairs"]:
+        for a, b in combinations(result.x[-1, compared], 2):
+            _draw_distance(panel, a, b)
     for radius in _radii(result):
         _draw_circle(panel, np.zeros(2), radius, color=DESIRED, linewidth=0.9, dashes=(6, 4))
     panel.plot([], [], color="black", linewidth=2.0, label="desired paths")

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from threading import RLock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,13 +59,20 @@ _STYLE: Any = {
 _PNG = {"compress_level": 2}
 
 
+#: held while a thread draws
+_drawing = RLock()
+
+
 @contextmanager
 def style() -> Iterator[None]:
-    """This package's look, for the figures made inside; what was set before comes back after."""
+    """This package's look, for the figures made inside; what was set before comes back after.
+
+    Threads draw one after another, for what matplotlib looks up holds for the whole process.
+    """
     from matplotlib import rc_context, rcParamsDefault
 
     default: Any = {k: v for k, v in rcParamsDefault.items() if k != "backend"}
-    with rc_context({**default, **_STYLE}):
+    with _drawing, rc_context({**default, **_STYLE}):
         yield
 
 

@@ -10,6 +10,7 @@ from ..errors import InputError
 from ..simulation.result import Result
 from ..tasks import rotations
 from ..tasks.poses import Attached
+from .bars import bars
 from .runs import check_run, frame_indices, shown_experiment
 from .scene import Scene
 from .style import DESIRED, robot_color
@@ -48,8 +49,8 @@ def formation_scene(result: Result, fps: float = 25) -> Scene:
         scene.add_sphere(f"tip of {name}", BALL, tips[:, i], robot_color(i))
         scene.add_legend(name, robot_color(i))
     colors = error_colors(result)[frames]
-    for k, (a, b) in enumerate(result.info["pairs"]):
-        scene.add_segment(f"pair {k + 1}", tips[:, a], tips[:, b], BAR, colors[:, k])
+    for bar in bars(result.info["pairs"], tips, "pair"):
+        scene.add_segment(bar.name, bar.start, bar.end, BAR, colors[:, bar.row])
     return scene
 
 
@@ -85,6 +86,7 @@ def payload_scene(result: Result, size: ArrayLike, fps: float = 25) -> Scene:
 
 def error_colors(result: Result) -> np.ndarray:
     """A colour per instant and pair, (T, p, 3): green without synchronization error, red with a large one."""
+    check_run(result, "sync_error")
     size = np.linalg.norm(result.sync_error[:, :, :3], axis=2)
     share = np.clip(size / max(RED * float(size.max()), 1e-12), 0, 1)[..., None]
     return (1 - share) * GOOD + share * BAD

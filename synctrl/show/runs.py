@@ -48,7 +48,7 @@ def shown_experiment(result: Result, experiment: Experiment | None) -> Experimen
     """
     if experiment is None and result.experiment is None:
         raise InputError(
-            "experiment: expected the one that made the result, or a result that still has its experiment; "
+            "experiment: expected the one that made this result, or one that still has its experiment; "
             "this one was loaded from a file"
         )
     experiment = experiment_of(result, experiment)

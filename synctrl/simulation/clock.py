@@ -125,6 +125,21 @@ class Clock:
         """All steps as ranges [first, last) of at most some length."""
         return ((k, min(k + length, self.steps)) for k in range(0, self.steps, length))
 
+    def joined(self, first: int, starts: np.ndarray) -> np.ndarray:
+        """Whether the right-hand side goes on smoothly from the step before.
+
+        Args:
+            first: index of the first of some consecutive steps.
+            starts: where they begin, (k,), s.
+
+        Returns:
+            One answer per step, (k,); no for the very first.
+        """
+        joined = ~np.isin(starts, self.jumps)
+        if first == 0:
+            joined[:1] = False
+        return joined
+
 
 def make_clock(
     duration: float,

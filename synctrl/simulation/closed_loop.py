@@ -21,7 +21,7 @@ class ClosedLoop:
 
     def __init__(self, controller: Controller, plant: Plant):
         self.controller, self.plant = controller, plant
-        self.cell = controller.cell
+        self.cell, self._law = controller.cell, controller.unchecked
         self._z0 = controller.adaptation.start()
         self._layout = Layout(self.cell, self._z0.shape, plant.hidden0.size)
         self.size = self._layout.size
@@ -71,7 +71,7 @@ class ClosedLoop:
         self, reference: Reference, state: State, disturbance: np.ndarray | None, rate: State
     ) -> Signals:
         """`evaluate` for states whose views are at hand: y' is written into `rate`."""
-        signals = self.controller.evaluate(reference, state.motion, state.z, state.integral)
+        signals = self._law(reference, state.motion, state.z, state.integral)
         tau = self.plant.applied(signals.tau)
         if disturbance is not None:
             tau = tau + disturbance

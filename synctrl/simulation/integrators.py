@@ -22,6 +22,7 @@ from .clock import Clock, Stretch, before
 from .closed_loop import ClosedLoop
 from .disturbances import DisturbanceSchedule
 from .handover import up_to_a_failure, user_failure
+from .step_error import StepError
 
 ADAPTIVE = ("RK45", "RK23", "DOP853", "Radau", "BDF", "LSODA")
 #: weights of the four stages, times 6
@@ -52,6 +53,7 @@ class Step(NamedTuple):
         number: which multiple of dt it begins at or after.
         checked: whether it begins at that multiple.
         logged: whether it begins at an instant that is logged.
+        joined: whether all goes on smoothly from the step before.
     """
 
     t: float
@@ -61,24 +63,29 @@ class Step(NamedTuple):
     number: int
     checked: bool
     logged: bool
+    joined: bool
 
 
-def rk4(loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule) -> Iterator[Sample]:
+def rk4(
+    loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule, step_error: StepError
+) -> Iterator[Sample]:
     """The classical Runge-Kutta method of fourth order, one step per instant of the clock."""
-    rates = np.empty((4, loop.size))
+    rates = np.zeros((4, loop.size))
     k1, k2, k3, k4 = map(loop.state, rates)
     y, following, stage = loop.state(loop.initial_state()), loop.state(), loop.state()
-    pushes = [tau if tau.any() else None for tau in schedule.torques]
-    for t, t_next, (start, middle, end), window, _, checked, logged in steps(loop, clock, schedule):
-        push = pushes[window]
-        h, now = t_next - t, loop.at(0.5 * (t + t_next))
+    pushes, h = [tau if tau.any() else None for tau in schedule.torques], 0.0
+    for t, t_next, (start, middle, end), window, _, checked, logged, joined in steps(loop, clock, schedule):
+        push, now = pushes[window], loop.at(0.5 * (t + t_next))
         signals = now.derive(start, y, push, k1)
+        step_error.add(t, y.v, h if joined else 0.0, k4.v - k1.v, k1.v)
+        h = t_next - t
         if checked:
             yield Sample(t, y.flat, schedule.torques[window], signals, logged)
         now.derive(middle, stage.ahead(y, 0.5 * h, k1.flat), push, k2)
         now.derive(middle, stage.ahead(y, 0.5 * h, k2.flat), push, k3)
         now.derive(end, stage.ahead(y, h, k3.flat), push, k4)
         y, following = now.settled(following.ahead(y, h / 6, _SIMPSON.dot(rates))), y
+    step_error.add(clock.end, y.v)
     yield final(loop, clock, y.flat, schedule.torques[window])
 
 
@@ -134,8 +141,8 @@ def _states(solver: Any, instants: np.ndarray) -> Iterator[tuple[float, np.ndarr
         tries += 1
         count = int(np.searchsorted(instants, solver.t, side="right"))
         if solver.status != "failed" and count > passed:
-            reached, passed, tries = instants[passed:count], count, 0
-            yield from zip(reached, solver.dense_output()(reached).T, strict=True)
+            reached, passed, tries, output = instants[passed:count], count, 0, solver.dense_output()
+            yield from ((t, output(t)) for t in reached)  # one by one: bits do not depend on what is logged
         if tries > MAX_TRIES:
             solver.status = "failed"
 
@@ -155,8 +162,8 @@ def _stuck(loop: ClosedLoop, method: str, t: float, y_dot: np.ndarray) -> NonFin
     v_dot = np.nan_to_num(np.abs(loop.split(y_dot)[1]), nan=np.inf).max(axis=1)
     i = int(v_dot.argmax())
     return NonFiniteError(
-        f"{method} got stuck at t = {t:g} s, where {loop.cell.names[i]} accelerates with {v_dot[i]:.3g} "
-        "rad/s²; the closed loop is unstable, near a singularity, or too stiff for the method's tolerances",
+        f"{method} got stuck at t = {t:g} s, where {loop.cell.names[i]} accelerates with "
+        f"{v_dot[i]:.3g} rad/s²",
         time=float(t),
         robot=i,
     )
@@ -170,18 +177,20 @@ def steps(loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule) -> Iter
     """
 
     def make(first: int, last: int) -> list[Step]:
-        return list(_tabulated(loop, clock.stretch(first, last), schedule))
+        return list(_tabulated(loop, clock, clock.stretch(first, last), schedule))
 
     for first, last in clock.stretches(BLOCK):
         for made in up_to_a_failure(make, first, last):
             yield from made
 
 
-def _tabulated(loop: ClosedLoop, stretch: Stretch, schedule: DisturbanceSchedule) -> Iterator[Step]:
+def _tabulated(
+    loop: ClosedLoop, clock: Clock, stretch: Stretch, schedule: DisturbanceSchedule
+) -> Iterator[Step]:
     """The steps of a stretch, their references evaluated together."""
     table, n = loop.cell.reference_table(stretch.stages.ravel()), len(stretch.starts)
     stages = (loop.cell.instants(table, slice(i * n, (i + 1) * n)) for i in range(3))
-    columns = stretch.number, stretch.checked, stretch.logged
+    columns = stretch.number, stretch.checked, stretch.logged, clock.joined(stretch.first, stretch.starts)
     return map(
         Step,
         stretch.starts.tolist(),

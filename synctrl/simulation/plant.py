@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import instance
+from ..checks import choice, instance
 from ..robots.forest import forests
 from ..robots.robot import Robot
 from ..tasks.cell import Cell
@@ -64,6 +64,9 @@ class Plant:
         saturate: whether torques are cut off at the limits of the robots' descriptions.
         robots: what really stands there, if it is not what the controller knows.
 
+    Raises:
+        InputError: an unknown library, or payloads that do not fit.
+
     Attributes:
         viscous, coulomb: coefficients of friction, (n, nv), N·m·s/rad and N·m.
         smoothing: velocity at which Coulomb friction reaches tanh(1) of its value, (n, nv), rad/s.
@@ -87,7 +90,7 @@ class Plant:
         robots: Sequence[Robot] | None = None,
     ):
         instance("payloads", payloads, Sequence, "a sequence of Payload objects")
-        self.cell, self.physics = cell, physics
+        self.cell, self.physics = cell, choice("plant", physics, tuple(PHYSICS))
         self.payloads, self.saturate = tuple(payloads), saturate
         self.schedule = PayloadSchedule(cell.robots if robots is None else robots, self.payloads)
         self.robots = self.schedule.robots[0]

@@ -30,6 +30,7 @@ class Recorder:
     Attributes:
         count: how many instants are logged.
         reached: the last instant at which all was well, s.
+        state: flat state that the run has come to.
 
     Raises:
         InputError: the log does not fit into memory.
@@ -48,7 +49,7 @@ class Recorder:
         self._arrays = self._allocate(shapes)
         self._rows = tuple(self._arrays[name] for name in LAYOUT)
         self._damping = DampingLog(instants, loop.cell.n)
-        self.count, self.reached = 0, 0.0
+        self.count, self.reached, self.state = 0, 0.0, loop.initial_state()
 
     def _allocate(self, shapes: Mapping[str, list[int]]) -> dict[str, np.ndarray]:
         return {name: np.zeros(shape) for name, shape in shapes.items()}
@@ -66,6 +67,10 @@ class Recorder:
         """An array at the last instant that was logged; zeros if there is none."""
         array = self._arrays[name]
         return array[self.count - 1] if self.count else np.zeros(array.shape[1:])
+
+    def logged(self) -> dict[str, np.ndarray]:
+        """What was logged until now, by name."""
+        return {name: array[: self.count] for name, array in self._arrays.items()}
 
     def result(self, status: str, info: Mapping[str, Any], experiment: Any) -> Result:
         """What was logged until now."""

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import RunInterrupted, SynctrlError
+from ..errors import RunInterrupted, SimulationError, SynctrlError
+from ..tasks.motion_checks import check_motions
 from ..tasks.reachability import SAMPLES, check_reachable
 from .clock import Clock
 from .closed_loop import ClosedLoop
+from .diagnosis import diagnosed
 from .disturbances import DisturbanceSchedule
 from .guard import Guard
 from .handover import Progress, date, tell, user_failure
@@ -20,6 +22,7 @@ from .recorder import Recorder, SampleRecorder
 from .result import Result
 from .sampled import sampled_rk4
 from .saturation import warn_of_saturation
+from .step_error import StepError, step_report
 
 if TYPE_CHECKING:
     from ctypes import CDLL
@@ -34,7 +37,7 @@ class Run(NamedTuple):
     """A run that is about to start.
 
     `every` is how many steps of dt a sample of sampled control lasts, or None; `experiment` is what the
-    result will know as its own.
+    result will know as its own; `step_error` learns what the worst step was.
     """
 
     experiment: Any
@@ -43,13 +46,15 @@ class Run(NamedTuple):
     schedule: DisturbanceSchedule
     every: int | None
     info: dict[str, Any]
+    step_error: StepError
 
     def check(self) -> None:
         """Look ahead, before anything runs.
 
         Raises:
+            TrajectoryError: a desired velocity or acceleration that does not fit the motion.
             UnreachableError: a robot cannot reach its desired positions.
-            CouplingError: a weight loses its inverse on the way.
+            CouplingError: a weight loses its inverse on the way, or its derivatives do not fit.
             MissingDependencyError, InputError: a library cannot compute the plant, or refuses a robot.
             SimulationError: a function of the user's fails.
             RunInterrupted: by Ctrl-C.
@@ -57,15 +62,17 @@ class Run(NamedTuple):
         cell = self.loop.cell
         with _before_the_start(self):
             self.loop.plant.prepare()
+            check_motions(cell, np.array([0.0, self.clock.end]))
             check_reachable(cell, self.clock.spread(SAMPLES))
             cell.coupling.check_weights(self.clock.spread(WEIGHT_SAMPLES), cell.m)
 
 
 def run_reference(run: Run, progress: Progress | None = None) -> Result:
     """A planned run by the reference engine and the fixed-step integrator."""
+    plan = run.loop, run.clock, run.schedule
     if run.every is not None:
-        return _collect(run, sampled_rk4(run.loop, run.clock, run.schedule, run.every), progress)
-    return _collect(run, rk4(run.loop, run.clock, run.schedule), progress)
+        return _collect(run, sampled_rk4(*plan, run.every, run.step_error), progress)
+    return _collect(run, rk4(*plan, run.step_error), progress)
 
 
 def run_adaptive(run: Run, method: str, rtol: float, atol: float, progress: Progress | None = None) -> Result:
@@ -91,7 +98,9 @@ def run_compiled(
     return _finish(
         run,
         recorder,
-        lambda: advance(program, run.clock, run.schedule, recorder, run.every, progress, tables),
+        lambda: advance(
+            program, run.clock, run.schedule, recorder, run.step_error, run.every, progress, tables
+        ),
     )
 
 
@@ -101,6 +110,7 @@ def _collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> 
 
     def log() -> None:
         for sample in samples:
+            recorder.state = sample.y
             guard.check(sample)
             recorder.reached = sample.t
             if sample.logged:
@@ -114,6 +124,7 @@ def _finish(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:
     """Let a run log itself; whatever ends it takes along what was logged."""
 
     def logged(status: str) -> Result:
+        run.info["step_error"] = step_report(run.step_error, run.loop, recorder.logged(), run.info)
         return recorder.result(status, run.info, run.experiment)
 
     with np.errstate(all="ignore"):  # overflow is found and named by the guard
@@ -123,8 +134,11 @@ def _finish(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:
             raise _interrupted(recorder.reached, logged) from None
         except SynctrlError as error:
             date(error, recorder.reached)
-            error.result = logged(f"stopped: {error}")
-            raise
+            told = _diagnosed(run, recorder, error)
+            told.result = logged(f"stopped: {told}")
+            if told is error:
+                raise
+            raise told from None
         except Exception as error:
             failure = user_failure(error, recorder.reached)
             failure.result = logged(f"stopped: {failure}")
@@ -132,6 +146,13 @@ def _finish(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:
         result = logged("completed")
     warn_of_saturation(result)
     return result
+
+
+def _diagnosed(run: Run, recorder: Recorder, error: SynctrlError) -> SynctrlError:
+    """An error of the guard's with its cause; others as they are."""
+    if not isinstance(error, SimulationError):
+        return error
+    return diagnosed(error, run.loop, run.schedule, recorder.logged(), recorder.state, run.info)
 
 
 @contextmanager

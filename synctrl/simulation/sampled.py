@@ -15,6 +15,7 @@ from .clock import Clock, multiple
 from .closed_loop import ClosedLoop
 from .disturbances import DisturbanceSchedule
 from .integrators import Sample, final, steps
+from .step_error import StepError
 
 
 def steps_per_sample(period: float, dt: float) -> int:
@@ -27,7 +28,7 @@ def steps_per_sample(period: float, dt: float) -> int:
 
 
 def sampled_rk4(
-    loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule, every: int
+    loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule, every: int, step_error: StepError
 ) -> Iterator[Sample]:
     """The plant by the classical Runge-Kutta method, under a controller that acts once in so many steps.
 
@@ -36,6 +37,7 @@ def sampled_rk4(
     that acts from it on; at the end of the run that of a new sample, if one is due.
     """
     y = loop.initial_state()
+    step_error.add(0.0, loop.cell.v0)
     held, tau = np.zeros(loop.size), np.zeros((loop.cell.n, loop.cell.nv))
     for step in steps(loop, clock, schedule):
         disturbance = schedule.torques[step.window]
@@ -44,15 +46,18 @@ def sampled_rk4(
             if step.number % every == 0:
                 held, tau = y_dot, signals.tau
             yield Sample(step.t, y, disturbance, replace(signals, tau=tau), step.logged)
-        plant = loop.at(0.5 * (step.t + step.t_next))
-        y = _rk4_step(plant, y, step.t_next - step.t, held, tau, disturbance)
+        plant, h = loop.at(0.5 * (step.t + step.t_next)), step.t_next - step.t
+        y, k4, k5 = _rk4_step(plant, y, h, held, tau, disturbance)
+        step_error.add(step.t_next, loop.split(y)[1], h, loop.split(k4 - k5)[1])
     last = final(loop, clock, y, disturbance)
     yield last if clock.sampled_at_end(every) else last._replace(signals=replace(last.signals, tau=tau))
 
 
 def _rk4_step(
     loop: ClosedLoop, y: np.ndarray, h: float, held: np.ndarray, tau: np.ndarray, disturbance: np.ndarray
-) -> np.ndarray:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The state a step later, the last derivative on the way, and the one there before a new sample."""
+
     def coast(y: np.ndarray) -> np.ndarray:
         return loop.coast(y, held, tau, disturbance)
 
@@ -60,4 +65,5 @@ def _rk4_step(
     k2 = coast(y + 0.5 * h * k1)
     k3 = coast(y + 0.5 * h * k2)
     k4 = coast(y + h * k3)
-    return y + (h / 6) * (k1 + 2 * (k2 + k3) + k4)
+    y = y + (h / 6) * (k1 + 2 * (k2 + k3) + k4)
+    return y, k4, coast(y)

@@ -23,6 +23,7 @@ from .plant import PHYSICS, Plant
 from .result import Result
 from .run import Run, run_adaptive, run_compiled, run_reference
 from .sampled import steps_per_sample
+from .step_error import StepError, warn_of_step
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +122,7 @@ class Experiment:
 
         Warns:
             SaturationWarning: torque was cut off while the controller went on adapting.
+            StepWarning: the step of "rk4" was too long, and which one does; `info["step_error"]` says more.
         """
         choice("integrator", integrator, ("rk4", *ADAPTIVE))
         choice("engine", engine, ("pinocchio", "compiled"))
@@ -134,7 +136,9 @@ class Experiment:
         run.check()
         if integrator != "rk4":
             return run_adaptive(run, integrator, *tolerances, progress)
-        return run_compiled(run, progress) if engine == "compiled" else run_reference(run, progress)
+        result = run_compiled(run, progress) if engine == "compiled" else run_reference(run, progress)
+        warn_of_step(result.info["step_error"], result.names, dt)
+        return result
 
     def controller(
         self, period: float, *, include_gravity: bool = True, faults: str = "error"
@@ -180,7 +184,7 @@ class Experiment:
         info["control_period"] = control_period
         info["disturbances"] = [_describe(d) for d in self.disturbances]
         info["payloads"] = [payload.as_dict() for payload in self.payloads]
-        return Run(self, loop, clock, schedule, every, info)
+        return Run(self, loop, clock, schedule, every, info, StepError(self.cell.n, self.cell.nv))
 
 
 def simulate(

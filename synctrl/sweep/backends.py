@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from typing import Any
 
 from ..errors import InputError, MissingDependencyError, SweepError
+from .main_guard import check_main_guard
 from .worker import Job, Outcome, Runner, Task, run_batch
 
 Batch = Sequence[Task]
@@ -77,7 +79,7 @@ def dask(job: Job, workers: int, client: Any) -> Iterator[Crew]:
 @contextlib.contextmanager
 def _connected(client: Any, workers: int) -> Iterator[Any]:
     """A client as it is; or one made from an address, or for a cluster of this machine, and closed again."""
-    from distributed import Client, LocalCluster
+    from distributed import Client
 
     if isinstance(client, Client):
         yield client
@@ -86,11 +88,23 @@ def _connected(client: Any, workers: int) -> Iterator[Any]:
         raise InputError(f"client: expected a Dask client or an address, found {type(client).__name__}")
     with contextlib.ExitStack() as stack:
         if client is None:
-            cluster = LocalCluster(
-                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None
-            )
-            client = stack.enter_context(cluster)
+            client = stack.enter_context(_local_cluster(workers))
         yield stack.enter_context(Client(client))
+
+
+def _local_cluster(workers: int) -> Any:
+    """A Dask cluster of this machine, which says what is wrong by errors and not in its log."""
+    from distributed import LocalCluster
+
+    check_main_guard("a Dask cluster of this machine")
+    options = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": logging.CRITICAL}
+    try:
+        return LocalCluster(n_workers=workers, processes=True, **options)
+    except RuntimeError as error:
+        raise SweepError(
+            f"a Dask cluster of this machine does not start: {_root(error)}; use backend='joblib', or start "
+            "one yourself and give its address as `client`"
+        ) from None
 
 
 def pickled(job: Job) -> bytes:
@@ -117,6 +131,13 @@ def _need(module: str, package: str | None = None) -> None:
         raise MissingDependencyError(
             f"this needs {package or module}: pip install 'synctrl[sweep]'; or use backend='serial'"
         )
+
+
+def _root(error: BaseException) -> BaseException:
+    """What an error began with."""
+    while before := error.__cause__ or error.__context__:
+        error = before
+    return error
 
 
 def _died(message: str) -> str:

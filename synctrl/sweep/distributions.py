@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Protocol
 
 import numpy as np
@@ -12,6 +13,8 @@ from ..checks import finite_number, positive_number
 from ..errors import InputError
 
 Value = float | str
+#: how many listed values are shown one by one
+SHOWN = 8
 
 
 class Values(Protocol):
@@ -120,7 +123,7 @@ class _Listed:
         kind = type(self).__name__
         if isinstance(values, str) or not len(values):
             raise InputError(f"{kind}: expected a list of numbers or words, found {values!r}")
-        self.values = tuple(v if isinstance(v, str) else finite_number(kind, v) for v in values)
+        self.values = tuple(_plain(kind, value) for value in values)
         if len(set(self.values)) != len(self.values):
             raise InputError(f"{kind}: expected different values, found {list(self.values)}")
 
@@ -128,7 +131,10 @@ class _Listed:
         return {"kind": type(self).__name__, "values": list(self.values)}
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({list(self.values)})"
+        kind, count = type(self).__name__, len(self.values)
+        if count <= SHOWN:
+            return f"{kind}({list(self.values)})"
+        return f"{kind}({count} values from {self.values[0]!r} to {self.values[-1]!r})"
 
 
 class Choice(_Listed):
@@ -154,3 +160,53 @@ class Grid(_Listed):
     Raises:
         InputError: none, two equal ones, or something else.
     """
+
+
+#: kinds of values by the name in their description
+KINDS: Mapping[str, type] = MappingProxyType(
+    {kind.__name__: kind for kind in (Uniform, LogUniform, Normal, Choice, Grid)}
+)
+
+
+def described(description: Mapping[str, Any]) -> Values | None:
+    """The values that `describe` has described, or None if they are of a kind of the user's own.
+
+    Raises:
+        InputError: parameters that the kind does not have.
+    """
+    parameters = dict(description)
+    name = parameters.pop("kind", None)
+    kind = KINDS.get(name) if isinstance(name, str) else None
+    if kind is None:
+        return None
+    try:
+        return kind(**parameters)
+    except TypeError as error:
+        raise InputError(f"{name}: {error}") from error
+
+
+def drawn(name: str, values: Any, rng: np.random.Generator) -> Value:
+    """One value of a distribution, as a plain number or word.
+
+    Raises:
+        InputError: a distribution of the user's own draws something else.
+    """
+    value = values.draw(rng)
+    plain = value.item() if isinstance(value, np.generic) else value
+    if type(plain) is int:
+        return plain
+    return _plain(f"factor '{name}', a value that {type(values).__name__} has drawn", plain)
+
+
+def is_text(value: object) -> bool:
+    """Whether this is a text that can be written to a file: half of a surrogate pair cannot."""
+    return isinstance(value, str) and not any("\ud800" <= letter <= "\udfff" for letter in value)
+
+
+def _plain(name: str, value: Any) -> Value:
+    """A value as a float, or as the word that it is."""
+    if not isinstance(value, str):
+        return finite_number(name, value)
+    if not is_text(value):
+        raise InputError(f"{name}: expected a word that can be written to a file, found {value!a}")
+    return str(value)

@@ -9,10 +9,10 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from ..checks import choice, instance
-from ..errors import InputError
+from ..checks import choice, count
 from . import backends
-from .journal import KEPT, Journal, Row
+from .journal import KEPT, Journal
+from .rows import Row
 from .worker import Job, Outcome, Runner, Task
 
 BACKENDS = ("joblib", "dask", "serial")
@@ -69,9 +69,10 @@ class Evaluation:
 
         Raises:
             ResultError: a row cannot be written.
+            SweepFileError: a run made before has other values than its task.
             SweepError: workers die again and again, or a function of the user fails.
         """
-        todo = [task for task in tasks if task.run not in self.rows]
+        todo = [task for task in tasks if not self._has(task)]
         if todo and self._batch is None:
             yield self._first(todo.pop(0), len(todo))
         attempts = RETRIES
@@ -96,6 +97,9 @@ class Evaluation:
         self._batch = max(1, min(int(BATCH_TIME / took), share))
         return self._write([outcome])
 
+    def _has(self, task: Task) -> bool:
+        return task.run in self.rows if self._journal is None else self._journal.has(*task)
+
     def _write(self, outcomes: Sequence[Outcome]) -> list[Row]:
         rows = [outcome.row for outcome in outcomes]
         if self._journal is None:
@@ -118,14 +122,6 @@ def batches(tasks: Sequence[Task], size: int) -> Iterator[list[Task]]:
 def kept_file(folder: str | Path, run: int) -> Path:
     """Where the trajectories of a run are kept."""
     return Path(folder) / KEPT / f"{run:06d}.npz"
-
-
-def count(name: str, value: object, least: int = 1) -> int:
-    """`value` as a whole number of at least `least`."""
-    instance(name, value, int, "a whole number")
-    if isinstance(value, bool) or value < least:  # type: ignore[operator]
-        raise InputError(f"{name}: expected a whole number of at least {least}, found {value!r}")
-    return int(value)  # type: ignore[call-overload]
 
 
 def progress_bar(total: int, done: int, shown: bool) -> Any:

@@ -31,6 +31,11 @@ class Setup(NamedTuple):
     engine: str
     control_period: float | None
 
+    def __repr__(self) -> str:
+        name = self.experiment.title or self.experiment.cell.name
+        period = "" if self.control_period is None else f", control period {self.control_period:g} s"
+        return f"{name}, {self.duration:g} s in steps of {self.dt:g} s, engine '{self.engine}'{period}"
+
     def simulate(self) -> Result:
         """Run it; see `Experiment.simulate`."""
         return self.experiment.simulate(
@@ -38,7 +43,7 @@ class Setup(NamedTuple):
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Factor:
     """Something that differs from run to run.
 
@@ -59,9 +64,11 @@ class Factor:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():
             raise InputError(f"factor: expected a name, found {self.name!r}")
-        if not isinstance(self.values, Grid) and not hasattr(self.values, "draw"):
+        needed = ("describe",) if isinstance(self.values, Grid) else ("draw", "describe")
+        if not all(callable(getattr(self.values, method, None)) for method in needed):
             raise InputError(
-                f"factor '{self.name}': expected a distribution or a Grid, found {self.values!r}"
+                f"factor '{self.name}': expected a distribution, which has draw and describe, or a Grid, "
+                f"found {self.values!r}"
             )
         if not callable(self.change):
             raise InputError(f"factor '{self.name}': expected a function, found {self.change!r}")
@@ -86,6 +93,9 @@ class Factor:
         }
         name = getattr(function, "__qualname__", type(function).__qualname__)
         return {"name": self.name, "values": self.values.describe(), "change": name, "with": plain}
+
+    def __repr__(self) -> str:
+        return f"Factor({self.name!r}, {self.values!r})"
 
 
 class _PeriodFactor(Factor):

@@ -2,7 +2,8 @@
 
 `sweep.json` describes the sweep and is written first. `runs.jsonl` grows by one line per run, in the order in
 which runs finish; only complete lines count, so whatever stops the sweep costs the runs in flight and no
-others. `table.csv` appears when the last run is done: the same rows, sorted.
+others. What a line can be follows from the description, and every line is compared with it. `table.csv`
+appears when the last run is done: the same rows, sorted.
 """
 
 from __future__ import annotations
@@ -12,42 +13,90 @@ import csv
 import io
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, Self
 
 from ..errors import ResultError
 from ..files import write_whole
+from .description import ABOUT, FORMAT, difference, read_about, row_format
+from .distributions import Value
+from .rows import Format, Row, Runs, fault_of_values, line_of, wrong_line
 
-FORMAT = "synctrl sweep 1"
-ABOUT, RUNS, TABLE, KEPT = "sweep.json", "runs.jsonl", "table.csv", "runs"
-
-Row = list[Any]
+RUNS, TABLE, KEPT = "runs.jsonl", "table.csv", "runs"
 
 
 class Journal:
-    """The folder of a sweep, held by one process that writes.
+    """The folder of a sweep, held by one process from here on: nothing was read or written before.
+
+    `begin` says what the sweep is and reads what was done; only then can rows be added.
 
     Args:
         folder: where; made if it does not exist.
-        about: what the sweep is, plain data with "columns", the names of a row's entries; the first is "run".
 
     Attributes:
-        rows: rows of the runs that are done, by number of the run.
+        rows: rows of the runs that are done, by number of the run, in the order of their lines.
 
     Raises:
-        ResultError: the folder holds another sweep, another process writes to it, it is damaged, or it cannot
-            be written.
+        ResultError: another process has it, or it cannot be written.
     """
 
-    def __init__(self, folder: str | Path, about: Mapping[str, Any]):
+    def __init__(self, folder: str | Path):
         self.folder = Path(folder)
-        self.about = {"format": FORMAT, **about}
+        self.about: dict[str, Any] = {}
+        self.rows: dict[int, Row] = {}
         with self._writing():
             self.folder.mkdir(parents=True, exist_ok=True)
-            self._begin()
-            self._file = self._open()
-            self.rows = read_rows(self.folder, self.about["columns"])
+            self._file = (self.folder / RUNS).open("a+b", buffering=0)
+            lock(self._file, self.folder)
+
+    def known(self) -> dict[str, Any] | None:
+        """What the sweep in the folder is, or None if there is none yet.
+
+        Raises:
+            ResultError: its description is damaged or missing.
+        """
+        if (self.folder / ABOUT).exists():
+            return read_about(self.folder)
+        if os.fstat(self._file.fileno()).st_size:
+            raise ResultError(f"'{self.folder}' has runs but no {ABOUT}; choose another folder")
+        return None
+
+    def begin(self, about: Mapping[str, Any], runs: Runs) -> None:
+        """Write what the sweep is, or compare it with what is written; and read the runs that are done.
+
+        Args:
+            about: what the sweep is, plain data.
+            runs: which runs it has.
+
+        Raises:
+            ResultError: the folder holds another sweep, or cannot be written.
+            SweepFileError: a line that cannot be of this sweep.
+        """
+        self.about = {"format": FORMAT, **about}
+        known = self.known()
+        with self._writing():
+            if known is None:
+                write_whole(self.folder / ABOUT, json.dumps(self.about, ensure_ascii=False, indent=1) + "\n")
+            elif found := difference(known, json.loads(json.dumps(self.about))):
+                raise ResultError(f"'{self.folder}' holds another sweep: {found}; choose another folder")
+            content = (self.folder / RUNS).read_bytes()
+            self.rows = Format(about["columns"], runs, about["duration"]).read(self.folder / RUNS, content)
+            self._file.truncate(content.rfind(b"\n") + 1)  # an incomplete last line does not count
+
+    def has(self, run: int, values: Sequence[Value]) -> bool:
+        """Whether a run is done.
+
+        Raises:
+            SweepFileError: it is, but with other values of the factors.
+        """
+        if run not in self.rows:
+            return False
+        names = self.about["columns"][1 : 1 + len(values)]
+        fault = fault_of_values(names, values, self.rows[run][1 : 1 + len(values)])
+        if fault:
+            raise wrong_line(self.folder / RUNS, line_of(run, self.rows), f"run {run}, {fault}")
+        return True
 
     def append(self, rows: Sequence[Row]) -> None:
         """Add rows of finished runs; they are on the disk when this returns."""
@@ -83,29 +132,6 @@ class Journal:
 
     # -- internals ----------------------------------------------------------------------------------------
 
-    def _begin(self) -> None:
-        """Write what the sweep is, or compare it with what is written."""
-        path = self.folder / ABOUT
-        if not path.exists():
-            if (self.folder / RUNS).exists():
-                raise ResultError(f"'{self.folder}' has runs but no {ABOUT}; choose another folder")
-            write_whole(path, json.dumps(self.about, ensure_ascii=False, indent=1) + "\n")
-            return
-        found = difference(read_about(self.folder), json.loads(json.dumps(self.about)))
-        if found:
-            raise ResultError(f"'{self.folder}' holds another sweep: {found}; choose another folder")
-
-    def _open(self) -> IO[bytes]:
-        """The file of runs, ready for another line; an incomplete last line is cut off."""
-        path = self.folder / RUNS
-        path.touch()
-        file = path.open("r+b", buffering=0)
-        lock(file, self.folder)
-        content = path.read_bytes()
-        file.truncate(content.rfind(b"\n") + 1)
-        file.seek(0, os.SEEK_END)
-        return file
-
     @contextlib.contextmanager
     def _writing(self) -> Any:
         try:
@@ -117,77 +143,23 @@ class Journal:
             ) from error
 
 
-def read_about(folder: str | Path) -> dict[str, Any]:
-    """What the sweep in a folder is.
-
-    Raises:
-        ResultError: there is none, or its description cannot be read.
-    """
-    path = Path(folder) / ABOUT
-    try:
-        about = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ResultError(f"no sweep in '{folder}': it has no {ABOUT}") from None
-    except (OSError, ValueError, RecursionError) as error:
-        raise ResultError(f"'{path}' cannot be read: {error}") from error
-    if not isinstance(about, dict) or about.get("format") != FORMAT:
-        found = about.get("format") if isinstance(about, dict) else type(about).__name__
-        raise ResultError(f"'{path}': expected the format '{FORMAT}', found {found!r}")
-    columns = about.get("columns")
-    if not isinstance(columns, list) or columns[:1] != ["run"]:
-        raise ResultError(f"'{path}': expected the names of the columns, 'run' first, found {columns!r}")
-    return about
-
-
-def read_rows(folder: str | Path, columns: Sequence[str]) -> dict[int, Row]:
+def read_rows(folder: str | Path, about: Mapping[str, Any]) -> dict[int, Row]:
     """Rows of the finished runs in a folder, by number; an incomplete last line does not count.
 
+    Args:
+        folder: where.
+        about: what its description says, see `read_about`.
+
     Raises:
-        ResultError: a complete line that is no row; the message names the file and the line.
+        ResultError: the file cannot be read.
+        SweepFileError: a complete line that cannot be of this sweep; the message names file and line.
     """
     path = Path(folder) / RUNS
     try:
         content = path.read_bytes() if path.exists() else b""
     except OSError as error:
         raise ResultError(f"'{path}' cannot be read: {error.strerror or error}") from error
-    rows: dict[int, Row] = {}
-    for number, line in enumerate(content.split(b"\n")[:-1], start=1):
-        row = _read_row(line)
-        if row is None or len(row) != len(columns) or row[0] in rows:
-            raise ResultError(
-                f"'{path}', line {number}: expected a run's {len(columns)} values, each run once, found "
-                f"{line[:60].decode(errors='replace')!r}; take the line out and its run is made again"
-            )
-        rows[row[0]] = row
-    return rows
-
-
-def _read_row(line: bytes) -> Row | None:
-    try:
-        row = json.loads(line)
-    except (ValueError, RecursionError):
-        return None
-    fits = isinstance(row, list) and row and type(row[0]) is int and row[0] >= 0
-    return row if fits and all(v is None or isinstance(v, (int, float, str)) for v in row) else None
-
-
-def difference(there: Any, here: Any, where: str = "") -> str:
-    """The first thing in which two descriptions differ, in words; empty if they do not."""
-    if isinstance(there, dict) and isinstance(here, dict):
-        keys = [*there, *(key for key in here if key not in there)]
-        parts: Iterable[tuple[str, Any, Any]] = (
-            (f"{where}.{key}" if where else key, there.get(key), here.get(key)) for key in keys
-        )
-    elif isinstance(there, list) and isinstance(here, list) and len(there) == len(here):
-        parts = ((f"{where}[{k}]", *pair) for k, pair in enumerate(zip(there, here, strict=True)))
-    else:
-        return "" if there == here else f"{where} is {_short(there)} there and {_short(here)} here"
-    return next((found for name, a, b in parts if (found := difference(a, b, name))), "")
-
-
-def _short(value: Any) -> str:
-    text = json.dumps(value, ensure_ascii=False)
-    return text if len(text) <= 80 else text[:77] + "..."
+    return row_format(about).read(path, content)
 
 
 def lock(file: IO[bytes], folder: Path) -> None:
@@ -204,4 +176,6 @@ def lock(file: IO[bytes], folder: Path) -> None:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         file.close()
-        raise ResultError(f"another process is running the sweep in '{folder}'; wait until it ends") from None
+        raise ResultError(
+            f"another process has it: it is running the sweep in '{folder}'; wait until it ends"
+        ) from None

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
-from ..analysis.metrics import ERRORS, settling_bands
-from ..checks import choice, instance, non_negative_number, positive_number
+from ..analysis.metrics import settling_bands
+from ..checks import choice, count, instance, positive_number
 from ..errors import InputError, SimulationError
 from ..simulation.prepared import Prepared
 from ..simulation.recorder import versions
 from ..simulation.simulate import Experiment
-from .evaluation import count
+from .description import checked_bands
 from .factors import Factor, Setup
 from .identity import describe_base
-from .journal import ABOUT, read_about
 from .measures import MEASURES, definitions
-from .worker import Job, columns
+from .rows import columns
+from .worker import Job
 
 
 class Study:
@@ -57,12 +56,12 @@ class Study:
         self.base = Setup(base, duration, positive_number("dt", dt), engine, period)
         self.factors = _checked_factors(factors)
         self.seed = count("seed", seed, least=0)
-        self._bands = None if bands is None else _checked_bands(bands)
+        self._bands = None if bands is None else checked_bands(bands)
 
-    def job(self, folder: str | Path | None = None, keep_every: int | None = None) -> Job:
-        """What workers are told; with the settling bands of the folder, if it has some."""
-        if self._bands is None and folder is not None and (Path(folder) / ABOUT).exists():
-            bands = _checked_bands(read_about(folder).get("settling_bands"))
+    def job(self, known: Mapping[str, Any] | None = None, keep_every: int | None = None) -> Job:
+        """What workers are told; with the settling bands of a description that is there, if any."""
+        if self._bands is None and known is not None:
+            bands = checked_bands(known["settling_bands"])
         else:
             bands = self._found_bands
         return Job(self.base, self.factors, bands, keep_every)
@@ -85,6 +84,10 @@ class Study:
             "measures": {name: measured[name]._asdict() for name in MEASURES},
             "versions": versions(),
         }
+
+    def __repr__(self) -> str:
+        factors = "".join(f"\n  {factor.name}: {factor.values!r}" for factor in self.factors)
+        return f"Study of {self.base!r}, seed {self.seed}{factors}"
 
     @cached_property
     def _found_bands(self) -> dict[str, float]:
@@ -111,9 +114,3 @@ def _checked_factors(factors: Sequence[Factor]) -> tuple[Factor, ...]:
     if not names:
         raise InputError("factors: expected at least one, found none")
     return tuple(factors)
-
-
-def _checked_bands(bands: Any) -> dict[str, float]:
-    if not isinstance(bands, Mapping) or set(bands) != set(ERRORS):
-        raise InputError(f"bands: expected numbers for {' and '.join(ERRORS)}, found {bands!r}")
-    return {kind: non_negative_number(f"bands, {kind}", bands[kind]) for kind in ERRORS}

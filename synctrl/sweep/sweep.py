@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..checks import count
 from ..errors import InputError
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .distributions import Grid, Value
-from .evaluation import Evaluation, count, progress_bar
+from .distributions import Value
+from .draws import Draws
+from .evaluation import Evaluation, progress_bar
 from .factors import Factor, Setup
 from .journal import Journal
 from .study import Study
@@ -58,13 +59,17 @@ class Sweep:
     ):
         self.study = Study(base, factors, seed, duration, dt, engine, control_period, bands)
         self.samples = count("samples", samples)
-        self._sizes = [len(f.values.values) if isinstance(f.values, Grid) else 1 for f in self.study.factors]
+        values = {factor.name: factor.values for factor in self.study.factors}
+        self._draws = Draws(values, self.samples, self.study.seed)
+
+    def __repr__(self) -> str:
+        return f"Sweep of {len(self)} runs\n{self.study!r}"
 
     # -- single runs --------------------------------------------------------------------------------------
 
     def __len__(self) -> int:
         """Number of runs."""
-        return self.samples * prod(self._sizes)
+        return self._draws.count
 
     def values(self, run: int) -> dict[str, Value]:
         """Values of the factors in a run."""
@@ -126,14 +131,16 @@ class Sweep:
         Raises:
             InputError: an unknown backend, or a number of the wrong kind.
             MissingDependencyError: the backend or the engine cannot be had.
-            ResultError: the folder holds another sweep, is damaged, or cannot be written.
+            ResultError: another process has the folder, or it holds another sweep, is damaged, or cannot be
+                written.
+            SweepFileError: a line in the folder cannot be of this sweep.
             SweepError: workers die again and again, or a function of a factor fails.
         """
         if keep_every is not None:
             count("keep_every", keep_every)
-        job = self.study.job(folder, keep_every)
-        about = self.study.about(job, samples=self.samples, runs=len(self), keep_every=keep_every)
-        with Journal(folder, about) as journal:
+        with Journal(folder) as journal:
+            job = self.study.job(journal.known(), keep_every)
+            journal.begin(self.about(job), self._draws)
             evaluation = Evaluation(job, journal, workers, backend, client, batch)
             tasks = [self._task(run) for run in range(len(self))]
             with progress_bar(len(tasks), len(journal.rows), progress) as bar, evaluation.open():
@@ -141,17 +148,15 @@ class Sweep:
                     bar.update(len(rows))
             return journal.finish()
 
+    def about(self, job: Job) -> dict[str, Any]:
+        """What the sweep is, as plain data."""
+        more = {"samples": self.samples, "runs": len(self), "keep_every": job.keep_every}
+        return self.study.about(job, **more)
+
     # -- internals ----------------------------------------------------------------------------------------
 
     def _task(self, run: int) -> Task:
-        """A run and its values: grid values by its number, drawn ones by its own random numbers."""
+        """A run and its values."""
         if isinstance(run, bool) or not isinstance(run, (int, np.integer)) or not 0 <= run < len(self):
             raise InputError(f"run: expected a number from 0 to {len(self) - 1}, found {run!r}")
-        run = int(run)
-        rng = np.random.default_rng(np.random.SeedSequence(self.study.seed, spawn_key=(run,)))
-        point = np.unravel_index(run // self.samples, self._sizes)
-        values = (
-            factor.values.values[k] if isinstance(factor.values, Grid) else factor.values.draw(rng)  # type: ignore[attr-defined]
-            for factor, k in zip(self.study.factors, point, strict=True)
-        )
-        return Task(run, tuple(values))
+        return Task(int(run), tuple(self._draws.at(int(run))))  # type: ignore[arg-type]

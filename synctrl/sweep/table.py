@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from ..checks import count
 from ..errors import MissingDependencyError, ResultError
 from ..simulation.result import Result
+from .description import read_about
 from .evaluation import kept_file
-from .journal import read_about, read_rows
+from .journal import read_rows
 
 #: columns that are text; all others are numbers, unless a factor's values are words
 TEXT = ("status", "cause")
@@ -27,7 +29,8 @@ def load(folder: str | Path) -> Any:
         xarray Dataset of it.
 
     Raises:
-        ResultError: no sweep, or one that is damaged; the message names the file and the line.
+        ResultError: no sweep, or one that is damaged; the message names the file.
+        SweepFileError: a line that cannot be of this sweep; the message names the file and the line.
         MissingDependencyError: pandas is not installed.
     """
     try:
@@ -36,7 +39,7 @@ def load(folder: str | Path) -> Any:
         raise MissingDependencyError("reading a table needs pandas: pip install 'synctrl[sweep]'") from error
     about = read_about(folder)
     columns = about["columns"]
-    rows = read_rows(folder, columns)
+    rows = read_rows(folder, about)
     table = pd.DataFrame([rows[run] for run in sorted(rows)], columns=columns)
     for name in columns[1:]:
         if name in TEXT or any(isinstance(value, str) for value in table[name]):
@@ -52,10 +55,14 @@ def trajectories(folder: str | Path, run: int) -> Result:
     """The trajectories that were kept of a run, see `keep_every` of `Sweep.run`.
 
     Raises:
-        ResultError: none were kept, or the file is damaged.
+        InputError: no number of a run.
+        ResultError: none were kept, or the file is damaged or of another run.
     """
     read_about(folder)
-    path = kept_file(folder, run)
+    path = kept_file(folder, count("run", run, least=0))
     if not path.is_file():
         raise ResultError(f"no trajectories of run {run} in '{folder}': run the sweep with keep_every")
-    return Result.load(path)
+    result = Result.load(path)
+    if result.info.get("run") != run:
+        raise ResultError(f"'{path}': expected run {run}, found run {result.info.get('run')!r}")
+    return result

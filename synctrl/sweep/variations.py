@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..robots.base_parameters import BaseParameters
+from ..robots.friction_parameters import FrictionParameters
 from ..robots.parameters import FullParameters, LinearParameters, Parameters
 from ..robots.robot import Robot
 from ..simulation.disturbances import Disturbance
@@ -105,14 +107,17 @@ def same_parameters(parameters: Parameters, robot: Robot) -> Parameters:
     Raises:
         InputError: a kind whose true values cannot be found out, or one that cannot describe this robot.
     """
-    if isinstance(parameters, FullParameters):
+    if type(parameters) is FullParameters:
         return FullParameters(robot)
-    if isinstance(parameters, LinearParameters):
+    if type(parameters) is FrictionParameters:
+        rigid = same_parameters(parameters.base, robot)
+        return FrictionParameters(robot, parameters.friction, rigid, parameters.armature)
+    if isinstance(parameters, LinearParameters) and type(parameters) in (LinearParameters, BaseParameters):
         theta = _fit(parameters.matrix, robot)
         return LinearParameters(robot, parameters.matrix, theta, parameters.names)
     raise InputError(
-        f"true parameters: expected full or linear parameters, found {type(parameters).__name__} for robot "
-        f"'{robot.name}'; vary them with a function of your own"
+        f"true parameters: expected full, linear or friction parameters, found {type(parameters).__name__} "
+        f"for robot '{robot.name}'; vary them with a function of your own"
     )
 
 

@@ -13,10 +13,8 @@ from ..simulation.prepared import Prepared
 from ..simulation.result import Result
 from .distributions import Value
 from .factors import Factor, Setup
-from .journal import Row
 from .measures import MEASURES, measures
-
-COMPLETED, STOPPED, REFUSED = "completed", "stopped", "refused"
+from .rows import COMPLETED, REFUSED, STOPPED, Row, columns
 
 
 class Task(NamedTuple):
@@ -48,10 +46,13 @@ class Job(NamedTuple):
     bands: Mapping[str, float]
     keep_every: int | None = None
 
+    def __repr__(self) -> str:
+        return f"Job: {self.base!r}, {len(self.factors)} factors"
+
     @property
     def columns(self) -> list[str]:
         """Names of the entries of a row."""
-        return columns(self.factors)
+        return columns(factor.name for factor in self.factors)
 
     def setup(self, values: Sequence[Value]) -> Setup:
         """The base with all factors applied, in their order."""
@@ -59,11 +60,6 @@ class Job(NamedTuple):
         for factor, value in zip(self.factors, values, strict=True):
             setup = factor.apply(setup, value)
         return setup
-
-
-def columns(factors: Sequence[Factor]) -> list[str]:
-    """Names of the entries of a row of a sweep over some factors."""
-    return ["run", *(factor.name for factor in factors), "status", "cause", "stop_time", *MEASURES]
 
 
 class Runner:
@@ -112,7 +108,7 @@ class Runner:
         return self._prepared.simulate(setup.experiment, setup.control_period)
 
     def _outcome(self, task: Task, status: str, error: SynctrlError | None, result: Result | None) -> Outcome:
-        cause = None if error is None else f"{type(error).__name__}: {error}"
+        cause = None if error is None else _written(f"{type(error).__name__}: {error}")
         time = error.time if isinstance(error, SimulationError) else None
         values: list[Any] = [None] * len(MEASURES)
         if status == COMPLETED and result is not None:
@@ -125,6 +121,11 @@ class Runner:
             return None
         thin = result.decimated(self.job.keep_every)
         return replace(thin, info={**thin.info, "run": task.run}, experiment=None)
+
+
+def _written(text: str) -> str:
+    """A text that files can hold: halves of surrogate pairs, which a name may have, become question marks."""
+    return text.encode(errors="replace").decode()
 
 
 def run_batch(payload: bytes, tasks: Sequence[Task]) -> list[Outcome]:

@@ -10,20 +10,13 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance
 from ..errors import InputError
-from ..robots.base_parameters import parameters_of
 from ..robots.friction import Friction
 from ..robots.parameters import Parameters
 from ..robots.robot import Robot
 from .coupling import Coupling
 from .desired import desired_motion, desired_weights
-from .member_checks import (
-    check_friction,
-    check_labels,
-    check_names,
-    check_parameters,
-    check_space,
-    check_trajectory,
-)
+from .member_checks import check_friction, check_labels, check_names, check_space, check_trajectory
+from .member_parameters import member_parameters
 from .spaces import JointSpace, Space
 from .trajectories import Motion, Trajectory
 from .weights import Weights
@@ -39,9 +32,11 @@ class Member:
         q0: joint positions at t = 0, (nv,), rad. In joint space, by default, on the path.
         v0: joint velocities at t = 0, (nv,), rad/s; by default at rest.
         parameters: what is adapted, or its name: "full", all inertial parameters, by default; "base", the
-            fewest that give the same torques.
+            fewest that give the same torques. Their true values have to be those of this robot, as it is
+            placed, and of this friction.
         theta_hat0: estimate at t = 0, (P,); by default zeros, which is to know nothing.
-        friction: friction of the true plant, which the controller does not know; by default none.
+        friction: friction of the true plant, which the controller does not know, unless what is adapted are
+            `FrictionParameters`; by default none.
         name: for legends and messages.
     """
 
@@ -53,6 +48,15 @@ class Member:
     theta_hat0: ArrayLike | None = None
     friction: Friction = field(default_factory=Friction)
     name: str | None = None
+
+    @property
+    def theta(self) -> np.ndarray:
+        """True values of what is adapted, (P,), of which `theta_hat0` is an estimate.
+
+        Raises:
+            InputError: parameters that do not describe the robot and its friction.
+        """
+        return member_parameters(self.name or "robot", self.robot, self.friction, self.parameters).theta
 
 
 @dataclass(slots=True)
@@ -178,8 +182,10 @@ class Cell:
     # -- internals ----------------------------------------------------------------------------------------
 
     def _set_parameters(self) -> None:
-        named = zip(self.names, self.members, strict=True)
-        self.parameters = tuple(_parameters(name, member) for name, member in named)
+        self.parameters = tuple(
+            member_parameters(name, member.robot, member.friction, member.parameters)
+            for name, member in zip(self.names, self.members, strict=True)
+        )
         self.theta = _pad([p.theta for p in self.parameters])
 
     def _set_initial_state(self) -> None:
@@ -204,8 +210,6 @@ class Cell:
         for name, member in zip(self.names, self.members, strict=True):
             check_trajectory(name, member.trajectory, self.labels)
             check_friction(name, member.friction, member.robot)
-            if member.parameters is not None and not isinstance(member.parameters, str):
-                check_parameters(name, member.parameters, member.robot)
 
     def __reduce__(self) -> tuple:
         """Copies and other processes bind the space anew: arrays that share memory would come apart."""
@@ -213,17 +217,6 @@ class Cell:
 
     def __repr__(self) -> str:
         return f"Cell('{self.name}', {self.n} robots, {self.space!r}, {self.coupling!r})"
-
-
-def _parameters(name: str, member: Member) -> Parameters:
-    """What a member adapts."""
-    given = "full" if member.parameters is None else member.parameters
-    if not isinstance(given, str):
-        return given
-    try:
-        return parameters_of(given, member.robot)
-    except InputError as error:
-        raise InputError(f"{name}, {error}") from None
 
 
 def _pad(rows: Sequence[np.ndarray]) -> np.ndarray:

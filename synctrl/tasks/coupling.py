@@ -31,7 +31,7 @@ class Coupling:
         edges: the robots compared in each row, counted from 0, (p, 2); or all robots in one row, (1, n).
         signs: the entries of S for them, of the same shape as `edges`.
         c: weights: a number per robot, (n,); diagonals, (n, m); matrices, (n, m, m); or a function of time
-            returning c, c' and c'' in one of these forms.
+            returning c, c' and c'' in one of these forms; or `SmoothWeights.from_function` of c alone.
         name: for legends.
         unit: unit of the weights, "" if they have none.
 

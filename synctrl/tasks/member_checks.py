@@ -100,22 +100,3 @@ def check_friction(name: str, friction: Any, robot: Robot) -> None:
                 f"{name}, friction, {part}: expected a number or shape ({robot.nv},), "
                 f"found {coefficients.shape}"
             )
-
-
-def check_parameters(name: str, parameters: Any, robot: Robot) -> None:
-    """Refuse what are no parameters of the robot.
-
-    Raises:
-        InputError: no parameters, or those of a robot with another number of joints.
-    """
-    if not all(hasattr(parameters, part) for part in ("names", "theta", "regressor")):
-        raise InputError(f"{name}, parameters: expected, for example, FullParameters, found {parameters!r}")
-    expected, still = (robot.nv, len(parameters.theta)), np.zeros(robot.nv)
-    try:
-        found = np.shape(parameters.regressor(still, still, still, still))
-    except ValueError as error:
-        raise InputError(f"{name}, parameters: they belong to another robot: {error}") from error
-    if found != expected:
-        raise InputError(
-            f"{name}, parameters: expected a regressor of shape {expected} for '{robot.name}', found {found}"
-        )

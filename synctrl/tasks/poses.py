@@ -86,6 +86,8 @@ class AxisRotation:
 class FunctionOrientation:
     """A desired orientation given by Python functions of one time.
 
+    Before a run the derivatives are held against differences. `SmoothOrientation` finds them by itself.
+
     Args:
         rotation: function of t returning a rotation matrix, (3, 3).
         velocity, acceleration: functions of t returning w and w' in world axes, (3,), rad/s and rad/s^2.

@@ -29,8 +29,10 @@ class Redundancy:
 
     The pseudo-inverse is J# = W^-1 J^T (J W^-1 J^T)^-1, and the preferred joint velocity
     zeta = gain (posture - q) acts in the null space of J: v_ref = J# xref' + (1 - J# J) zeta. Robots with as
-    many joints as task coordinates have no null space; nothing here has an effect on them. Damping that acts
-    in task space (`k_r_space="task"`) leaves motion in the null space undamped: prefer joint space.
+    many joints as task coordinates have no null space: nothing here has an effect on them, unless singular
+    configurations are damped. Then W decides where that begins and how much of it each joint takes, and near
+    them, where 1 - J# J is not zero, the posture acts too. Damping that acts in task space
+    (`k_r_space="task"`) leaves motion in the null space undamped: prefer joint space.
 
     Args:
         posture: preferred joint positions, (nv,) for every robot, or a list with one (nv,) per robot, rad; by

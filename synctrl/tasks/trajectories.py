@@ -160,6 +160,8 @@ class Circle:
 class FunctionTrajectory:
     """A desired motion given by Python functions of one time.
 
+    Before a run the derivatives are held against differences. `SmoothTrajectory` finds them by itself.
+
     Args:
         position, velocity, acceleration: functions of t returning (m,).
         breaks: instants at which a derivative jumps, s.

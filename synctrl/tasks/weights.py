@@ -8,9 +8,10 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array
+from ..checks import finite_array, positive_number
 from ..errors import CouplingError, InputError
-from .chebyshev import ACCURACY, SmoothFunction
+from .chebyshev import ACCURACY, NotSmoothError, SmoothFunction, certify
+from .derivatives import difference, find_misfit, look_at
 
 #: A condition number above this counts as "no inverse".
 SINGULAR = 1e12
@@ -125,6 +126,32 @@ class SmoothWeights:
         self._c, self._factor = c, factor
         self.robots = c.shape[0]
 
+    @classmethod
+    def from_function(cls, c: Callable[[float], ArrayLike], duration: float, m: int) -> SmoothWeights:
+        """Weights from a function that returns c alone; their derivatives are found, and certified.
+
+        Args:
+            c: t -> a number per robot, (n,), diagonals, (n, m), or matrices, (n, m, m).
+            duration: they can be used from 0 to this time, s.
+            m: dimension of the task.
+
+        Raises:
+            InputError: the function returns something else.
+            CouplingError: it is not smooth enough for a relative error of 1e-8.
+        """
+        try:
+            smooth = certify(
+                lambda t: as_matrices(finite_array(f"c at t = {t:g} s", c(t)), m),
+                positive_number("duration", duration),
+            )
+        except NotSmoothError as error:
+            raise CouplingError(
+                f"the weight of the robot at index {error.row} cannot be differentiated with a relative "
+                f"error below {ACCURACY:g}: near t = {error.time:g} s derivative {error.order} is off by "
+                f"{ACCURACY * error.error:.2g}; expected a smooth function of time that is not noisy"
+            ) from None
+        return cls(smooth)
+
     def at(self, times: np.ndarray, m: int) -> Weights:
         end = self._c.duration
         outside = (times < -ACCURACY * end) | (times > (1 + ACCURACY) * end)
@@ -163,7 +190,7 @@ def as_source(robots: int, c: ArrayLike | WeightFunction | WeightSource) -> Weig
 
 def as_matrices(c: np.ndarray, m: int) -> np.ndarray:
     """Numbers, (n,), diagonals, (n, m), or matrices, (n, m, m), as matrices, (n, m, m)."""
-    n = len(c)
+    n = c.shape[0] if c.ndim else 0
     if c.ndim == 1:
         return c[:, None, None] * np.eye(m)
     if c.shape == (n, m):
@@ -224,13 +251,11 @@ def check_weights(source: WeightSource, times: np.ndarray, m: int) -> None:
             belong to the weights.
     """
     times = np.unique(times[np.linspace(0, len(times) - 1, _instants(source.robots)).astype(int)])
-    c, c_dot, c_ddot, c_inv = source.at(times, m)
+    c, c_dot, _, c_inv = source.at(times, m)
     if isinstance(source, ConstantWeights) or len(times) < 2:
         return
     if isinstance(source, FunctionWeights):
-        floor = 1e-6 * np.abs(c).max(axis=(0, 2, 3))
-        _check_derivative("c'", c, c_dot, times, floor)
-        _check_derivative("c''", c_dot, c_ddot, times, floor / (times[-1] - times[0]))
+        _check_derivatives(source, float(times[0]), float(times[-1]), m)
     gaps = np.gradient(times)[:, None]
     change = np.abs(np.linalg.eigvals(c_inv @ c_dot).real).max(axis=-1) * gaps
     if change.max() >= 1:
@@ -246,23 +271,23 @@ def _instants(robots: int) -> int:
     return int(np.clip(200_000 // robots, 200, 2000))
 
 
-def _check_derivative(
-    name: str, value: np.ndarray, derivative: np.ndarray, times: np.ndarray, floor: np.ndarray
-) -> None:
-    """Compare the steps of a function with its derivative by the trapezoidal rule, in sum over the run.
+def _check_derivatives(source: WeightSource, start: float, stop: float, m: int) -> None:
+    """Compare c' and c'' with differences of c and c'."""
+    n, entries = source.robots, m * m
+    groups = [slice(i * entries, (i + 1) * entries) for i in range(n)]
+    windows = look_at(start, stop, (), int(np.clip(1000 // n, 4, 24)))
+    largest = np.abs(source.at(windows.start, m).c).max()
+    for order, name in enumerate(("c'", "c''")):
 
-    A sum, because a derivative may jump; a wide tolerance, because the instants may be far apart. Steps that
-    add up to less than `floor`, (n,), count as none.
-    """
-    steps = np.diff(value, axis=0)
-    expected = 0.5 * np.diff(times)[:, None, None, None] * (derivative[1:] + derivative[:-1])
-    total = (np.abs(steps) + np.abs(expected)).sum(axis=(0, 2, 3))
-    share = np.abs(steps - expected).sum(axis=(0, 2, 3)) / np.maximum(total, floor)
-    if share.max() > 0.2:
-        i = int(np.argmax(share))
-        k = int(np.argmax(np.abs(steps - expected)[:, i].sum(axis=(1, 2))))
-        raise CouplingError(
-            f"{name} of the robot at index {i} is not the derivative of {name[:-1]}: from t = {times[k]:g} s "
-            f"to {times[k + 1]:g} s {name[:-1]} changes by {steps[k, i].tolist()}, but {name} says "
-            f"{expected[k, i].tolist()}"
-        )
+        def sample(t: np.ndarray, order: int = order) -> tuple[np.ndarray, np.ndarray]:
+            parts = source.at(t, m)
+            return parts[order].reshape(len(t), -1), parts[order + 1].reshape(len(t), -1)
+
+        found = find_misfit(sample, windows, groups, order * largest / stop, difference)
+        if found is not None:
+            i, entry = divmod(found.coordinate, entries)
+            raise CouplingError(
+                f"{name} of the robot at index {i} is not the derivative of {name[:-1]}: near "
+                f"t = {found.time:.6g} s entry {divmod(entry, m)} of {name[:-1]} changes by "
+                f"{found.expected:.6g} per second, but {name} says {found.found:.6g}"
+            )

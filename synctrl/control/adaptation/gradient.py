@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from ...errors import InputError
 from ...tasks.cell import Cell
 from .. import law
-from ..gains import adaptation_gain, spread
+from ..gains import read_gain, spread_rows
+from ..rows import Rows
 from .protocol import Adaptation, Seen
 
 
@@ -22,14 +23,17 @@ class Gradient:
     not (Gamma = 0) is the power "model error", s_q^T Y tilde.
 
     Args:
-        Gamma: rate, a number, (P,) or (n, P), not below 0; 0 switches the adaptation off.
+        Gamma: rate, a number, (P,), (n, P) or a list of n rows of different lengths, not below 0; 0 switches
+            the adaptation off.
 
     Raises:
         InputError: not numbers, not finite, or below 0.
     """
 
-    def __init__(self, Gamma: ArrayLike):
-        self.Gamma = adaptation_gain(Gamma)
+    def __init__(self, Gamma: ArrayLike | Rows):
+        self.Gamma = read_gain("Gamma", Gamma)
+        if self.Gamma.size and self.Gamma.min() < 0:
+            raise InputError(f"Gamma: expected entries of at least 0, found {self.Gamma.min():g}")
 
     def bind(self, cell: Cell) -> BoundGradient:
         """This adaptation for a cell.
@@ -37,13 +41,14 @@ class Gradient:
         Raises:
             InputError: Gamma of another size.
         """
-        return BoundGradient(cell, spread("Gamma", self.Gamma, cell.theta.shape))
+        sizes = [parameters.theta.size for parameters in cell.parameters]
+        return BoundGradient(cell, spread_rows("Gamma", self.Gamma, sizes))
 
     def as_dict(self) -> dict[str, Any]:
         return {"name": "Gradient", "Gamma": self.Gamma.tolist()}
 
 
-def chosen(Gamma: np.ndarray | None, adaptation: Adaptation | None) -> Adaptation:
+def chosen(Gamma: np.ndarray | Rows | None, adaptation: Adaptation | None) -> Adaptation:
     """The adaptation of a controller: the one given, or the paper's with the rate among its gains.
 
     Raises:

@@ -202,9 +202,7 @@ def _way(folder: Path) -> Iterator[tuple[Path, os.stat_result]]:
         if here.name == "..":
             here = here.parent.parent
             continue
-        with suppress(FileExistsError):
-            os.mkdir(here, 0o700)
-        found = os.lstat(here)
+        found = _made(here)
         yield here, found
         if stat.S_ISLNK(found.st_mode):
             links += 1
@@ -214,6 +212,16 @@ def _way(folder: Path) -> Iterator[tuple[Path, os.stat_result]]:
             here = here.parent
         elif not stat.S_ISDIR(found.st_mode):
             raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(here))
+
+
+def _made(place: Path) -> os.stat_result:
+    """What is at a place; a new folder for this user alone, if nothing was."""
+    try:
+        return os.lstat(place)
+    except FileNotFoundError:
+        with suppress(FileExistsError):
+            os.mkdir(place, 0o700)
+    return os.lstat(place)
 
 
 # -- places -----------------------------------------------------------------------------------------------

@@ -39,6 +39,13 @@ typedef struct { /* one row per logged instant */
     double *x, *xd, *e, *epsilon, *integral, *e_star, *q, *v, *s_q, *tau, *disturbance, *theta_hat;
 } Log;
 
+typedef struct { /* the worst step of a run: its error in velocity, largest velocity, end, and which joint */
+    double largest, speed, time;
+    double h, h_before; /* the last step, and the one before if it could be looked at, else 0 */
+    double *v, *a;      /* (2, n nv): at the two instants before */
+    int at;
+} StepError;
+
 typedef struct {
     double *w;        /* scratch of the generated functions */
     long long *iw;
@@ -55,12 +62,13 @@ typedef struct {
     double *k[4], *stage;
     double *sign;     /* (n): signs of the determinants at the last logged instant, 0 at first */
     double *held, *held_tau; /* sampled control */
+    StepError *step_error;
 } Work;
 
-enum { FINE = 0, NOT_FINITE = 1, SINGULAR = 2, CROSSED = 3, TURNED = 4 };
+enum { FINE = 0, STATE = 1, TURNED = 2, SINGULAR = 3, CROSSED = 4, TORQUE = 5 };
 
 /* what happens at the start of a step */
-enum { CHECKED = 1, LOGGED = 2, SAMPLED = 4 };
+enum { CHECKED = 1, LOGGED = 2, SAMPLED = 4, JOINED = 8 }; /* JOINED: all goes on smoothly from the step before */
 
 typedef struct { int status, step, robot; double value; long rows; } Report; /* rows: how many were logged */
 
@@ -244,35 +252,88 @@ static double determinant_sign(double *A, int m) {
     return sign;
 }
 
-/* The same tests as the guard of the reference engine. */
-static int check(const Cell *c, const double *y, Work *k, Report *report) {
-    int m = c->m, nv = c->nv, size = state_size(c);
+/* The tests of the guard of the reference engine, in its order; each looks at all robots before the next one. */
+
+static int found(Report *report, int status, int robot, double value) {
+    report->status = status;
+    report->robot = robot;
+    report->value = value;
+    return 1;
+}
+
+static int not_finite(const double *numbers, int size) {
     for (int j = 0; j < size; j++)
-        if (!isfinite(y[j])) { report->status = NOT_FINITE; report->robot = j; return 1; }
+        if (!isfinite(numbers[j])) return 1;
+    return 0;
+}
+
+static int turned(const Cell *c, const Work *k, Report *report) {
+    int worst = 0;
+    double largest = 0;
+    for (int i = 0; i < c->n; i++) {
+        const double *e = k->task + (size_t)i * 7 * c->m + c->m + 3;
+        double angle = kinds[c->kind[i]].pose ? sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]) : 0;
+        if (angle > largest) { largest = angle; worst = i; }
+    }
+    return largest > c->max_angle && found(report, TURNED, worst, largest);
+}
+
+static int singular(const Cell *c, const Work *k, Report *report) {
     for (int i = 0; i < c->n; i++) {
         const Kind *kind = &kinds[c->kind[i]];
-        if (!kind->cartesian) continue;
-        const double *J = k->J + (size_t)i * J_size(c), *J_inv = J + 2 * (size_t)m * nv;
+        const double *J = k->J + (size_t)i * J_size(c), *J_inv = J + 2 * (size_t)c->m * c->nv;
         double a = 0, b = 0;
-        for (int j = 0; j < m * kind->nv; j++) { a += J[j] * J[j]; b += J_inv[j] * J_inv[j]; }
-        report->value = sqrt(a * b);
-        report->robot = i;
-        if (!(report->value < c->max_condition)) { report->status = SINGULAR; return 1; }
-        if (kind->pose) {
-            const double *e = k->task + (size_t)i * 7 * m + m + 3;
-            report->value = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
-            if (!(report->value < c->max_angle)) { report->status = TURNED; return 1; }
-        }
-        if (kind->nv == m) {
-            memcpy(k->w, J, sizeof(double) * m * m);
-            double sign = determinant_sign(k->w, m);
-            if (k->sign[i] != 0 && sign != k->sign[i]) { report->status = CROSSED; return 1; }
-            k->sign[i] = sign;
-        }
+        for (int j = 0; j < c->m * kind->nv; j++) { a += J[j] * J[j]; b += J_inv[j] * J_inv[j]; }
+        if (kind->cartesian && !(sqrt(a * b) < c->max_condition)) return found(report, SINGULAR, i, sqrt(a * b));
     }
-    for (int j = 0; j < c->n * nv; j++)
-        if (!isfinite(k->tau[j])) { report->status = NOT_FINITE; report->robot = size + j; return 1; }
     return 0;
+}
+
+static int crossed(const Cell *c, Work *k, Report *report) {
+    int m = c->m;
+    for (int i = 0; i < c->n; i++) {
+        const Kind *kind = &kinds[c->kind[i]];
+        if (!kind->cartesian || kind->nv != m) continue;
+        memcpy(k->w, k->J + (size_t)i * J_size(c), sizeof(double) * m * m);
+        double before = k->sign[i];
+        k->sign[i] = determinant_sign(k->w, m);
+        if (before != 0 && k->sign[i] != before) return found(report, CROSSED, i, 0);
+    }
+    return 0;
+}
+
+static int check(const Cell *c, const double *y, Work *k, Report *report) {
+    if (not_finite(y, state_size(c))) return found(report, STATE, 0, 0);
+    if (turned(c, k, report) || singular(c, k, report) || crossed(c, k, report)) return 1;
+    for (int i = 0; i < c->n; i++)
+        if (not_finite(k->tau + (size_t)i * c->nv, c->nv)) return found(report, TORQUE, i, 0);
+    return 0;
+}
+
+static void note(StepError *worst, double error, double t, int joint) {
+    if (!(error > worst->largest) || !isfinite(error)) return;
+    worst->largest = error;
+    worst->time = t;
+    worst->at = joint;
+}
+
+/* The step that ended at t, as `StepError` of step_error.py judges it: by the derivatives k4 and k1 on both sides
+ * of t, and by Simpson's rule over two steps. h = 0 where it cannot be judged. */
+static void look_back(const Cell *c, double t, double h, const double *y, const double *k4, const double *k1,
+                      StepError *w) {
+    int size = c->n * c->nv;
+    int equal = h > 0 && fabs(h - w->h_before) <= 1e-6 * h;
+    for (int j = 0; j < size; j++) {
+        double v = y[size + j], a = k1[size + j], *vs = w->v + j, *as = w->a + j;
+        if (fabs(v) > w->speed && isfinite(v)) w->speed = fabs(v);
+        note(w, h / 6 * fabs(k4[size + j] - a), t, j);
+        if (equal) note(w, fabs(v - vs[0] - h / 3 * (as[0] + 4 * as[size] + a)), t, j);
+        vs[0] = vs[size];
+        vs[size] = v;
+        as[0] = as[size];
+        as[size] = a;
+    }
+    w->h_before = h;
 }
 
 static void combine(double *out, const double *y, double h, const double *slope, int size) {
@@ -292,6 +353,8 @@ void advance(const Cell *c, const Reference *r, const double *t, const char *mar
         const double *d = disturbances + (size_t)window[step] * c->n * c->nv;
         report->step = step;
         evaluate(c, r, 0, step, y, d, k->k[0], k);
+        look_back(c, t[step], marks[step] & JOINED ? k->step_error->h : 0, y, k->k[3], k->k[0], k->step_error);
+        k->step_error->h = h;
         if (marks[step] & CHECKED && check(c, y, k, report)) return;
         if (marks[step] & LOGGED) record(c, r, step, report->rows++, y, k->tau, d, log, k);
         combine(k->stage, y, 0.5 * h, k->k[0], size);
@@ -327,6 +390,9 @@ void advance_sampled(const Cell *c, const Reference *r, const double *t, const c
             coast(c, stage ? k->stage : y, d, k->k[stage], k);
         }
         finish(y, h, k->k, size);
+        coast(c, y, d, k->k[0], k);
+        look_back(c, t[step + 1], h, y, k->k[3], k->k[0], k->step_error);
+        k->step_error->h_before = 0; /* torque may jump here */
     }
 }
 

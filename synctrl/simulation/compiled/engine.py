@@ -10,15 +10,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...errors import OrientationError, SimulationError
 from ...tasks.cell import Cell
 from ..clock import Clock, Stretch
 from ..disturbances import DisturbanceSchedule
-from ..guard import fastest, not_finite, run_away, singular
+from ..guard import CHECKS, Finding, stopped
 from ..handover import tell, up_to_a_failure
 from ..recorder import Recorder
+from ..step_error import StepError
 from .program import Program
-from .structs import LogStruct, ReferenceStruct, ReportStruct
+from .structs import LogStruct, ReferenceStruct, ReportStruct, StepErrorStruct
 
 #: bytes of references that one block of steps may need
 BLOCK_BYTES = 32_000_000
@@ -103,15 +103,17 @@ class Pace:
         self._steps = 1
 
     def parts(self, count: int) -> Iterator[tuple[int, int]]:
-        """Steps 0 to `count` as ranges [first, last), each to be made before the next is asked for."""
+        """Steps 0 to `count` as ranges [first, last), each as long as was learnt until then."""
         first = 0
         while first < count:
             last = min(first + self._steps, count)
-            start = perf_counter()
             yield first, last
-            took = max(perf_counter() - start, 1e-6)
-            self._steps = max(1, min(8 * self._steps, int(0.5 * AWAY / took * (last - first))))
             first = last
+
+    def learn(self, steps: int, took: float) -> None:
+        """Aim at half the time, from how long some steps took, s; grow no faster than eightfold."""
+        fitting = int(0.5 * AWAY * steps / max(took, 1e-6))
+        self._steps = max(1, min(8 * self._steps, fitting))
 
 
 def advance(
@@ -119,6 +121,7 @@ def advance(
     clock: Clock,
     schedule: DisturbanceSchedule,
     recorder: Recorder,
+    step_error: StepError,
     every: int | None = None,
     progress: Callable[[float], Any] | None = None,
     tables: Tables | None = None,
@@ -130,6 +133,7 @@ def advance(
         clock: its instants.
         schedule: disturbances.
         recorder: where logged instants go; after a failure it has those before it.
+        step_error: told what the worst step was.
         every: with sampled control, how many steps of dt one sample lasts.
         progress: called with the time reached, s, several times a second.
         tables: those of earlier runs.
@@ -138,11 +142,13 @@ def advance(
         NonFiniteError, SingularJacobianError, OrientationError: as the reference engine.
         SynctrlError: a desired motion or weight fails.
     """
-    y, pace = program.loop.initial_state(), Pace()
-    steps = _Steps(program, clock, schedule, recorder, every)
+    y, pace = recorder.state, Pace()
+    steps = _Steps(program, clock, schedule, recorder, step_error, every)
     for block in blocks(program, clock) if tables is None else tables.blocks(program, clock):
         for first, last in pace.parts(len(block.steps.starts)):
+            start = perf_counter()
             steps.advance(block, first, last, y)
+            pace.learn(last - first, perf_counter() - start)
             recorder.reached = float(block.steps.times[last])
             tell(progress, recorder.reached)
     steps.finish(y)
@@ -157,10 +163,16 @@ class _Steps:
         clock: Clock,
         schedule: DisturbanceSchedule,
         recorder: Recorder,
+        step_error: StepError,
         every: int | None,
     ):
         self._program, self._clock, self._every = program, clock, every
-        self._schedule, self._recorder = schedule, recorder
+        self._schedule, self._recorder, self._step_error = schedule, recorder, step_error
+        v0 = program.loop.cell.v0
+        self._before = np.zeros((2, 2, v0.size))
+        buffers = (part.ctypes.data for part in self._before)
+        self._worst = StepErrorStruct(0, np.abs(v0).max(), 0, 0, 0, *buffers)
+        program.work.step_error = ctypes.addressof(self._worst)
         self._torques = np.ascontiguousarray(schedule.torques)
         ctypes.memset(program.work.sign, 0, 8 * program.loop.cell.n)
 
@@ -168,7 +180,8 @@ class _Steps:
         """Move y through some steps of a block, in place."""
         steps = block.steps
         part = slice(first, last)
-        marks = _marks(steps.checked[part], steps.logged[part], self._due(steps.number[part]))
+        joined = self._clock.joined(steps.first + first, steps.starts[part])
+        marks = _marks(steps.checked[part], steps.logged[part], self._due(steps.number[part]), joined)
         window = self._schedule.windows(steps.middles[part])
         self._call(block, first, steps.times[first : last + 1], marks, window, y)
 
@@ -180,7 +193,7 @@ class _Steps:
         block = Block(nothing, *_tables(self._program.loop.cell, np.array([end] * 3)))
         due = np.array([self._every is not None and clock.sampled_at_end(self._every)])
         window = self._schedule.windows(clock.stretch(clock.steps - 1, clock.steps).middles)
-        self._call(block, 0, nothing.times, _marks(at > 0, at > 0, due), window, y)
+        self._call(block, 0, nothing.times, _marks(at > 0, at > 0, due, at < 0), window, y)
 
     def _due(self, number: np.ndarray) -> np.ndarray:
         return number % (self._every or 1) == 0
@@ -214,17 +227,20 @@ class _Steps:
             )
         finally:  # an interrupt that came meanwhile is raised before the call has returned
             recorder.advance(times[:-1][marks & LOGGED > 0][: report.rows])
+            worst = self._worst
+            self._step_error.note(worst.largest, worst.speed, worst.at, worst.time)
         if report.status:
-            raise _failure(program, float(times[report.step]), report, y, recorder.last("v"))
+            found = Finding(CHECKS[report.status - 1], report.robot, report.value)
+            raise stopped(program.loop, float(times[report.step]), y, recorder.last("v"), found)
 
 
 #: what happens at the start of a step, as in driver.c
-CHECKED, LOGGED, SAMPLED = 1, 2, 4
+CHECKED, LOGGED, SAMPLED, JOINED = 1, 2, 4, 8
 
 
-def _marks(checked: np.ndarray, logged: np.ndarray, due: np.ndarray) -> np.ndarray:
+def _marks(checked: np.ndarray, logged: np.ndarray, due: np.ndarray, joined: np.ndarray) -> np.ndarray:
     """What happens at the start of each step, as one number; samples fall on multiples of dt."""
-    marks = CHECKED * checked + LOGGED * logged + SAMPLED * (checked & due)
+    marks = CHECKED * checked + LOGGED * logged + SAMPLED * (checked & due) + JOINED * joined
     return marks.astype(np.int8)
 
 
@@ -240,24 +256,3 @@ def _tables(cell: Cell, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             desired[:, i, k] = part
     parts = cell.weights(flat[:1] if cell.coupling.is_constant else flat)
     return desired, np.stack(parts, axis=2)  # as one row of instants after the other
-
-
-def _failure(
-    program: Program, t: float, report: ReportStruct, y: np.ndarray, v: np.ndarray
-) -> SimulationError:
-    loop, cell = program.loop, program.loop.cell
-    if report.status == 1 and report.robot < loop.size:  # an entry of the state, or of the torques after it
-        return run_away(loop, t, y, v)
-    if report.status == 1:
-        return not_finite(cell, t, fastest(np.arange(cell.n), loop.split(y)[1]), "torque")
-    i, name = report.robot, cell.names[report.robot]
-    if report.status == 4:
-        return OrientationError(
-            f"the orientation error of {name} is {report.value:.3g} rad at t = {t:g} s; at pi its direction "
-            "is not defined: start closer to the desired orientation, or turn more slowly",
-            time=t,
-            robot=i,
-        )
-    if report.status == 3:
-        return singular(cell, t, i, "its determinant changed sign since the instant before")
-    return singular(cell, t, i, f"its condition number is {report.value:.3g}")

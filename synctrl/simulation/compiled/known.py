@@ -9,8 +9,11 @@ base. Desired motions, weights and disturbances may be anything: they are called
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from types import FunctionType, MethodType
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from ...control import law
 from ...control.adaptation.gradient import BoundGradient
@@ -26,8 +29,9 @@ from ...robots.robot import Robot
 from ...tasks.cell import Cell
 from ...tasks.coupling import Coupling
 from ...tasks.pose import BoundPoseSpace, PoseSpace
-from ...tasks.redundancy import Redundancy
+from ...tasks.redundancy import DampedInverse, Inverse, Pseudoinverse, Redundancy
 from ...tasks.spaces import BoundCartesianSpace, BoundJointSpace, CartesianSpace, JointSpace
+from ...tasks.tips import Tips
 from ..closed_loop import ClosedLoop
 from ..plant import Plant
 
@@ -36,6 +40,7 @@ WAY_OUT = "use engine='pinocchio'"
 SPACES = (JointSpace, CartesianSpace, PoseSpace)
 BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace)
 RIGID = (FullParameters, LinearParameters, BaseParameters)
+INVERSES = (Inverse, Pseudoinverse, DampedInverse)
 LAWS = (FoldedWeights, ConstantWeights, MovingWeights)
 
 
@@ -59,6 +64,7 @@ def check_known(loop: ClosedLoop) -> None:
     for part in _parts(loop):
         _check_type(part)
         _check_own_methods(part)
+    _check_controller(loop.controller)
     _check_plant(loop)
 
 
@@ -80,6 +86,7 @@ def check_untouched(loop: ClosedLoop) -> None:
 
 def _parts(loop: ClosedLoop) -> Iterator[Part]:
     controller, cell = loop.controller, loop.controller.cell
+    task: Any = cell.task
     yield Part("closed loop", loop, (ClosedLoop,))
     yield Part("plant", loop.plant, (Plant,))
     yield Part("controller", controller, (Controller,))
@@ -89,9 +96,12 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     yield Part("cell", cell, (Cell,))
     yield Part("coupling", cell.coupling, (Coupling,))
     yield Part("space", cell.space, SPACES)
-    yield Part("space bound to the robots", cell.task, BOUND)
+    yield Part("space bound to the robots", task, BOUND)
     if not isinstance(cell.space, JointSpace):
-        yield Part("redundancy", cell.space.redundancy, (Redundancy,))  # type: ignore[attr-defined]
+        space: Any = cell.space
+        yield Part("redundancy", space.redundancy, (Redundancy,))
+        yield Part("tips of the robots", task._tips, (Tips,))
+        yield Part("way from the task to the joints", task._inverse, INVERSES)
     for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True):
         yield Part(f"model of {name}", robot, (Robot,))
         yield Part(f"parameters of {name}", parameters, (*RIGID, FrictionParameters))
@@ -106,7 +116,6 @@ def _functions(controller: Controller) -> Iterator[tuple[str, Any, str]]:
             yield f"line '{name}' of the law", function, law.__name__
     acceleration = REFERENCE_ACCELERATIONS[controller.reference_acceleration]
     yield "reference acceleration", acceleration, law.__name__
-    yield "damping of the controller", controller._damping, Controller.__module__
 
 
 def _check_type(part: Part) -> None:
@@ -120,10 +129,11 @@ def _check_type(part: Part) -> None:
 
 def _check_own_methods(part: Part) -> None:
     """Refuse an object that has a method of its own in place of its class's."""
-    kind = type(part.value)
-    for name, own in vars(part.value).items():
-        if isinstance(getattr(kind, name, None), (FunctionType, MethodType, property)):
-            raise _replaced(f"{part.role}, {kind.__name__}.{name}", own)
+    kind: Any = type(part.value)
+    own, methods = vars(part.value), _methods(kind)
+    if not methods.isdisjoint(own):
+        name = next(name for name in own if name in methods)
+        raise _replaced(f"{part.role}, {kind.__name__}.{name}", own[name])
 
 
 def _check_class(kind: type) -> None:
@@ -134,6 +144,20 @@ def _check_class(kind: type) -> None:
             ours = getattr(function, "__module__", None) == base.__module__
             if callable(function) and not ours and (name == "__call__" or not name.startswith("__")):
                 raise _replaced(f"{base.__name__}.{name}", function)
+
+
+def _check_controller(controller: Controller) -> None:
+    """Refuse a controller whose parts no longer say what it does: it made some of them into others."""
+    damping = controller._joint_damping if controller.k_r_space == "joint" else controller._task_damping
+    if controller._damping != damping:
+        raise _replaced("damping of the controller", controller._damping)
+    for name in ("Lambda", "beta", "K_eps"):
+        now, then = getattr(controller, name), getattr(controller.gains, name)
+        if np.shape(now) != (controller.cell.m,) or not (now == then).all():
+            raise InputError(
+                f"engine='compiled' does not have a controller whose {name} was changed after its law was "
+                f"made of it; make another one of changed gains, or {WAY_OUT}"
+            )
 
 
 def _check_plant(loop: ClosedLoop) -> None:
@@ -160,6 +184,16 @@ def _name(thing: Any) -> str:
     """What a class or function is called, with its module."""
     kind = thing if hasattr(thing, "__qualname__") else type(thing)
     return f"{kind.__module__}.{kind.__qualname__}"
+
+
+@cache
+def _methods(kind: Any) -> frozenset[str]:
+    """Names of the methods and computed attributes of a class, without those that are kept once computed."""
+    return frozenset(
+        name
+        for name in dir(kind)
+        if isinstance(getattr(kind, name, None), (FunctionType, MethodType, property))
+    )
 
 
 def _unwrapped(method: Any) -> Any:

@@ -61,7 +61,18 @@ class WorkStruct(ctypes.Structure):
         ("e_star", ctypes.c_void_p),
         ("s_q", ctypes.c_void_p),
         ("k", ctypes.c_void_p * 4),
-        *((name, ctypes.c_void_p) for name in ("stage", "sign", "held", "held_tau")),
+        *((name, ctypes.c_void_p) for name in ("stage", "sign", "held", "held_tau", "step_error")),
+    ]
+
+
+class StepErrorStruct(ctypes.Structure):
+    """`StepError` of driver.c."""
+
+    _fields_ = [
+        *((name, ctypes.c_double) for name in ("largest", "speed", "time", "h", "h_before")),
+        ("v", ctypes.c_void_p),
+        ("a", ctypes.c_void_p),
+        ("at", ctypes.c_int),
     ]
 
 

@@ -1,0 +1,153 @@
+"""How fast a closed loop wants to move: what each gain asks of the step, and which joint it is about.
+
+With the mass matrix M of a robot, its damping D (K_r, or J^T K_r J in task space), its friction F at rest and
+lambda_n, the largest eigenvalue of S^T S:
+
+    K_r        largest eigenvalue of M^-1 D
+    friction   largest eigenvalue of M^-1 F
+    Lambda     Lambda
+    beta       beta lambda_n
+    K_eps      root of the largest eigenvalue of M^-1 lambda_n J^T c^T K_eps c J
+    Gamma      root of the largest eigenvalue of M^-1 Y Gamma Y^T
+
+The first four damp, and add up; the last two are springs, that swing. Held torque damps a spring late: what
+counts then is the largest eigenvalue of (D + F)^-1 Y Gamma Y^T, against the period.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..robots.regressors import regressors
+from ..tasks.cell import Reference
+from .closed_loop import ClosedLoop
+
+#: largest product of rate and step that was ever seen to do with the classical Runge-Kutta method, whose own
+#: limits are 2.78 for what damps, alone and linear, and 2.83 for what swings
+RUNGE_KUTTA, SWING = 2.0, 2.83
+#: the same for rate and period of torque that is held
+HELD, HELD_SPRING = 2.0, 1.0
+
+
+class Rate(NamedTuple):
+    """A rate of a robot and where it comes from.
+
+    Attributes:
+        gain: name of the gain, or "friction".
+        robot: counted from 0.
+        joint: the one that moves most in the fastest mode, counted from 0, or None if the gain is the task's.
+        rate: 1/s.
+        spring: whether it swings rather than damps.
+    """
+
+    gain: str
+    robot: int
+    joint: int | None
+    rate: float
+    spring: bool = False
+
+
+def loop_rates(
+    loop: ClosedLoop, t: float, motion: np.ndarray, sampled: bool = False, driven: bool = False
+) -> list[Rate]:
+    """Rates of every robot of a closed loop at one instant.
+
+    Args:
+        loop: the closed loop.
+        t: the instant, s.
+        motion: joint positions and velocities, (2, n, nv).
+        sampled: whether torque is held for a period.
+        driven: whether the regressor is that of the reference motion with its feedback, rather than that of
+            what is desired.
+    """
+    reference = loop.cell.references(np.array([t]))[0]
+    J, Y = _maps(loop, reference, motion, driven)
+    shared = _task_rates(loop)
+    found = []
+    for i, robot in enumerate(loop.cell.robots):
+        nv = robot.nv
+        M = robot.mass_matrix(motion[0, i, :nv])
+        damping, springs = _matrices(loop, reference, i, J[i, :, :nv], Y[i, :nv])
+        friction = np.diag(rest_friction(loop)[i, :nv])
+        found += [Rate(name, i, None, rate) for name, rate in shared]
+        found += [_rate("K_r", i, M, damping), _rate("friction", i, M, friction)]
+        against = damping + friction + 1e-12 * np.eye(nv) if sampled else M
+        found += [_rate(name, i, against, spring, True, sampled) for name, spring in springs]
+    return found
+
+
+def rest_friction(loop: ClosedLoop) -> np.ndarray:
+    """Slope of the true friction at rest, (n, nv), N·m·s/rad."""
+    plant = loop.plant
+    return plant.viscous + plant.coulomb / plant.smoothing
+
+
+def damping_rate(loop: ClosedLoop, t: float, motion: np.ndarray, sampled: bool = False) -> float:
+    """The largest sum of what damps a robot within a step, 1/s.
+
+    It is the largest eigenvalue of M^-1 (D + F), plus Lambda and beta lambda_n. Where torque is held, a step
+    knows nothing but the friction.
+    """
+    own: dict[int, float] = {}
+    for rate in loop_rates(loop, t, motion):
+        if not rate.spring and (rate.gain == "friction" or not sampled):
+            own[rate.robot] = own.get(rate.robot, 0.0) + rate.rate
+    return max(own.values())
+
+
+def _task_rates(loop: ClosedLoop) -> list[tuple[str, float]]:
+    """Lambda, and beta times the largest eigenvalue of S^T S, 1/s."""
+    controller = loop.controller
+    return [
+        ("Lambda", float(controller.Lambda.max())),
+        ("beta", float(controller.beta.max()) * _largest_share(loop)),
+    ]
+
+
+def _largest_share(loop: ClosedLoop) -> float:
+    """The largest eigenvalue of S^T S."""
+    return float(np.linalg.norm(loop.cell.coupling.matrix, 2) ** 2)
+
+
+def _maps(
+    loop: ClosedLoop, reference: Reference, motion: np.ndarray, driven: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Jacobians, (n, m, nv), and regressors, (n, nv, P), of all robots."""
+    cell = loop.cell
+    task = cell.task.measure(motion, reference.desired)
+    wanted = cell.task.to_joints(task, *task.rates)
+    if driven:
+        integral = np.zeros((cell.coupling.pairs, cell.m))
+        signals = loop.controller.evaluate(reference, motion, cell.theta_hat0, integral)
+        wanted = signals.v_ref, signals.a_ref
+    regressor = regressors(cell.parameters, [robot.nv for robot in cell.robots])
+    Y = regressor(*motion, *wanted).matrices()
+    J = np.broadcast_to(np.eye(cell.m, cell.nv), (cell.n, cell.m, cell.nv)) if task.J is None else task.J
+    return J, Y
+
+
+def _matrices(
+    loop: ClosedLoop, reference: Reference, i: int, J: np.ndarray, Y: np.ndarray
+) -> tuple[np.ndarray, list[tuple[str, np.ndarray]]]:
+    """Damping, (nv, nv), and springs of a robot."""
+    controller = loop.controller
+    K_r, nv = controller.K_r[i], J.shape[1]
+    damping = np.diag(K_r[:nv]) if controller.k_r_space == "joint" else J.T @ np.diag(K_r) @ J
+    cJ = reference.c[i] @ J
+    coupling = _largest_share(loop) * cJ.T @ np.diag(controller.K_eps) @ cJ
+    return damping, [("K_eps", coupling), ("Gamma", Y @ np.diag(controller.Gamma[i]) @ Y.T)]
+
+
+def _rate(
+    gain: str, i: int, M: np.ndarray, A: np.ndarray, spring: bool = False, sampled: bool = False
+) -> Rate:
+    """The largest eigenvalue of M^-1 A, or its root for a spring, with the joint that its mode moves most."""
+    if not (np.isfinite(A).all() and np.isfinite(M).all()):
+        return Rate(gain, i, None, 0.0, spring)
+    L_inv = np.linalg.inv(np.linalg.cholesky(M))
+    values, vectors = np.linalg.eigh(L_inv @ A @ L_inv.T)
+    value = max(float(values[-1]), 0.0)
+    joint = int(np.abs(L_inv.T @ vectors[:, -1]).argmax())
+    return Rate(gain, i, joint, np.sqrt(value) if spring and not sampled else value, spring)

@@ -1,0 +1,110 @@
+"""What a folder says of its sweep: `sweep.json`, read, checked, and compared with what is at hand."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from ..analysis.metrics import ERRORS
+from ..checks import count, instance, non_negative_number, positive_number
+from ..errors import InputError, ResultError
+from .distributions import Values, described
+from .draws import Draws, Generations
+from .rows import Format, columns
+
+FORMAT = "synctrl sweep 1"
+ABOUT = "sweep.json"
+
+
+def read_about(folder: str | Path) -> dict[str, Any]:
+    """What the sweep in a folder is.
+
+    Raises:
+        ResultError: there is none, or its description cannot be read or contradicts itself.
+    """
+    path = Path(folder) / ABOUT
+    try:
+        about = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ResultError(f"no sweep in '{folder}': it has no {ABOUT}") from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise ResultError(f"'{path}' cannot be read: {error}") from error
+    if not isinstance(about, dict) or about.get("format") != FORMAT:
+        found = about.get("format") if isinstance(about, dict) else type(about).__name__
+        raise ResultError(f"'{path}': expected the format '{FORMAT}', found {found!r}")
+    try:
+        row_format(about)
+        checked_bands(about.get("settling_bands"))
+    except InputError as error:
+        raise ResultError(f"'{path}': {error}") from error
+    return about
+
+
+def row_format(about: Mapping[str, Any]) -> Format:
+    """What rows have to be, by the description of their sweep or search.
+
+    Raises:
+        InputError: a part that is missing or wrong, or parts that contradict each other.
+    """
+    factors = _described_factors(about.get("factors"))
+    expected = columns(factors)
+    if about.get("columns") != expected:
+        raise InputError(f"columns: expected {expected}, found {about.get('columns')!r}")
+    duration = positive_number("duration", about.get("duration"))
+    if "search" in about:
+        instance("search", about["search"], Mapping, "a description of the search")
+        population = count("population", about["search"].get("population"))
+        return Format(expected, Generations(factors, population), duration)
+    draws = Draws(factors, count("samples", about.get("samples")), count("seed", about.get("seed"), least=0))
+    if about.get("runs") != draws.count:
+        raise InputError(f"runs: expected {draws.count}, as the factors say, found {about.get('runs')!r}")
+    return Format(expected, draws, duration)
+
+
+def checked_bands(bands: Any) -> dict[str, float]:
+    """Settling bands by kind of error.
+
+    Raises:
+        InputError: other kinds, or values that are no band.
+    """
+    if not isinstance(bands, Mapping) or set(bands) != set(ERRORS):
+        raise InputError(f"bands: expected numbers for {' and '.join(ERRORS)}, found {bands!r}")
+    return {kind: non_negative_number(f"bands, {kind}", bands[kind]) for kind in ERRORS}
+
+
+def difference(there: Any, here: Any, where: str = "") -> str:
+    """The first thing in which two descriptions differ, in words; empty if they do not."""
+    if isinstance(there, dict) and isinstance(here, dict):
+        keys = [*there, *(key for key in here if key not in there)]
+        parts: Iterable[tuple[str, Any, Any]] = (
+            (f"{where}.{key}" if where else key, there.get(key), here.get(key)) for key in keys
+        )
+    elif isinstance(there, list) and isinstance(here, list) and len(there) == len(here):
+        parts = ((f"{where}[{k}]", *pair) for k, pair in enumerate(zip(there, here, strict=True)))
+    else:
+        return "" if there == here else f"{where} is {_short(there)} there and {_short(here)} here"
+    return next((found for name, a, b in parts if (found := difference(a, b, name))), "")
+
+
+def _described_factors(factors: Any) -> dict[str, Values | None]:
+    """Values by the name of their factor; None for a kind that is not known here."""
+    instance("factors", factors, list, "a list of factors")
+    found: dict[str, Values | None] = {}
+    for factor in factors:
+        instance("factors", factor, Mapping, "descriptions of factors")
+        name, values = factor.get("name"), factor.get("values")
+        instance("factors", name, str, "the name of a factor")
+        instance(f"factor '{name}'", values, Mapping, "a description of its values")
+        if name in found:
+            raise InputError(f"factors: expected different names, found '{name}' again")
+        found[name] = described(values)
+    if not found:
+        raise InputError("factors: expected at least one, found none")
+    return found
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= 80 else text[:77] + "..."

@@ -1,0 +1,149 @@
+"""Rows of a sweep's table: what their entries are, and whether a row can be of a sweep at all."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from ..errors import SweepFileError
+from .distributions import Value, is_text
+from .measures import MEASURES
+
+Row = list[Any]
+
+COMPLETED, STOPPED, REFUSED = "completed", "stopped", "refused"
+#: where the last entries begin, counted from the end: how the run ended, and its measures
+_MEASURED = -len(MEASURES)
+_ENDING = _MEASURED - 3
+#: how far a value may be off: less than two draws ever are, more than the last digits of other machines
+CLOSE = 1e-9
+
+
+def columns(factors: Iterable[str]) -> list[str]:
+    """Names of the entries of a row, for factors of these names."""
+    return ["run", *factors, "status", "cause", "stop_time", *MEASURES]
+
+
+class Runs(Protocol):
+    """The runs that there can be, and the values of their factors."""
+
+    def fault(self, run: int, values: Sequence[Any], rows: Mapping[int, Row]) -> str:
+        """Why a run of this number and with these values cannot be, after those in `rows`; "" if it can."""
+
+
+class Format(NamedTuple):
+    """What rows of one sweep have to be.
+
+    Attributes:
+        columns: names of a row's entries.
+        runs: which runs there are.
+        duration: of every run, s.
+    """
+
+    columns: Sequence[str]
+    runs: Runs
+    duration: float
+
+    def read(self, path: Path, content: bytes) -> dict[int, Row]:
+        """Rows of a file's complete lines by number of the run, in the order of the lines.
+
+        Raises:
+            SweepFileError: a complete line that is no row of this sweep; the message names file and line.
+        """
+        rows: dict[int, Row] = {}
+        for number, line in enumerate(content.split(b"\n")[:-1], start=1):
+            row = _decoded(line)
+            fault = self.fault(row, rows)
+            if fault:
+                shown = line[:60].decode(errors="replace")
+                raise wrong_line(path, number, f"{fault}, in {shown!r}")
+            rows[row[0]] = row
+        return rows
+
+    def fault(self, row: Any, rows: Mapping[int, Row]) -> str:
+        """Why something is no row that can follow others; "" if it is one."""
+        if not isinstance(row, list) or len(row) != len(self.columns):
+            return f"expected a run's {len(self.columns)} values"
+        run, values, (status, cause, stop_time) = row[0], row[1:_ENDING], row[_ENDING:_MEASURED]
+        if type(run) is not int or run < 0:
+            return f"expected the number of a run, found {_short(run)}"
+        if run in rows:
+            same = "the same" if rows[run] == row else "other values"
+            return f"expected each run once, found run {run} again; line {line_of(run, rows)} has {same}"
+        return (
+            self.runs.fault(run, values, rows)
+            or _fault_of_ending(status, cause, stop_time, self.duration)
+            or _fault_of_measures(status, row[_MEASURED:])
+        )
+
+
+def wrong_line(path: Path, line: int, fault: str) -> SweepFileError:
+    """The error about a line of a file."""
+    return SweepFileError(f"'{path}', line {line}: {fault}; take the line out and its run is made again")
+
+
+def line_of(run: int, rows: Mapping[int, Row]) -> int:
+    """In which line of its file a row stands, counted from 1: rows are in the order of the lines."""
+    return list(rows).index(run) + 1
+
+
+def fault_of_values(names: Iterable[str], expected: Sequence[Value | None], found: Sequence[Any]) -> str:
+    """The first value that is not the expected one; None stands for any number or word."""
+    for name, wanted, value in zip(names, expected, found, strict=True):
+        if not _is_number(value) and not is_text(value):
+            return f"{name}: expected a finite number or a word, found {_short(value)}"
+        if wanted is not None and not _close(wanted, value):
+            return f"{name}: expected {_short(wanted)}, found {_short(value)}"
+    return ""
+
+
+def _fault_of_ending(status: Any, cause: Any, stop_time: Any, duration: float) -> str:
+    if status not in (COMPLETED, STOPPED, REFUSED):
+        return f"status: expected {COMPLETED}, {STOPPED} or {REFUSED}, found {_short(status)}"
+    if (cause is not None) if status == COMPLETED else not is_text(cause):
+        expected = "none" if status == COMPLETED else "why the run ended"
+        return f"cause: expected {expected}, found {_short(cause)}"
+    if stop_time is None:
+        return ""
+    if status != STOPPED or not _is_number(stop_time) or not 0 <= stop_time <= duration * (1 + CLOSE):
+        expected = f"a time from 0 to {duration:g}" if status == STOPPED else "none"
+        return f"stop_time: expected {expected}, found {_short(stop_time)}"
+    return ""
+
+
+def _fault_of_measures(status: str, measured: Sequence[Any]) -> str:
+    for name, value in zip(MEASURES, measured, strict=True):
+        if value is None:
+            continue
+        if status != COMPLETED:
+            return f"{name}: expected none of a run that {status}, found {_short(value)}"
+        if not _is_number(value) or value < 0:
+            return f"{name}: expected a finite number of at least 0, found {_short(value)}"
+    return ""
+
+
+def _decoded(line: bytes) -> Any:
+    try:
+        return json.loads(line)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _close(a: Value, b: Any) -> bool:
+    if isinstance(a, str) or isinstance(b, str):
+        return a == b
+    return math.isclose(a, b, rel_tol=CLOSE)
+
+
+def _is_number(value: Any) -> bool:
+    if type(value) is int:
+        return abs(value) < 2**1000  # larger ones are no floats, and cannot even be compared with one
+    return type(value) is float and math.isfinite(value)
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 80 else text[:77] + "..."

@@ -1,0 +1,85 @@
+"""Do velocity and acceleration of a desired motion belong to its position? Checked before anything runs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..checks import finite_array
+from ..errors import InputError, TrajectoryError
+from . import rotations
+from .cell import Cell
+from .derivatives import Displacement, Misfit, difference, find_misfit, look_at
+from .pose import PoseSpace
+from .trajectories import Motion
+
+PARTS = ("position", "velocity", "acceleration")
+
+
+def check_motions(cell: Cell, times: np.ndarray) -> None:
+    """Compare the derivatives of all desired motions with differences, between their breaks.
+
+    In `PoseSpace` the velocity is the angular velocity w of R' = [w] R. A space of another kind may offer
+    `displacement(start, end)`, the way from one position to another, (..., m), if its velocities are no
+    derivatives of its coordinates.
+
+    Args:
+        cell: the robots and what is desired of them.
+        times: instants of the run, (T,), s.
+
+    Raises:
+        TrajectoryError: a derivative that is off by more than 2 % of its largest value. The message names the
+            robot, the derivative, the time and both values.
+        SimulationError: a motion fails or is not finite, see `Cell.motion`.
+    """
+    start, stop = float(times[0]), float(times[-1])
+    count = int(np.clip(1000 // cell.n, 4, 24))
+    for robot in range(cell.n):
+        _check_motion(cell, robot, start, stop, count)
+
+
+def pose_displacement(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """From one pose to another, (..., 6): a translation and, in world axes, a rotation vector."""
+    turn = rotations.exp(end[..., 3:]) @ np.swapaxes(rotations.exp(start[..., 3:]), -1, -2)
+    return np.concatenate((end[..., :3] - start[..., :3], rotations.log(turn)), axis=-1)
+
+
+def _check_motion(cell: Cell, robot: int, start: float, stop: float, count: int) -> None:
+    windows = look_at(start, stop, cell.members[robot].trajectory.breaks, count)
+    pose = isinstance(cell.space, PoseSpace)
+    groups = [slice(0, 3), slice(3, 6)] if pose else [slice(0, cell.m)]
+    way = pose_displacement if pose else getattr(cell.space, "displacement", difference)
+    largest = np.abs(_motion(cell, robot, windows.start).x).max()
+    ways: tuple[Displacement, Displacement] = (way, difference)
+    for order, displacement in enumerate(ways):
+
+        def sample(t: np.ndarray, order: int = order) -> tuple[np.ndarray, np.ndarray]:
+            motion = _motion(cell, robot, t)
+            return motion[order], motion[order + 1]
+
+        misfit = find_misfit(sample, windows, groups, order * largest / stop, displacement)
+        if misfit is not None:
+            raise _error(cell, cell.names[robot], order, misfit)
+
+
+def _motion(cell: Cell, robot: int, times: np.ndarray) -> Motion:
+    """The motion at some times, known to be numbers."""
+    try:
+        parts = zip(PARTS, cell.motion(robot, times), strict=True)
+        return Motion(*(finite_array(part, value, (len(times), cell.m)) for part, value in parts))
+    except InputError as error:
+        name, end = cell.names[robot], times.max()
+        raise TrajectoryError(f"{name}, trajectory, {error}, between t = 0 s and {end:g} s") from None
+
+
+def _error(cell: Cell, name: str, order: int, misfit: Misfit) -> TrajectoryError:
+    label = cell.labels[misfit.coordinate]
+    units = cell.space.unit.split(", ")
+    unit = units[-1] if misfit.coordinate >= 3 else units[0]
+    per = ("/s", "/s^2")[order]
+    function, derivative = PARTS[order : order + 2]
+    return TrajectoryError(
+        f"{name}, trajectory: its {derivative} along {label} does not fit its {function}: near "
+        f"t = {misfit.time:.6g} s found {misfit.found:.6g} {unit}{per}, but the {function} changes by "
+        f"{misfit.expected:.6g} {unit}{per}; expected its derivative, which SmoothTrajectory finds by "
+        "itself, or `breaks` where it jumps"
+    )

@@ -1,0 +1,156 @@
+"""Desired motion given by its position alone: velocity and acceleration are found, and certified.
+
+Between its breaks a motion becomes Chebyshev polynomials, see `chebyshev`, whose derivatives are exact. They
+are off by at most 1e-8 of the size of the motion times its fastest rate, or the motion is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..checks import finite_array, instance, positive_number
+from ..errors import InputError, TrajectoryError
+from . import rotations
+from .chebyshev import ACCURACY, Function, NotSmoothError, SmoothFunction, certify
+from .poses import Turning
+from .trajectories import Motion
+
+PARTS = ("position", "velocity", "acceleration")
+
+
+class SmoothTrajectory:
+    """A desired motion given by a Python function of one time for its position alone.
+
+    Args:
+        position: function of t returning (m,); smooth between the breaks.
+        duration: it can be used from 0 to this time, s.
+        breaks: instants at which a derivative jumps, s.
+
+    Raises:
+        InputError: no function, a duration that is not positive, or breaks that are no numbers.
+        TrajectoryError: not finite vectors of one size, or not smooth enough for a relative error of 1e-8.
+    """
+
+    def __init__(self, position: Callable[[float], ArrayLike], duration: float, breaks: Sequence[float] = ()):
+        instance("position", position, Callable, "a function of time")  # type: ignore[arg-type]
+        self.dimension = int(np.size(position(0.0)))
+
+        def rows(t: float) -> np.ndarray:
+            return _value("position", position, t, (self.dimension,))[None, :, None]
+
+        self._pieces = _Pieces(rows, duration, breaks)
+        self.duration, self.breaks = self._pieces.duration, self._pieces.breaks
+
+    def __call__(self, t: ArrayLike) -> Motion:
+        """Motion at t, in s.
+
+        Raises:
+            TrajectoryError: t is outside the time it was made for.
+        """
+        times = np.asarray(t, dtype=float)
+        parts = self._pieces.at(times.ravel())
+        return Motion(*(part.reshape(*times.shape, self.dimension) for part in parts))
+
+
+class SmoothOrientation:
+    """A desired orientation given by a Python function of one time for its rotation alone.
+
+    The angular velocity is that of R' = [w] R, in world axes.
+
+    Args:
+        rotation: function of t returning a rotation matrix, (3, 3); smooth between the breaks.
+        duration: it can be used from 0 to this time, s.
+        breaks: instants at which a derivative jumps, s.
+
+    Raises:
+        InputError: no function, a duration that is not positive, or breaks that are no numbers.
+        TrajectoryError: no rotation matrices, or not smooth enough for a relative error of 1e-8.
+    """
+
+    def __init__(self, rotation: Callable[[float], ArrayLike], duration: float, breaks: Sequence[float] = ()):
+        instance("rotation", rotation, Callable, "a function of time")  # type: ignore[arg-type]
+
+        def matrices(t: float) -> np.ndarray:
+            value = _value("rotation", rotation, t, (3, 3))
+            try:
+                return rotations.rotation_matrix("rotation", value)[None]
+            except InputError as error:
+                raise TrajectoryError(f"orientation at t = {t:g} s: {error}") from error
+
+        self._pieces = _Pieces(matrices, duration, breaks)
+        self.duration, self.breaks = self._pieces.duration, self._pieces.breaks
+
+    def __call__(self, t: ArrayLike) -> Turning:
+        """Orientation at t, in s.
+
+        Raises:
+            TrajectoryError: t is outside the time it was made for.
+        """
+        times = np.asarray(t, dtype=float)
+        parts = self._pieces.at(times.ravel()).reshape(3, *times.shape, 3, 3)
+        R, R_dot, R_ddot = parts
+        w = _axial(R_dot @ R.mT)
+        w_dot = _axial(R_ddot @ R.mT + R_dot @ R_dot.mT)
+        return Turning(_orthonormal(R), w, w_dot)
+
+
+class _Pieces:
+    """A certified function of shape (1, a, b) from 0 to `duration`, with breaks."""
+
+    def __init__(self, function: Function, duration: float, breaks: Sequence[float]):
+        self.duration = positive_number("duration", duration)
+        self.breaks = tuple(finite_array("breaks", breaks, (None,)).tolist())
+        inner = sorted({b for b in self.breaks if 0 < b < self.duration})
+        self._starts = np.array([0.0, *inner])
+        ends = [*inner, self.duration]
+        spans = zip(self._starts.tolist(), ends, strict=True)
+        self._parts = [_certified(function, start, end) for start, end in spans]
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """The function and two derivatives, (3, T, a, b), at a break from the right."""
+        slack = ACCURACY * self.duration
+        outside = (times < -slack) | (times > self.duration + slack)
+        if outside.any():
+            raise TrajectoryError(
+                f"expected a time from 0 to {self.duration:g} s, for which the motion was made, found "
+                f"t = {times[np.argmax(outside)]:g} s; make it for a longer duration"
+            )
+        where = np.clip(np.searchsorted(self._starts, times, side="right") - 1, 0, None)
+        out = np.empty((3, len(times), *self._parts[0].shape[1:]))
+        for k in np.unique(where):
+            chosen = where == k
+            out[:, chosen] = self._parts[k].at(times[chosen] - self._starts[k])[:, :, 0]
+        return out
+
+
+def _certified(function: Function, start: float, end: float) -> SmoothFunction:
+    """The function between two breaks, at which it does not jump itself."""
+    try:
+        return certify(lambda s: function(min(start + s, end)), end - start)
+    except NotSmoothError as error:
+        raise TrajectoryError(
+            f"the {PARTS[error.order]} cannot be found with a relative error below {ACCURACY:g}: near "
+            f"t = {start + error.time:g} s it is off by {ACCURACY * error.error:.2g}; expected a smooth "
+            "function of time that is not noisy, with `breaks` where a derivative jumps"
+        ) from None
+
+
+def _value(name: str, function: Callable, t: float, shape: tuple[int, ...]) -> np.ndarray:
+    try:
+        return finite_array(name, function(t), shape)
+    except InputError as error:
+        raise TrajectoryError(f"{error} at t = {t:g} s") from error
+
+
+def _axial(A: np.ndarray) -> np.ndarray:
+    """The w of the skew part of A = [w], (..., 3, 3) -> (..., 3)."""
+    skew = 0.5 * (A - A.mT)
+    return np.stack((skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]), axis=-1)
+
+
+def _orthonormal(R: np.ndarray) -> np.ndarray:
+    """The rotation next to a matrix that is one but for 1e-8: a step of Newton's method."""
+    return 1.5 * R - 0.5 * R @ R.mT @ R

@@ -1,0 +1,188 @@
+"""Who stops a run is named with its joint, whatever it met on its way to infinity, alike in both engines."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from cells import SMALL_GAINS, small_cell
+
+from synctrl import (
+    CartesianSpace,
+    Cell,
+    Coupling,
+    Cubic,
+    Disturbance,
+    Experiment,
+    Friction,
+    Gains,
+    Hold,
+    Member,
+    load_robot,
+)
+from synctrl.errors import NonFiniteError, OrientationError, SimulationError, SingularJacobianError
+from synctrl.experiments import a460_pair, planar_four, ur5_payload
+
+ARM = load_robot("planar2r")
+ENGINES = ("pinocchio", "compiled")
+
+
+@pytest.fixture(autouse=True)
+def _compiled_is_there() -> None:
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+
+
+def small(*pushes: Disturbance, members: dict[str, Any] | None = None, **gains: Any) -> Experiment:
+    """Two planar arms, with changes of their members: one value for each."""
+    cell = small_cell()
+    changed = [
+        replace(m, **{name: value[i] for name, value in (members or {}).items()})
+        for i, m in enumerate(cell.members)
+    ]
+    made = Cell(changed, cell.coupling, cell.space, cell.name)
+    return Experiment(made, SMALL_GAINS.replace(**gains), 0.5, pushes)
+
+
+def in_joint_space(**gains: Any) -> Experiment:
+    members = [Member(ARM, Cubic([0.0, 1.0], [1.0, 0.5 + i], 0.5)) for i in range(2)]
+    return Experiment(Cell(members, Coupling.pair()), SMALL_GAINS.replace(**gains), 1.0)
+
+
+def stretched() -> Experiment:
+    """Robot 2 is pushed gently until its elbow is nearly straight."""
+    cell = small_cell()
+    strict = Cell(cell.members, cell.coupling, CartesianSpace("xy", max_condition=5))
+    return Experiment(strict, SMALL_GAINS, 1.0, [Disturbance(1, (0.0, -8.0), 0.1, 0.4)])
+
+
+def carried_through() -> Experiment:
+    """Robot 2 swings through its outstretched pose."""
+    postures = ([0.0, 1.0], [0.0, 0.8])
+    paths = [Hold(ARM.tip_position(q)[:2]) for q in postures]
+    members = [Member(ARM, paths[0], postures[0]), Member(ARM, paths[1], postures[1], v0=[4.0, -12.0])]
+    weak = Gains(Lambda=0.1, beta=0.0, K_r=0.01, K_eps=0.0, Gamma=0.0)
+    return Experiment(Cell(members, Coupling.pair(), CartesianSpace("xy")), weak, 0.5)
+
+
+def turned() -> Experiment:
+    """The wrist of robot 1 starts almost half a turn away."""
+    experiment = ur5_payload()
+    cell = experiment.cell
+    first = replace(cell.members[0], q0=cell.q0[0] + np.array([0, 0, 0, 0, 0, 3.1]))
+    return replace(experiment, cell=Cell([first, *cell.members[1:]], cell.coupling, cell.space))
+
+
+def one_row(robot: int, joint: int, large: float) -> np.ndarray:
+    """K_r that is large at one joint."""
+    K_r = np.ones((2, 2))
+    K_r[robot, joint] = large
+    return K_r
+
+
+def four(**gains: float) -> Experiment:
+    return planar_four(gains=planar_four().gains.replace(**gains))
+
+
+class Row(NamedTuple):
+    """What is run, and who is to blame; None where any will do."""
+
+    make: Callable[[], Experiment]
+    cause: str
+    robot: int | None = None
+    joint: int | None = None
+    kind: type[SimulationError] = NonFiniteError
+    options: dict[str, Any] = {}  # noqa: RUF012
+
+
+TABLE = {
+    "Lambda": Row(lambda: small(Lambda=1e6), "Lambda"),
+    "Lambda of four arms": Row(lambda: four(Lambda=1e6), "Lambda"),
+    "beta": Row(lambda: small(beta=1e5), "beta"),
+    "Gamma": Row(lambda: small(Gamma=1e5), "Gamma"),
+    "Gamma of four arms": Row(lambda: four(Gamma=1e5), "Gamma"),
+    "Gamma in joint space": Row(lambda: in_joint_space(Gamma=1e8), "Gamma"),
+    "K_eps": Row(lambda: small(K_eps=1e7), "K_eps"),
+    "K_r": Row(lambda: in_joint_space(K_r=1e6), "K_r", joint=1),
+    "a light joint of robot 1": Row(lambda: small(K_r=one_row(0, 1, 300.0)), "K_r", 0, 1),
+    "a light joint of robot 2": Row(lambda: small(K_r=one_row(1, 1, 300.0)), "K_r", 1, 1),
+    "a step": Row(small, "step", options={"dt": 0.25}),
+    "a step of four arms": Row(planar_four, "step", options={"dt": 0.25, "duration": 3.0}),
+    "a step for friction": Row(
+        lambda: small(members={"friction": [Friction(viscous=50.0), Friction()]}), "step", 0, 1,
+        options={"dt": 4e-3},
+    ),
+    "friction": Row(lambda: small(members={"friction": [Friction(), Friction(500.0)]}), "friction", 1, 1),
+    "a period": Row(planar_four, "period", options={"control_period": 0.03}),
+    "a period for K_r": Row(lambda: small(K_r=30.0), "period", joint=1, options={"control_period": 4e-3}),
+    "Gamma for a period": Row(lambda: small(Gamma=1e4), "Gamma", options={"control_period": 2e-3}),
+    "a push of 1e300 on robot 1": Row(
+        lambda: small(Disturbance(0, (1e300, 0.0), 0.1, 0.2)), "disturbance", 0, 0
+    ),
+    "a push of 1e300 on joint 2": Row(
+        lambda: small(Disturbance(1, (0.0, 1e300), 0.1, 0.2)), "disturbance", 1, 1
+    ),
+    "a push before another": Row(
+        lambda: small(Disturbance(0, (1e9, 0.0), 0.1, 0.2), Disturbance(1, (1e12, 0.0), 0.3, 0.4)),
+        "disturbance", 0, 0,
+    ),
+    "a strong push": Row(lambda: small(Disturbance(0, (3e3, 0.0), 0.1, 0.2)), "disturbance", 0, 0),
+    "a fast start": Row(lambda: small(members={"v0": [[0, 0], [0, 1e3]]}), "start", 1, 1),
+    "a wrong guess": Row(
+        lambda: small(members={"theta_hat0": [np.zeros(20), np.full(20, 1e9)]}), "start", 1
+    ),
+    "a path to the border": Row(stretched, "singular", 1, None, SingularJacobianError),
+    "a swing through the border": Row(carried_through, "singular", 1, None, SingularJacobianError),
+    "a turned wrist": Row(turned, "orientation", 0, None, OrientationError),
+}  # fmt: skip
+
+
+def stop(row: Row, engine: str) -> SimulationError:
+    with pytest.raises(SimulationError) as caught:
+        row.make().simulate(engine=engine, **row.options)
+    return caught.value
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_who_stopped_a_run_is_named_by_both_engines_in_the_same_words(name: str) -> None:
+    row = TABLE[name]
+    one, other = (stop(row, engine) for engine in ENGINES)
+    assert (one.cause, type(one)) == (row.cause, row.kind)
+    assert row.robot in (None, one.robot) and row.joint in (None, one.joint)
+    for attribute in ("cause", "robot", "joint", "time"):
+        assert getattr(one, attribute) == getattr(other, attribute)
+    assert (type(one), str(one)) == (type(other), str(other))
+    assert row.make().cell.names[one.robot] in str(one)
+    assert one.joint is None or f"joint {one.joint + 1} of" in str(one)
+
+
+@pytest.mark.parametrize("name", ["a step", "a step of four arms", "a period", "a period for K_r"])
+def test_a_step_or_period_that_is_said_to_do_does(name: str) -> None:
+    row = TABLE[name]
+    found = re.search(r"needs at most (\S+) s", str(stop(row, "compiled")))
+    assert found is not None
+    longest = float(found[1])
+    if "control_period" in row.options:
+        options: dict[str, Any] = {"dt": longest, "control_period": longest}
+    else:
+        options = {"dt": longest}
+    assert row.make().simulate(engine="compiled", **options).status == "completed"
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("robot", [0, 1])
+def test_the_robot_with_the_high_gain_is_named_not_the_one_it_drags_along(robot: int, engine: str) -> None:
+    K_r = np.full((2, 3), 80.0)
+    K_r[robot, 2] *= 100
+    error = stop(Row(lambda: a460_pair(gains=a460_pair().gains.replace(K_r=K_r)), "K_r"), engine)
+    assert (error.cause, error.robot, error.joint) == ("K_r", robot, 2)
+    assert f"K_r = {K_r[robot, 2]:g}" in str(error)
+
+
+def test_what_was_computed_until_then_says_why_too() -> None:
+    error = stop(TABLE["a light joint of robot 2"], "pinocchio")
+    assert error.result.status == f"stopped: {error}"
+    assert np.isfinite(error.result.q).all()
