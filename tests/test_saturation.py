@@ -67,7 +67,9 @@ def test_the_applied_torque_is_what_moves_the_robots():
 def test_the_warning_says_what_was_learned_meanwhile():
     with pytest.warns(SaturationWarning) as caught:
         run = pair(way=60.0).simulate()
-    (text,) = [str(warning.message) for warning in caught]
+    (warning,) = [each for each in caught if each.category is SaturationWarning]
+    text = str(warning.message)
+    assert warning.filename == __file__
     start, largest = max((entry["theta_hat"] for entry in run.info["saturation"]), key=lambda pair: pair[1])
     assert f"theta_hat went from {start:.3g} to {largest:.3g}" in text
     assert "Estimates and integrals" in text

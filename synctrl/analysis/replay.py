@@ -20,6 +20,7 @@ from ..simulation.recorder import ADAPTATION_STATE, PLANT_STATE, own_states
 from ..simulation.result import LAYOUT, Result
 from ..simulation.simulate import Experiment
 from ..tasks.cell import Reference
+from .jumps import Stretch, jumps_in, stretches, tolerance
 
 #: instants whose references are evaluated together
 BLOCK = 256
@@ -83,14 +84,6 @@ class Row(NamedTuple):
     Y_size: np.ndarray
 
 
-class Stretch(NamedTuple):
-    """A part of the log in which nothing jumps: instants `first` to `last`, and their rows."""
-
-    first: int
-    last: int
-    rows: slice
-
-
 @dataclass(frozen=True, eq=False)
 class Replay:
     """The instants of a run, gone through again.
@@ -131,13 +124,13 @@ def replay(result: Result, experiment: Experiment | None = None) -> Replay:
     _check_sizes(result, loop)
     _check_numbers(result)
     schedule = DisturbanceSchedule(loop.cell, experiment.disturbances)
-    jumps, crossed = _jumps(result.t, loop, schedule)
+    jumps, crossed = jumps_in(result.t, loop, schedule)
     rows = Row(*(np.array(column) for column in zip(*_rows(result, loop, schedule, jumps), strict=True)))
     instants = np.arange(len(result.t))
     logged = instants + np.searchsorted(jumps, instants, side="right")
     _check_same(result, Row(*(column[logged] for column in rows)))
     learning = _learning(loop, result)
-    return Replay(result, experiment, loop, rows, logged, _stretches(logged, jumps, crossed), learning)
+    return Replay(result, experiment, loop, rows, logged, stretches(logged, jumps, crossed), learning)
 
 
 def experiment_of(result: Result, experiment: Experiment | None) -> Experiment:
@@ -156,39 +149,6 @@ def experiment_of(result: Result, experiment: Experiment | None) -> Experiment:
     return experiment
 
 
-# -- jumps ------------------------------------------------------------------------------------------------
-
-
-def _jumps(t: np.ndarray, loop: ClosedLoop, schedule: DisturbanceSchedule) -> tuple[list[int], list[int]]:
-    """Logged instants at which something jumps, and those before a jump that falls between two."""
-    edges = (*schedule.edges, *loop.plant.schedule.edges)
-    tolerance = _tolerance(t)
-    on_log, between = set(), set()
-    for jump in (*edges, *loop.cell.breaks):
-        if t[0] < jump < t[-1]:
-            nearest = int(np.abs(t - jump).argmin())
-            if abs(t[nearest] - jump) <= tolerance:
-                on_log.add(nearest)
-            else:
-                between.add(int(np.searchsorted(t, jump)) - 1)
-    return sorted(on_log - {0, len(t) - 1}), sorted(between)
-
-
-def _tolerance(t: np.ndarray) -> float:
-    """How far a jump may be from a logged instant that stands for it, s."""
-    return 1e-9 * float(np.diff(t).max(initial=0.0))
-
-
-def _stretches(logged: np.ndarray, jumps: list[int], crossed: list[int]) -> tuple[Stretch, ...]:
-    starts = sorted([0, *jumps, *(k + 1 for k in crossed)])
-    ends = sorted([*jumps, *crossed, len(logged) - 1])
-    return tuple(
-        Stretch(a, b, slice(int(logged[a]), int(logged[b]) + 1 - (b in jumps)))
-        for a, b in zip(starts, ends, strict=True)
-        if b > a
-    )
-
-
 # -- rows -------------------------------------------------------------------------------------------------
 
 
@@ -197,7 +157,7 @@ def _rows(result: Result, loop: ClosedLoop, schedule: DisturbanceSchedule, jumps
     for start in range(0, len(t), BLOCK):
         for k, reference in enumerate(references(t[start : start + BLOCK]), start):
             if k in jumps:
-                from_left, left = references(np.array([before(t[k])]))[0], t[k] - 2 * _tolerance(t)
+                from_left, left = references(np.array([before(t[k])]))[0], t[k] - 2 * tolerance(t)
                 yield _row(result, loop.at(left), bodies, k, from_left, schedule.torque(left))
             yield _row(result, loop.at(t[k]), bodies, k, reference, result.disturbance[k])
 

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..control.adaptation import Seen
 from ..robots.regressors import regressors
 from ..tasks.cell import Reference
 from .closed_loop import ClosedLoop
@@ -120,7 +121,7 @@ def _maps(
     wanted = cell.task.to_joints(task, *task.rates)
     if driven:
         integral = np.zeros((cell.coupling.pairs, cell.m))
-        signals = loop.controller.evaluate(reference, motion, cell.theta_hat0, integral)
+        signals = loop.controller.evaluate(reference, motion, loop.controller.adaptation.start(), integral)
         wanted = signals.v_ref, signals.a_ref
     regressor = regressors(cell.parameters, [robot.nv for robot in cell.robots])
     Y = regressor(*motion, *wanted).matrices()
@@ -137,7 +138,27 @@ def _matrices(
     damping = np.diag(K_r[:nv]) if controller.k_r_space == "joint" else J.T @ np.diag(K_r) @ J
     cJ = reference.c[i] @ J
     coupling = _largest_share(loop) * cJ.T @ np.diag(controller.K_eps) @ cJ
-    return damping, [("K_eps", coupling), ("Gamma", Y @ np.diag(controller.Gamma[i]) @ Y.T)]
+    return damping, [("K_eps", coupling), ("Gamma", _learned(loop, i, Y))]
+
+
+def _learned(loop: ClosedLoop, i: int, Y: np.ndarray) -> np.ndarray:
+    """The spring that adaptation is, (nv, nv): Y theta_hat' per velocity error, Y Gamma Y^T with (14)."""
+    cell, adaptation = loop.cell, loop.controller.adaptation
+    z, still = adaptation.start(), np.zeros((cell.n, cell.nv))
+
+    def rate(gradient: np.ndarray) -> np.ndarray:
+        rows = np.zeros(cell.theta.shape)
+        rows[i] = gradient
+        return adaptation.rate(z, Seen(still, still, still, still, still, rows, None))
+
+    rest = rate(np.zeros(Y.shape[1]))
+    changes = [rate(row) - rest for row in Y]
+    steps = [1e-6 / (1.0 + np.abs(change).max()) for change in changes]
+    columns = [
+        (adaptation.estimate(z + h * change) - adaptation.estimate(z - h * change))[i] / (2 * h)
+        for h, change in zip(steps, changes, strict=True)
+    ]
+    return Y @ np.stack(columns, axis=1)
 
 
 def _rate(

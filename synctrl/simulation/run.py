@@ -21,7 +21,6 @@ from .integrators import Sample, adaptive, rk4
 from .recorder import Recorder, SampleRecorder
 from .result import Result
 from .sampled import sampled_rk4
-from .saturation import warn_of_saturation
 from .step_error import StepError, step_report
 
 if TYPE_CHECKING:
@@ -143,9 +142,7 @@ def _finish(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:
             failure = user_failure(error, recorder.reached)
             failure.result = logged(f"stopped: {failure}")
             raise failure from error
-        result = logged("completed")
-    warn_of_saturation(result)
-    return result
+        return logged("completed")
 
 
 def _diagnosed(run: Run, recorder: Recorder, error: SynctrlError) -> SynctrlError:

@@ -60,7 +60,7 @@ def applied_output(plant: Plant, tau: np.ndarray) -> dict[str, Output]:
 
 
 def warn_of_saturation(result: Result) -> None:
-    """Warn if torque was cut off: the controller does not know, and goes on adapting and integrating."""
+    """Warn the caller of the caller if torque was cut off while the controller went on as if it were not."""
     found = result.info["saturation"]
     if not found:
         return
@@ -75,5 +75,5 @@ def warn_of_saturation(result: Result) -> None:
         f"entry of theta_hat went from {start:.3g} to {largest:.3g}{grown}. See info['saturation'] and "
         f"outputs['{APPLIED}']; lower the gains, or ask for a slower motion",
         SaturationWarning,
-        stacklevel=2,
+        stacklevel=3,
     )

@@ -23,6 +23,7 @@ from .plant import PHYSICS, Plant
 from .result import Result
 from .run import Run, run_adaptive, run_compiled, run_reference
 from .sampled import steps_per_sample
+from .saturation import warn_of_saturation
 from .step_error import StepError, warn_of_step
 
 
@@ -135,9 +136,11 @@ class Experiment:
             _needs_rk4(integrator, engine, control_period)
         run.check()
         if integrator != "rk4":
-            return run_adaptive(run, integrator, *tolerances, progress)
-        result = run_compiled(run, progress) if engine == "compiled" else run_reference(run, progress)
+            result = run_adaptive(run, integrator, *tolerances, progress)
+        else:
+            result = run_compiled(run, progress) if engine == "compiled" else run_reference(run, progress)
         warn_of_step(result.info["step_error"], result.names, dt)
+        warn_of_saturation(result)
         return result
 
     def controller(

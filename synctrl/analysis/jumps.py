@@ -1,0 +1,54 @@
+"""Where something jumps in the log of a run, and the parts in between in which nothing does."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..simulation.closed_loop import ClosedLoop
+from ..simulation.disturbances import DisturbanceSchedule
+
+
+class Stretch(NamedTuple):
+    """A part of the log in which nothing jumps: instants `first` to `last`, and their rows."""
+
+    first: int
+    last: int
+    rows: slice
+
+
+def jumps_in(t: np.ndarray, loop: ClosedLoop, schedule: DisturbanceSchedule) -> tuple[list[int], list[int]]:
+    """Logged instants at which something jumps, and those before a jump that falls between two."""
+    edges = (*schedule.edges, *loop.plant.schedule.edges)
+    close = tolerance(t)
+    on_log, between = set(), set()
+    for jump in (*edges, *loop.cell.breaks):
+        if t[0] < jump < t[-1]:
+            nearest = int(np.abs(t - jump).argmin())
+            if abs(t[nearest] - jump) <= close:
+                on_log.add(nearest)
+            else:
+                between.add(int(np.searchsorted(t, jump)) - 1)
+    return sorted(on_log - {0, len(t) - 1}), sorted(between)
+
+
+def tolerance(t: np.ndarray) -> float:
+    """How far a jump may be from a logged instant that stands for it, s."""
+    return 1e-9 * float(np.diff(t).max(initial=0.0))
+
+
+def stretches(logged: np.ndarray, jumps: list[int], crossed: list[int]) -> tuple[Stretch, ...]:
+    """The parts of a log between jumps.
+
+    Args:
+        logged: row of every logged instant, (T,).
+        jumps, crossed: as `jumps_in` gives them.
+    """
+    starts = sorted([0, *jumps, *(k + 1 for k in crossed)])
+    ends = sorted([*jumps, *crossed, len(logged) - 1])
+    return tuple(
+        Stretch(a, b, slice(int(logged[a]), int(logged[b]) + 1 - (b in jumps)))
+        for a, b in zip(starts, ends, strict=True)
+        if b > a
+    )
