@@ -160,7 +160,7 @@ def energy(loop, y, now) -> float:
     )
     wrong = loop.cell.theta - theta_hat
     stored = (k.K_eps * now.epsilon**2).sum() + (k.K_eps * k.Lambda * k.beta * now.E**2).sum()
-    return 0.5 * (kinetic + (wrong**2 / k.Gamma).sum() + stored)
+    return 0.5 * (kinetic + (wrong**2 / k.adaptation.Gamma).sum() + stored)
 
 
 def power(loop, now) -> float:
