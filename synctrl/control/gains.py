@@ -59,7 +59,7 @@ class Gains:
         """
         return replace(self, beta=np.zeros_like(self.beta), K_eps=np.zeros_like(self.K_eps))
 
-    def replace(self, **changes: ArrayLike) -> Self:
+    def replace(self, **changes: ArrayLike | None) -> Self:
         """These gains with some of them changed."""
         unknown = set(changes) - set(_SIGNS)
         if unknown:

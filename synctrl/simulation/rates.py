@@ -30,6 +30,8 @@ from .closed_loop import ClosedLoop
 RUNGE_KUTTA, SWING = 2.0, 2.83
 #: the same for rate and period of torque that is held
 HELD, HELD_SPRING = 2.0, 1.0
+#: gains are cut off here, so that rates do not overflow
+HUGE = 1e200
 
 
 class Rate(NamedTuple):
@@ -102,8 +104,8 @@ def _task_rates(loop: ClosedLoop) -> list[tuple[str, float]]:
     """Lambda, and beta times the largest eigenvalue of S^T S, 1/s."""
     controller = loop.controller
     return [
-        ("Lambda", float(controller.Lambda.max())),
-        ("beta", float(controller.beta.max()) * _largest_share(loop)),
+        ("Lambda", min(float(controller.Lambda.max()), HUGE)),
+        ("beta", min(float(controller.beta.max()), HUGE) * _largest_share(loop)),
     ]
 
 
@@ -134,10 +136,11 @@ def _matrices(
 ) -> tuple[np.ndarray, list[tuple[str, np.ndarray]]]:
     """Damping, (nv, nv), and springs of a robot."""
     controller = loop.controller
-    K_r, nv = controller.K_r[i], J.shape[1]
+    nv = J.shape[1]
+    K_r, K_eps = (np.minimum(gain, HUGE) for gain in (controller.K_r[i], controller.K_eps))
     damping = np.diag(K_r[:nv]) if controller.k_r_space == "joint" else J.T @ np.diag(K_r) @ J
     cJ = reference.c[i] @ J
-    coupling = _largest_share(loop) * cJ.T @ np.diag(controller.K_eps) @ cJ
+    coupling = _largest_share(loop) * cJ.T @ np.diag(K_eps) @ cJ
     return damping, [("K_eps", coupling), ("Gamma", _learned(loop, i, Y))]
 
 
@@ -158,17 +161,17 @@ def _learned(loop: ClosedLoop, i: int, Y: np.ndarray) -> np.ndarray:
         (adaptation.estimate(z + h * change) - adaptation.estimate(z - h * change))[i] / (2 * h)
         for h, change in zip(steps, changes, strict=True)
     ]
-    return Y @ np.stack(columns, axis=1)
+    return np.clip(np.nan_to_num(Y @ np.stack(columns, axis=1)), -HUGE, HUGE)
 
 
 def _rate(
     gain: str, i: int, M: np.ndarray, A: np.ndarray, spring: bool = False, sampled: bool = False
 ) -> Rate:
     """The largest eigenvalue of M^-1 A, or its root for a spring, with the joint that its mode moves most."""
-    if not (np.isfinite(A).all() and np.isfinite(M).all()):
+    if np.isnan(A).any():  # at a singular configuration
         return Rate(gain, i, None, 0.0, spring)
     L_inv = np.linalg.inv(np.linalg.cholesky(M))
-    values, vectors = np.linalg.eigh(L_inv @ A @ L_inv.T)
+    values, vectors = np.linalg.eigh(L_inv @ np.clip(A, -HUGE, HUGE) @ L_inv.T)
     value = max(float(values[-1]), 0.0)
     joint = int(np.abs(L_inv.T @ vectors[:, -1]).argmax())
     return Rate(gain, i, joint, np.sqrt(value) if spring and not sampled else value, spring)

@@ -58,6 +58,10 @@ class Recorder:
         """The part of every array not logged yet, in the order of `LAYOUT`, to be filled from outside."""
         return [array[self.count :] for array in self._rows]
 
+    def address_ahead(self, name: str) -> int | None:
+        """Where the part of an array begins that is not logged yet; None if there is no such array."""
+        return self._arrays[name][self.count :].ctypes.data if name in self._arrays else None
+
     def advance(self, times: np.ndarray) -> None:
         """Count rows that were filled from outside."""
         self._rows[0][self.count : self.count + len(times)] = times

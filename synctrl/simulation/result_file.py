@@ -8,6 +8,7 @@ ResultError.
 from __future__ import annotations
 
 import json
+import os
 import re
 import struct
 import zipfile
@@ -66,11 +67,13 @@ def read_result(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """
     if not path.is_file():
         raise ResultError(f"no result file at '{path}'")
-    with _named(path, "no result of synctrl can be read from"), zipfile.ZipFile(path) as archive:
-        members = _members(archive, path.stat().st_size)
-        info = read_json(_read_text(archive, members.pop("info", None)))
-        check_info(info)
-        arrays = _read_arrays(archive, members, info)
+    with _named(path, "no result of synctrl can be read from"), path.open("rb") as file:
+        size = os.fstat(file.fileno()).st_size  # of what is open: there may be another file of that name now
+        with zipfile.ZipFile(file) as archive:
+            members = _members(archive, size)
+            info = read_json(_read_text(archive, members.pop("info", None)))
+            check_info(info)
+            arrays = _read_arrays(archive, members, info)
         check_arrays(info, arrays)
     return info, arrays
 

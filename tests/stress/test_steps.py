@@ -1,4 +1,4 @@
-"""Steps against references of 10 microseconds: every bad run is flagged, and what is advised does."""
+"""Steps against references of 20 microseconds: every bad run is flagged, and what is advised does."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from synctrl.experiments import a460_pair, mobile_robot, planar_four, ur5_payloa
 from synctrl.simulation.step_error import LIMIT
 
 #: step of the references, s; all steps are multiples of it
-FINE = 1e-5
+FINE = 2e-5
 STEPS = (2e-4, 5e-4, 1e-3, 2e-3, 4e-3)
 #: Coulomb friction, N·m, and viscous friction, N·m·s/rad
 FRICTIONS = ((0.0, 0.0), (0.1, 0.1), (0.5, 0.0), (5.0, 0.0), (0.0, 20.0))

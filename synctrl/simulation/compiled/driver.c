@@ -2,14 +2,15 @@
  *
  * The functions of each kind of robot are generated and stand above this text, with the table `kinds`. Arrays
  * are row-major and have one row per robot; rows are padded to the largest robot. The state y is
- * q (n, nv), v (n, nv), theta_hat (n, P), integrals of epsilon (p, m), one after another.
+ * q (n, nv), v (n, nv), z of the adaptation (n, Z), integrals of epsilon (p, m), one after another; with (14) z is
+ * theta_hat.
  */
 
 #include <math.h>
 #include <string.h>
 
 typedef struct {
-    int n, m, nv, P, p, bodies; /* bodies: 10 times the largest number of bodies */
+    int n, m, nv, P, Z, p, bodies; /* Z: state of the adaptation; bodies: 10 times the largest number of bodies */
     const int *kind;            /* per robot */
     const int *edge;            /* (p, arity) robots that are compared */
     const double *sign;         /* (p, arity) entries of S */
@@ -36,7 +37,7 @@ typedef struct { /* what is desired in one block of steps; stage 0: start, 1: mi
 } Reference;
 
 typedef struct { /* one row per logged instant */
-    double *x, *xd, *e, *epsilon, *integral, *e_star, *q, *v, *s_q, *tau, *disturbance, *theta_hat;
+    double *x, *xd, *e, *epsilon, *integral, *e_star, *q, *v, *s_q, *tau, *disturbance, *theta_hat, *z; /* z may be 0 */
 } Log;
 
 typedef struct { /* the worst step of a run: its error in velocity, largest velocity, end, and which joint */
@@ -72,7 +73,7 @@ enum { CHECKED = 1, LOGGED = 2, SAMPLED = 4, JOINED = 8 }; /* JOINED: all goes o
 
 typedef struct { int status, step, robot; double value; long rows; } Report; /* rows: how many were logged */
 
-static int state_size(const Cell *c) { return c->n * (2 * c->nv + c->P) + c->p * c->m; }
+static int state_size(const Cell *c) { return c->n * (2 * c->nv + c->Z) + c->p * c->m; }
 static int J_size(const Cell *c) { return 3 * c->m * c->nv + c->m * c->m; }
 
 static const double *weights_of(const Cell *c, const Reference *r, int stage, int step, int i) {
@@ -142,7 +143,7 @@ static void control(const Cell *c, const Reference *r, int stage, int step, cons
         *a++ = y + (size_t)(n + i) * nv;
         *a++ = trig;
         *a++ = trig + nv;
-        *a++ = y + (size_t)2 * n * nv + (size_t)i * c->P;
+        *a++ = y + (size_t)2 * n * nv + (size_t)i * c->Z;
         for (int part = 0; part < 3; part++) *a++ = share + part * m;
         for (int part = 1; part < 7; part++) *a++ = task + part * m;
         for (int part = 0; part < 4; part++) *a++ = J + (size_t)part * m * nv;
@@ -157,13 +158,13 @@ static void control(const Cell *c, const Reference *r, int stage, int step, cons
         *a++ = c->gain + (size_t)i * nv;
         *a++ = c->base + 12 * i;
         *o++ = k->tau + (size_t)i * nv;
-        *o++ = y_dot + (size_t)2 * n * nv + (size_t)i * c->P;
+        *o++ = y_dot + (size_t)2 * n * nv + (size_t)i * c->Z;
         *o++ = k->e_star + (size_t)i * m;
         *o++ = k->s_q + (size_t)i * nv;
         kind->control(k->arg, k->res, k->iw, k->w, 0);
     }
     for (int pair = 0; pair < c->p; pair++)
-        memcpy(y_dot + n * (2 * nv + c->P) + (size_t)pair * m, k->compared + (size_t)pair * 2 * m,
+        memcpy(y_dot + n * (2 * nv + c->Z) + (size_t)pair * m, k->compared + (size_t)pair * 2 * m,
                sizeof(double) * m);
 }
 
@@ -198,7 +199,7 @@ static void plant(const Cell *c, const double *y, const double *tau, const doubl
 static void evaluate(const Cell *c, const Reference *r, int stage, int step, const double *y,
                      const double *disturbance, double *y_dot, Work *k) {
     measure(c, r, stage, step, y, k);
-    couple(c, y + c->n * (2 * c->nv + c->P), k);
+    couple(c, y + c->n * (2 * c->nv + c->Z), k);
     control(c, r, stage, step, y, y_dot, k);
     plant(c, y, k->tau, disturbance, y_dot, 1, k);
 }
@@ -221,14 +222,22 @@ static void record(const Cell *c, const Reference *r, int step, long row, const 
     }
     for (int pair = 0; pair < c->p; pair++)
         memcpy(log->epsilon + (row * c->p + pair) * m, k->compared + (size_t)pair * 2 * m, sizeof(double) * m);
-    memcpy(log->integral + row * c->p * m, y + n * (2 * nv + c->P), sizeof(double) * c->p * m);
+    memcpy(log->integral + row * c->p * m, y + n * (2 * nv + c->Z), sizeof(double) * c->p * m);
     memcpy(log->e_star + row * n * m, k->e_star, sizeof(double) * n * m);
     memcpy(log->q + row * n * nv, y, sizeof(double) * n * nv);
     memcpy(log->v + row * n * nv, y + n * nv, sizeof(double) * n * nv);
     memcpy(log->s_q + row * n * nv, k->s_q, sizeof(double) * n * nv);
     memcpy(log->tau + row * n * nv, tau, sizeof(double) * n * nv);
     memcpy(log->disturbance + row * n * nv, disturbance, sizeof(double) * n * nv);
-    memcpy(log->theta_hat + row * n * c->P, y + 2 * n * nv, sizeof(double) * n * c->P);
+    for (int i = 0; i < n; i++) {
+        const double *z = y + 2 * (size_t)n * nv + (size_t)i * c->Z;
+        double *theta_hat = log->theta_hat + (row * n + i) * c->P;
+        k->arg[0] = z;
+        k->res[0] = theta_hat;
+        if (kinds[c->kind[i]].estimate) kinds[c->kind[i]].estimate(k->arg, k->res, k->iw, k->w, 0);
+        else memcpy(theta_hat, z, sizeof(double) * c->P);
+    }
+    if (log->z) memcpy(log->z + row * n * c->Z, y + 2 * n * nv, sizeof(double) * n * c->Z);
 }
 
 /* sign of a determinant by elimination with row exchanges; A is destroyed */
@@ -406,7 +415,7 @@ void state_dot(const Cell *c, const Reference *r, const double *y, const double 
 void work_sizes(long long *largest) {
     for (int j = 0; j < 4; j++) largest[j] = 0;
     for (int i = 0; i < KINDS; i++)
-        for (int f = 0; f < 3; f++) {
+        for (int f = 0; f < 4 && kinds[i].sizes[f]; f++) {
             long long need[4];
             kinds[i].sizes[f](need, need + 1, need + 2, need + 3);
             for (int j = 0; j < 4; j++)

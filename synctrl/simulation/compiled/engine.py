@@ -15,7 +15,7 @@ from ..clock import Clock, Stretch
 from ..disturbances import DisturbanceSchedule
 from ..guard import CHECKS, Finding, stopped
 from ..handover import tell, up_to_a_failure
-from ..recorder import Recorder
+from ..recorder import ADAPTATION_STATE, Recorder
 from ..step_error import StepError
 from .program import Program
 from .structs import LogStruct, ReferenceStruct, ReportStruct, StepErrorStruct
@@ -215,6 +215,7 @@ class _Steps:
         )  # fmt: skip
         rows = recorder.rows_ahead()
         log, report = LogStruct(*(row.ctypes.data for row in rows[1:])), ReportStruct()
+        log.z = recorder.address_ahead(ADAPTATION_STATE)
         arrays = [np.ascontiguousarray(times), marks, window.astype(np.intc), self._torques, y]
         call = library.advance if self._every is None else library.advance_sampled
         call.restype = None

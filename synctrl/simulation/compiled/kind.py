@@ -14,6 +14,7 @@ from ...robots.friction_parameters import FrictionParameters
 from ...robots.mechanism import Mechanism, mechanism
 from ...tasks.pose import PoseSpace
 from ...tasks.spaces import CartesianSpace
+from .learning import Learning, trace_learning
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,7 @@ class Kind:
         smoothing: velocity at which adapted Coulomb friction reaches tanh(1), or None without it.
         rotors: whether rotors are adapted too.
         made_of: names of the types that the user has plugged in.
+        learning: how it learns, or None for (14).
     """
 
     fixed: Mechanism
@@ -43,6 +45,7 @@ class Kind:
     smoothing: float | None = None
     rotors: bool = False
     made_of: tuple[str, ...] = ()
+    learning: Learning | None = None
 
     @property
     def nv(self) -> int:
@@ -66,6 +69,11 @@ class Kind:
         return 10 * self.nv if self.matrix is None else self.matrix.shape[1]
 
     @property
+    def learned(self) -> int:
+        """Number of entries of the adaptation's state."""
+        return self.parameters if self.learning is None else self.learning.size
+
+    @property
     def redundant(self) -> bool:
         """Whether there are more joints than task coordinates."""
         return self.nv > self.m
@@ -76,6 +84,7 @@ class Kind:
         matrix = None if self.matrix is None else self.matrix.tolist()
         options: list[Any] = [self.reference_acceleration, self.k_r_space, list(self.gravity)]
         options += [self.smoothing, self.rotors, list(self.made_of)]
+        options += [None if self.learning is None else self.learning.key()]
         return [self.fixed.key(), self.space, list(self.rows), matrix, shared, options]
 
 
@@ -105,17 +114,23 @@ def classify(controller: Controller) -> Classified:
     for name, (_, base) in zip(names, found, strict=True):
         rotations.setdefault(name, set()).add((base.rotation + 0.0).tobytes())  # -0 counts as 0
     kinds: dict[str, Kind] = {}
-    index = []
+    index, learning = [], trace_learning(controller)
     for i, (name, (fixed, base)) in enumerate(zip(names, found, strict=True)):
         same = len(rotations[name]) == 1
-        kind = _kind(controller, i, fixed, base.rotation if same else None)
+        kind = _kind(controller, i, fixed, base.rotation if same else None, learning[i])
         key = repr(kind.key())
         kinds.setdefault(key, kind)
         index.append(list(kinds).index(key))
     return Classified(list(kinds.values()), index, [base for _, base in found])
 
 
-def _kind(controller: Controller, i: int, fixed: Mechanism, rotation: np.ndarray | None) -> Kind:
+def _kind(
+    controller: Controller,
+    i: int,
+    fixed: Mechanism,
+    rotation: np.ndarray | None,
+    learning: Learning | None,
+) -> Kind:
     cell, parameters = controller.cell, controller.cell.parameters[i]
     rigid: Any = parameters.base if isinstance(parameters, FrictionParameters) else parameters
     gravity = cell.robots[i].gravity_vector
@@ -132,6 +147,7 @@ def _kind(controller: Controller, i: int, fixed: Mechanism, rotation: np.ndarray
         getattr(parameters, "smoothing", None),
         getattr(parameters, "armature", False),
         tuple(type(part).__qualname__ for part in (cell.space, parameters, rigid)),
+        learning,
     )
 
 

@@ -91,7 +91,8 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     yield Part("plant", loop.plant, (Plant,))
     yield Part("controller", controller, (Controller,))
     yield Part("law of the controller", controller._command, LAWS)
-    yield Part("adaptation", controller.adaptation, (BoundGradient,))
+    if isinstance(controller.adaptation, BoundGradient):  # others are traced
+        yield Part("adaptation", controller.adaptation, (BoundGradient,))
     yield Part("gains", controller.gains, (Gains,))
     yield Part("cell", cell, (Cell,))
     yield Part("coupling", cell.coupling, (Coupling,))

@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from ...control.adaptation.gradient import BoundGradient
 from ...control.controller import Controller
 from ...errors import CompilationError
+from ...robots.mechanism import mechanism
 from ...tasks.cell import Reference
 from ...tasks.pose import MAX_ANGLE
 from ..closed_loop import ClosedLoop
@@ -33,7 +35,8 @@ def generate(kinds: list[Kind]) -> Iterator[str]:
 
     for k, kind in enumerate(kinds):
         trace = Trace(kind, f"kind{k}")
-        for make in (trace.control, trace.plant, trace.measure):  # those that take long to compile first
+        makers = [trace.control, trace.plant, trace.measure]  # those that take long to compile first
+        for make in makers if kind.learning is None else [*makers, trace.estimate]:
             function = make()
             generator = ca.CodeGenerator(f"{function.name()}.c")
             generator.add(function)
@@ -52,17 +55,20 @@ def _table(kinds: list[Kind]) -> str:
     lines = [
         "typedef int (*Function)(const double **, double **, long long *, double *, int);",
         "typedef int (*Sizes)(long long *, long long *, long long *, long long *);",
-        "typedef struct { Function measure, control, plant; Sizes sizes[3]; int nv, cartesian, pose; } Kind;",
+        "typedef struct { Function measure, control, plant, estimate; Sizes sizes[4];",
+        "                 int nv, cartesian, pose; } Kind;",
     ]
     rows = []
     for k, kind in enumerate(kinds):
-        names = [f"kind{k}_{function}" for function in ("measure", "control", "plant")]
+        functions = ["measure", "control", "plant", *([] if kind.learning is None else ["estimate"])]
+        names = [f"kind{k}_{function}" for function in functions]
         for name in names:
             lines.append(f"int {name}(const double **, double **, long long *, double *, int);")
             lines.append(f"int {name}_work(long long *, long long *, long long *, long long *);")
         works = ", ".join(f"{name}_work" for name in names)
+        none = ", 0" if kind.learning is None else ""  # an adaptation whose state is theta_hat itself
         flags = f"{kind.nv}, {int(kind.space != 'joint')}, {int(kind.space == 'pose')}"
-        rows.append(f"    {{{', '.join(names)}, {{{works}}}, {flags}}},")
+        rows.append(f"    {{{', '.join(names)}{none}, {{{works}{none}}}, {flags}}},")
     return "\n".join(
         [*lines, "static const Kind kinds[] = {", *rows, "};", f"enum {{ KINDS = {len(kinds)} }};\n"]
     )
@@ -125,7 +131,8 @@ class CompiledLoop:
             controller.Lambda, controller.beta, controller.K_eps, controller.K_r, gamma_of(controller),
             W_inv, posture, gain, base, pi, plant.viscous, plant.coulomb, plant.smoothing[:, 0],
         )  # fmt: skip
-        sizes = (cell.n, cell.m, cell.nv, cell.theta.shape[1], coupling.pairs, bodies)
+        learned = controller.adaptation.start().shape[1]
+        sizes = (cell.n, cell.m, cell.nv, cell.theta.shape[1], learned, coupling.pairs, bodies)
         limit = float(getattr(cell.space, "max_condition", np.inf))
         addresses = [self.address(np.ascontiguousarray(array)) for array in arrays]
         columns = controller.K_r.shape[1], coupling.edges.shape[1]
@@ -191,7 +198,7 @@ def _compare(library: ctypes.CDLL, loop: ClosedLoop, classified: Classified) -> 
         raise CompilationError("the library was made from other code")
     specimen = Specimen(loop, classified)
     small = specimen.loop
-    bases = classify(small.controller).bases
+    bases = [mechanism(robot)[1] for robot in small.cell.robots]
     found = CompiledLoop(small, specimen.index, bases, library)
     for case in specimen.cases():
         expected = small.evaluate(*case)[0]
@@ -209,8 +216,11 @@ def _agree(expected: list[np.ndarray], found: list[np.ndarray]) -> None:
 
 
 def gamma_of(controller: Controller) -> np.ndarray:
-    """Gamma of (14), (n, P); `check_known` has seen to it that there is one."""
-    return controller.adaptation.Gamma  # type: ignore[attr-defined]
+    """Gamma of (14), (n, P); zeros, which nothing reads, for another adaptation."""
+    adaptation = controller.adaptation
+    if isinstance(adaptation, BoundGradient):
+        return adaptation.Gamma
+    return np.zeros(controller.cell.theta.shape)
 
 
 def _posture(controller: Controller) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

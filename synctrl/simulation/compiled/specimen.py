@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...control.adaptation.gradient import BoundGradient
 from ...control.controller import Controller
 from ...control.gains import Gains
 from ...robots.friction import Friction
@@ -28,6 +29,7 @@ from ...tasks.trajectories import Hold
 from ...tasks.weights import Weights
 from ..closed_loop import ClosedLoop
 from ..plant import Plant
+from .chosen import Chosen
 from .kind import Classified
 
 #: robots at least: with three in a ring, each is in two pairs, and each pair leaves one out
@@ -68,7 +70,7 @@ class Specimen:
         self.index = [k % count for k in range(max(ROBOTS, count))]
         chosen = [_most_turned(classified, k) for k in range(count)]
         members = [_member(loop.controller.cell, chosen[k]) for k in self.index]
-        self.loop = self._loop(loop.controller, members)
+        self.loop = self._loop(loop.controller, members, [chosen[k] for k in self.index])
 
     def cases(self) -> Iterator[Case]:
         """What to compare at; nothing if a robot is singular everywhere, and cannot run."""
@@ -85,14 +87,21 @@ class Specimen:
 
     # -- the loop -----------------------------------------------------------------------------------------
 
-    def _loop(self, original: Controller, members: Sequence[Member]) -> ClosedLoop:
+    def _loop(self, original: Controller, members: Sequence[Member], robots: Sequence[int]) -> ClosedLoop:
         n, m = len(members), original.cell.m
         coupling = Coupling.signed_ring(n, lambda t: tuple(self._moving(n, m)))
         coupling = coupling.weighted(self._positive(n))
         cell = Cell(members, coupling, self._space(original.cell.space, [x.robot for x in members]))
+        gains = self._gains(cell, original.k_r_space)
+        adaptation: Any = None
+        if not isinstance(original.adaptation, BoundGradient):
+            theta = original.cell.theta
+            adaptation = Chosen(original.adaptation, robots, original.cell.nv, theta.shape[1])
+            gains = gains.replace(Gamma=None)
         controller = Controller(
             cell,
-            self._gains(cell, original.k_r_space),
+            gains,
+            adaptation=adaptation,
             reference_acceleration=original.reference_acceleration,
             k_r_space=original.k_r_space,
         )
@@ -133,7 +142,10 @@ class Specimen:
         state.v[...] *= self._joints()
         for row, parameters in zip(known, cell.parameters, strict=True):
             row[: len(parameters.theta)] = 1
-        state.z[...] = known * (cell.theta + 0.1 * state.z)
+        if isinstance(self.loop.controller.adaptation, BoundGradient):
+            state.z[...] = known * (cell.theta + 0.1 * state.z)
+        else:
+            state.z[...] = self.loop.controller.adaptation.start() * (1 + 0.1 * state.z)
         return y
 
     def _desired(self, q: np.ndarray, distance: float) -> np.ndarray:

@@ -9,7 +9,7 @@ class CellStruct(ctypes.Structure):
     """`Cell` of driver.c."""
 
     _fields_ = [
-        *((name, ctypes.c_int) for name in ("n", "m", "nv", "P", "p", "bodies")),
+        *((name, ctypes.c_int) for name in ("n", "m", "nv", "P", "Z", "p", "bodies")),
         *(
             (name, ctypes.c_void_p)
             for name in (
@@ -39,13 +39,13 @@ class ReferenceStruct(ctypes.Structure):
 
 
 class LogStruct(ctypes.Structure):
-    """`Log` of driver.c, in the order of `LAYOUT` without t."""
+    """`Log` of driver.c, in the order of `LAYOUT` without t, and the adaptation's state if it is logged."""
 
     _fields_ = [
         (name, ctypes.c_void_p)
         for name in (
             "x", "x_desired", "tracking_error", "sync_error", "sync_integral", "coupled_error",
-            "q", "v", "v_error", "tau", "disturbance", "theta_hat",
+            "q", "v", "v_error", "tau", "disturbance", "theta_hat", "z",
         )
     ]  # fmt: skip
 

@@ -95,11 +95,10 @@ class Trace:
     # -- the law ------------------------------------------------------------------------------------------
 
     def control(self) -> Any:
-        """The law: torque, theta_hat', e*, s_q."""
+        """The law: torque, z' of the adaptation, e*, s_q."""
         ca, kind = self.ca, self.kind
         nv, m, P = kind.nv, kind.m, kind.parameters
         sym = ca.SX.sym
-        theta_hat = sym("theta_hat", P)
         shares = [sym(name, m) for name in ("E", "sigma", "sigma_dot")]
         task = [sym(name, m) for name in ("e", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot")]
         gains = [sym(name, m) for name in ("Lambda", "beta", "K_eps")]
@@ -111,13 +110,13 @@ class Trace:
         v = self._array(self.v, nv)
         s_q = v_ref - v
         damping = self._damping(K_r, s_q, r)
-        model_torque, theta_hat_dot = self._adaptive(theta_hat, Gamma, v_ref, a_ref, s_q)
+        z, model_torque, z_dot = self._adaptive(Gamma, v_ref, a_ref, s_q)
         tau = model_torque + damping + self._to_torque(force)
         inputs = [
-            self.q, self.v, self.sine, self.cosine, theta_hat, *shares, *task, self.J, self.J_dot, self.J_inv,
+            self.q, self.v, self.sine, self.cosine, z, *shares, *task, self.J, self.J_dot, self.J_inv,
             self.G, self.weights, *gains, K_r, Gamma, *posture, self.base,
         ]  # fmt: skip
-        outputs = [self._flat(tau), theta_hat_dot, self._flat(e_star), self._flat(s_q)]
+        outputs = [self._flat(tau), z_dot, self._flat(e_star), self._flat(s_q)]
         return self._function("control", inputs, outputs)
 
     def _law(self, task: list, shares: list, gains: list) -> tuple:
@@ -165,21 +164,39 @@ class Trace:
     def _to_torque(self, force: np.ndarray) -> np.ndarray:
         return force if self.kind.space == "joint" else law.transposed_times(self._jacobians()[0], force)
 
+    def estimate(self) -> Any:
+        """z -> theta_hat, of an adaptation whose state is something else."""
+        z = self.ca.SX.sym("z", self.kind.learned)
+        return self._function("estimate", [z], [self.kind.learning.estimate(z)])  # type: ignore[union-attr]
+
     def _adaptive(
-        self, theta_hat: Any, Gamma: Any, v_ref: Any, a_ref: Any, s_q: Any
-    ) -> tuple[np.ndarray, Any]:
-        """Y theta_hat, and Gamma Y^T s_q as the derivative of s_q^T Y theta_hat with respect to theta_hat."""
+        self, Gamma: Any, v_ref: np.ndarray, a_ref: np.ndarray, s_q: np.ndarray
+    ) -> tuple[Any, np.ndarray, Any]:
+        """State z of the adaptation, Y theta_hat, and z'; with (14) z is theta_hat."""
+        ca, kind = self.ca, self.kind
+        theta_hat, motion = (
+            ca.SX.sym("theta_hat", kind.parameters),
+            tuple(map(self._back, (v_ref, a_ref, s_q))),
+        )
+        torque, gradient = self._model(theta_hat, *motion)
+        if kind.learning is None:
+            return theta_hat, self._array(torque, kind.nv), law.adaptation(gradient, Gamma)
+        z = ca.SX.sym("z", kind.learned)
+        torque, gradient = ca.substitute([torque, gradient], [theta_hat], [kind.learning.estimate(z)])
+        return z, self._array(torque, kind.nv), kind.learning.rate(z, self.q, self.v, *motion, gradient)
+
+    def _model(self, theta_hat: Any, v_ref: Any, a_ref: Any, s_q: Any) -> tuple[Any, Any]:
+        """Y theta_hat, and Y^T s_q as the derivative of s_q^T Y theta_hat with respect to theta_hat."""
         ca, kind = self.ca, self.kind
         rigid = theta_hat[: kind.rigid_parameters]
         pi = rigid if kind.matrix is None else ca.mtimes(ca.SX(kind.matrix), rigid)
-        v_ref, a_ref, s_q = (self._back(part) for part in (v_ref, a_ref, s_q))
         symbols = Symbols(kind.fixed, self.q, self.sine, self.cosine)
         torque = symbols.torque(pi, self.v, v_ref, a_ref, self._gravity())
         if kind.smoothing is not None:
             columns = [v_ref, ca.tanh(self.v / kind.smoothing), *([a_ref] if kind.rotors else [])]
             rubbing = theta_hat[kind.rigid_parameters :]
             torque += sum(rubbing[k * kind.nv : (k + 1) * kind.nv] * c for k, c in enumerate(columns))
-        return self._array(torque, kind.nv), Gamma * ca.jtimes(torque, theta_hat, s_q, True)
+        return torque, ca.jtimes(torque, theta_hat, s_q, True)
 
     # -- the plant ----------------------------------------------------------------------------------------
 
