@@ -21,7 +21,7 @@ RESOLVED = 0.1
 #: digits that the function may have, from single to double precision
 NOISE = (1e-5, 1e-8, 1e-11, 1e-13)
 #: what looks wrong must not look rough or right in windows that are shorter by these shares
-AGAIN = (0.618, 0.236, 0.0557, 0.0133)
+AGAIN = (0.618, 0.236, 0.0557, 0.0133, 0.00317, 0.00075)
 #: windows serve coordinates that need lengths up to this factor apart
 ALIKE = 30.0
 #: changes below this share of the function's size over the whole run count as none
