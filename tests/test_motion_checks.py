@@ -97,7 +97,7 @@ def test_a_motion_that_is_not_finite_later_on_is_left_to_the_run() -> None:
 
     check_motions(cell_with(Own()), TIMES)
     with pytest.raises(NonFiniteError, match="desired motion of left is not finite"):
-        cell_with(Own()).motion(0, TIMES)
+        cell_with(Own()).motion(1, TIMES)
 
 
 def test_jumps_pass_where_breaks_are_named_and_the_derivatives_fit_in_between() -> None:
