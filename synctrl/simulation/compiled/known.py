@@ -17,10 +17,12 @@ import numpy as np
 
 from ...control import law
 from ...control.adaptation.gradient import BoundGradient
-from ...control.commands import REFERENCE_ACCELERATIONS, ConstantWeights, MovingWeights
+from ...control.commands import REFERENCE_ACCELERATIONS, Composed, ConstantWeights
 from ...control.controller import Controller
 from ...control.folded import FoldedWeights
 from ...control.gains import Gains
+from ...control.laws.sun_mills import BoundSunMills
+from ...control.network import BoundIdeal
 from ...errors import InputError
 from ...robots.base_parameters import BaseParameters
 from ...robots.friction_parameters import FrictionParameters
@@ -41,7 +43,7 @@ SPACES = (JointSpace, CartesianSpace, PoseSpace)
 BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace)
 RIGID = (FullParameters, LinearParameters, BaseParameters)
 INVERSES = (Inverse, Pseudoinverse, DampedInverse)
-LAWS = (FoldedWeights, ConstantWeights, MovingWeights)
+WAYS = (FoldedWeights, ConstantWeights, Composed)
 
 
 class Part(NamedTuple):
@@ -90,7 +92,9 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     yield Part("closed loop", loop, (ClosedLoop,))
     yield Part("plant", loop.plant, (Plant,))
     yield Part("controller", controller, (Controller,))
-    yield Part("law of the controller", controller._command, LAWS)
+    yield Part("law", controller.law, (BoundSunMills,))
+    yield Part("network", controller.network, (BoundIdeal,))
+    yield Part("law of the controller", controller._command, WAYS)
     if isinstance(controller.adaptation, BoundGradient):  # others are traced
         yield Part("adaptation", controller.adaptation, (BoundGradient,))
     yield Part("gains", controller.gains, (Gains,))
