@@ -208,9 +208,8 @@ def _power(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
         "damped inverse": (s - moved) * x.force,
     }
     power = {name: _sum(term) for name, term in terms.items()}
-    power |= dict(zip(run.learning, x.learning.T, strict=True)) | unproven_powers(
-        run, proof, _sum(s * x.force)
-    )
+    power |= dict(zip(run.learning, x.learning.T, strict=True))
+    power |= unproven_powers(run, proof, _sum(s * x.force))
     power["other"] = np.sum(_rates(run, proof), axis=0) - np.sum(list(power.values()), axis=0)
     return power
 

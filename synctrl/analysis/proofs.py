@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, cast
 
 import numpy as np
@@ -37,10 +38,13 @@ def unproven_powers(run: Replay, proof: Proof, pushed: np.ndarray) -> dict[str, 
         return {"law": -pushed}
     if outside(controller.network) is None:
         return {}
-    rates, powers = (
-        sum(term.sum(axis=(1, 2)) for term in terms.values()) for terms in (proof.rates, proof.powers)
-    )
+    rates, powers = (_total(terms, pushed) for terms in (proof.rates, proof.powers))
     return {"network": rates - powers - pushed}
+
+
+def _total(terms: Mapping[str, np.ndarray], like: np.ndarray) -> np.ndarray:
+    """Sum over all terms, rows and axes, (T,)."""
+    return sum((term.sum(axis=(1, 2)) for term in terms.values()), np.zeros_like(like))
 
 
 def outside(network: BoundNetwork) -> str | None:

@@ -7,7 +7,7 @@ quantity and its derivative, and every line then serves both at once.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, cast
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from ..errors import InputError
 from ..tasks.cell import Cell, Reference
 from ..tasks.coupling import Coupling
 from ..tasks.spaces import Measurement
-from ..tasks.weights import Weights
 from . import law
 from .laws import Asked, BoundLaw, Errors
 from .laws.sun_mills import REFERENCE_ACCELERATIONS as REFERENCE_ACCELERATIONS
@@ -115,31 +114,27 @@ class Composed:
 
     Args:
         law, network: for the robots of one cell.
-
-    Raises:
-        InputError: one of them gives something of another shape than it should.
     """
 
     def __init__(self, law: BoundLaw, network: BoundNetwork):
-        self._law, self._network = law, network
+        self.law, self.network = law, network
 
     def __call__(self, task: Measurement, reference: Reference, memory: np.ndarray) -> Lines:
         c, c_dot, c_ddot, c_inv = reference.weights
         (e, e_dot), (xd_dot, xd_ddot) = task.error, task.rates
         w, w_dot = law.weighted_error(c, e), law.weighted_error_dot(c, c_dot, e, e_dot)
-        heard = self._network.exchange(reference.t, np.stack((w, w_dot)), memory)
+        heard = self.network.exchange(reference.t, np.stack((w, w_dot)), memory)
         E, sigma, sigma_dot = heard.shares
         errors = Errors(
             reference.t, e, e_dot, task.x_dot, xd_dot, xd_ddot, w, w_dot, E, sigma, sigma_dot,
             c, c_dot, c_ddot, c_inv,
         )  # fmt: skip
-        asked = self._law.command(errors)
-        e_star = w if asked.e_star is None else asked.e_star
-        u = _command(asked, reference.weights) if asked.u is None else asked.u
+        asked = completed(self.law.command(errors), errors)
         xref = asked.xref_dot, asked.xref_ddot
         return Lines(
-            heard.epsilon, heard.epsilon_dot, heard.shares, e_star, u, xref, asked.force, heard.memory_dot
-        )
+            heard.epsilon, heard.epsilon_dot, heard.shares, cast(np.ndarray, asked.e_star),
+            cast(np.ndarray, asked.u), xref, asked.force, heard.memory_dot,
+        )  # fmt: skip
 
     def check(self, n: int, p: int, m: int) -> None:
         """Look once at what law and network give, before anything runs.
@@ -147,16 +142,16 @@ class Composed:
         Raises:
             InputError: something of another shape than it should have.
         """
-        memory = self._network.start()
-        integral = self._network.integral(memory)
-        heard = self._network.exchange(0.0, np.zeros((2, n, m)), memory)
-        asked = self._law.command(_no_errors(n, m))
-        _check_shapes("network", self._network, {
+        memory = self.network.start()
+        integral = self.network.integral(memory)
+        heard = self.network.exchange(0.0, np.zeros((2, n, m)), memory)
+        asked = self.law.command(_no_errors(n, m))
+        _check_shapes("network", self.network, {
             "epsilon": (heard.epsilon, (p, m)), "epsilon_dot": (heard.epsilon_dot, (p, m)),
             "shares": (heard.shares, (3, n, m)), "memory_dot": (heard.memory_dot, np.shape(memory)),
             "integral": (integral, (p, m)),
         })  # fmt: skip
-        _check_shapes("law", self._law, {
+        _check_shapes("law", self.law, {
             "xref_dot": (asked.xref_dot, (n, m)), "xref_ddot": (asked.xref_ddot, (n, m)),
             "force": (asked.force, (n, m)),
         })  # fmt: skip
@@ -168,11 +163,15 @@ def _no_errors(n: int, m: int) -> Errors:
     return Errors(0.0, o, o, o, o, o, o, o, o, o, o, one, zero, zero, one)
 
 
-def _command(asked: Asked, weights: Weights) -> np.ndarray:
-    """u = c xref' and its rate, (2, n, m)."""
-    u = law.times(weights.c, asked.xref_dot)
-    u_dot = law.times(weights.c, asked.xref_ddot) + law.times(weights.c_dot, asked.xref_dot)
-    return np.stack((u, u_dot))
+def completed(asked: Asked, errors: Errors) -> Asked:
+    """What a law asks for, with w for e*, and c xref' and its rate for u, where it does not say."""
+    if asked.e_star is None:
+        asked = asked._replace(e_star=errors.w)
+    if asked.u is None:
+        u = law.times(errors.c, asked.xref_dot)
+        u_dot = law.times(errors.c, asked.xref_ddot) + law.times(errors.c_dot, asked.xref_dot)
+        asked = asked._replace(u=np.stack((u, u_dot)))
+    return asked
 
 
 def _check_shapes(role: str, part: Any, parts: Mapping[str, tuple[Any, tuple[int, ...]]]) -> None:
