@@ -113,7 +113,7 @@ def gain_condition_of(run: Replay) -> GainCondition:
         k = robot.nv
         M, J, J_inv = x.M[:, i, :k, :k], x.J[:, i, :, :k], x.J_inv[:, i, :k]
         values = _values(
-            run.experiment.k_r_space, loop.controller.K_r[i], M, x.c_inv[:, i], x.c_dot[:, i], J, J_inv
+            loop.controller.k_r_space, loop.controller.K_r[i], M, x.c_inv[:, i], x.c_dot[:, i], J, J_inv
         )
         row = int(np.argmin(values[0]))
         instant = int(np.searchsorted(run.logged, row))
@@ -167,8 +167,9 @@ class _Evaluation:
     def __init__(self, experiment: Experiment, i: int):
         cell, self._i = experiment.cell, i
         self._robot, self._coupling, self._m = cell.robots[i], cell.coupling, cell.m
-        self._task, self._space = cell.space.bind([self._robot]), experiment.k_r_space
-        self._K_r = experiment.closed_loop().controller.K_r[i]
+        controller = experiment.closed_loop().controller
+        self._task, self._space = cell.space.bind([self._robot]), controller.k_r_space
+        self._K_r = controller.K_r[i]
 
     def __call__(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         q, t = point[:-1], point[-1:]
@@ -228,12 +229,13 @@ def _condition(
     experiment: Experiment, robot: int, place: tuple[float, np.ndarray], values: list[float]
 ) -> GainCondition:
     margin, corrected, printed = values
-    K_r = experiment.closed_loop().controller.K_r[robot]
-    size = experiment.cell.robots[robot].nv if experiment.k_r_space == "joint" else experiment.cell.m
+    controller = experiment.closed_loop().controller
+    K_r = controller.K_r[robot]
+    size = experiment.cell.robots[robot].nv if controller.k_r_space == "joint" else experiment.cell.m
     time, q = place
     return GainCondition(
         margin, corrected, printed, float(K_r[:size].min()), robot, time, tuple(map(float, q)),
-        experiment.reference_acceleration == "paper",
+        controller.reference_acceleration == "paper",
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@
        + power of what is outside the theorem
 
 with tilde = theta - theta_hat, E = S^T int eps, sigma = S^T eps; (19), (24), (34) and (39) for any coupling.
+Synchronization, integral and coupling are the part of the paper's law; another law says what its own is.
 V' is not taken from that formula: it is the chain rule applied to V with the accelerations of the plant. What
 the formula does not explain is the power called "other", and is rounding when the model is complete.
 """
@@ -24,17 +25,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..control.laws import Proof
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
+from .proofs import proof_of, unproven_powers
 from .replay import Replay, replay
 
+#: energies of the paper's law; those of another law stand in place of the last two
 ENERGIES = ("kinetic", "parameter", "synchronization", "integral")
-#: what the theorem knows; each is at most 0
+#: what the theorem knows of the paper's law; each is at most 0
 THEOREM = ("damping", "synchronization rate", "coupling", "friction in Y")
 #: what it does not: each may have either sign
 OUTSIDE = ("friction", "disturbance", "saturation", "weight rate", "damped inverse", "other")
-#: the powers of any run; those of its adaptation come beside them
+#: the powers of the paper's law; those of the adaptation come beside them
 POWERS = THEOREM + OUTSIDE
 EPS = float(np.finfo(float).eps)
 
@@ -47,12 +51,16 @@ class Lyapunov:
 
     Attributes:
         t: (T,), s.
-        energy: terms of V under the names in `ENERGIES`, each (T,).
-        power: terms of V' under the names in `POWERS` and those of the adaptation, each (T,).
+        energy: terms of V by name, each (T,): "kinetic", "parameter", and the law's; with the paper's law
+            those in `ENERGIES`.
+        power: terms of V' by name, each (T,): with the paper's law those in `POWERS`, and those of the
+            adaptation. A law without a proof has the power of its force here, as "law"; what a network does
+            that is not ideal is "network".
         rounding: bound of the rounding error of V', (T,).
         drift: V(t) - V(0) - integral of V', (T,); 0 but for the error of the run and of the quadrature.
         drift_bound: what these two errors and rounding may amount to.
         supplied: integral of every power over the run, by name; together the change of V.
+        inside: names of the powers that the theorem knows.
     """
 
     t: np.ndarray
@@ -62,11 +70,12 @@ class Lyapunov:
     drift: np.ndarray
     drift_bound: float
     supplied: Mapping[str, float]
+    inside: tuple[str, ...] = THEOREM
 
     @property
     def V(self) -> np.ndarray:  # noqa: N802
         """Sum of the energies, (T,)."""
-        return np.sum([self.energy[name] for name in ENERGIES], axis=0)
+        return np.sum(list(self.energy.values()), axis=0)
 
     @property
     def V_dot(self) -> np.ndarray:  # noqa: N802
@@ -120,18 +129,20 @@ def lyapunov(result: Result, experiment: Experiment | None = None) -> Lyapunov:
 
 def lyapunov_of(run: Replay) -> Lyapunov:
     """V and V' of a run that has been gone through already."""
-    energy, power = _energy(run), _power(run)
+    proof = proof_of(run)
+    energy, power = _energy(run, proof), _power(run, proof)
     V, V_dot = (np.sum(list(terms.values()), axis=0) for terms in (energy, power))
-    drift, bound = _drift(run, V, V_dot)
+    drift, bound = _drift(run, proof, V, V_dot)
     at = run.logged
     return Lyapunov(
         run.result.t,
         {name: term[at] for name, term in energy.items()},
         {name: term[at] for name, term in power.items()},
-        operations(run.loop) * EPS * _magnitude(run)[at],
+        operations(run.loop) * EPS * _magnitude(run, proof)[at],
         drift,
         bound + operations(run.loop) * EPS * float(np.max(V)),
         {name: _supplied(run, term) for name, term in power.items()},
+        ("damping", *proof.powers, "friction in Y"),
     )
 
 
@@ -162,57 +173,44 @@ def operations(loop: ClosedLoop) -> int:
 # -- terms ------------------------------------------------------------------------------------------------
 
 
-def _energy(run: Replay) -> dict[str, np.ndarray]:
+def _energy(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
     """Terms of V, one value per row."""
-    x, controller = run.rows, run.loop.controller
-    K_eps, beta, Lambda = controller.K_eps, controller.beta, controller.Lambda
-    terms = (
-        0.5 * _sum(x.s_q * np.matvec(x.M, x.s_q)),
-        x.storage,
-        0.5 * _sum(x.epsilon * K_eps * x.epsilon),
-        0.5 * _sum(x.E * K_eps * Lambda * beta * x.E),
-    )
-    return dict(zip(ENERGIES, terms, strict=True))
+    x = run.rows
+    energy = {"kinetic": 0.5 * _sum(x.s_q * np.matvec(x.M, x.s_q)), "parameter": x.storage}
+    return energy | {name: _sum(term) for name, term in proof.energies.items()}
 
 
-def _rates(run: Replay) -> tuple[np.ndarray, ...]:
+def _rates(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
     """Time derivatives of the terms of V by the chain rule, (R,) each."""
-    return (*map(_sum, _summands(run)), run.rows.storage_rate)
+    return (*map(_sum, _summands(run, proof)), run.rows.storage_rate)
 
 
-def _summands(run: Replay) -> tuple[np.ndarray, ...]:
+def _summands(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
     """The same but for the adaptation's, before they are added up over robots and axes."""
-    x, controller = run.rows, run.loop.controller
-    K_eps, beta, Lambda = controller.K_eps, controller.beta, controller.Lambda
+    x = run.rows
     s_q_dot = x.a_ref + _reference_gap(run) - x.v_dot
-    return (
-        x.s_q * (np.matvec(x.M, s_q_dot) + x.C_s),
-        x.epsilon * K_eps * x.epsilon_dot,
-        x.E * K_eps * Lambda * beta * x.sigma,
-    )
+    return x.s_q * (np.matvec(x.M, s_q_dot) + x.C_s), *proof.rates.values()
 
 
-def _power(run: Replay) -> dict[str, np.ndarray]:
+def _power(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
     """Terms of V', one value per row; "other" is what the chain rule has beyond those with a name."""
     x, controller = run.rows, run.loop.controller
-    K_eps, K_r = controller.K_eps, controller.K_r
-    s, moved = np.matvec(x.c_inv, x.r), np.matvec(x.J, x.s_q)
+    K_r, s, moved = controller.K_r, np.matvec(x.c_inv, x.r), np.matvec(x.J, x.s_q)
     damping = x.s_q * K_r * x.s_q if controller.k_r_space == "joint" else moved * K_r * s
-    force = np.vecmat(K_eps * x.sigma, x.c)
-    terms = (
-        -damping,
-        -x.epsilon * K_eps * controller.Lambda * x.epsilon,
-        -x.sigma * K_eps * controller.beta * x.sigma,
-        -x.s_q * x.friction_damping,
-        x.s_q * x.friction,
-        -x.s_q * x.disturbance,
-        x.s_q * x.cut_off,
-        x.s_q * np.matvec(x.M, _reference_gap(run)),
-        (s - moved) * force,
-    )
-    power = {name: _sum(term) for name, term in zip(POWERS, terms, strict=False)}
+    terms = {
+        "damping": -damping,
+        **proof.powers,
+        "friction in Y": -x.s_q * x.friction_damping,
+        "friction": x.s_q * x.friction,
+        "disturbance": -x.s_q * x.disturbance,
+        "saturation": x.s_q * x.cut_off,
+        "weight rate": x.s_q * np.matvec(x.M, _reference_gap(run)),
+        "damped inverse": (s - moved) * x.force,
+    }
+    power = {name: _sum(term) for name, term in terms.items()}
     power |= dict(zip(run.learning, x.learning.T, strict=True))
-    power["other"] = np.sum(_rates(run), axis=0) - np.sum(list(power.values()), axis=0)
+    power |= unproven_powers(run, proof, _sum(s * x.force))
+    power["other"] = np.sum(_rates(run, proof), axis=0) - np.sum(list(power.values()), axis=0)
     return power
 
 
@@ -224,7 +222,7 @@ def _reference_gap(run: Replay) -> np.ndarray:
     return -np.matvec(x.J_inv, np.matvec(x.c_inv, np.matvec(x.c_dot, np.matvec(x.c_inv, x.r))))
 
 
-def _magnitude(run: Replay) -> np.ndarray:
+def _magnitude(run: Replay, proof: Proof) -> np.ndarray:
     """Sum of the magnitudes of all that is added up to V', from which its rounding follows, (R,)."""
     x, controller = run.rows, run.loop.controller
     condition = np.linalg.norm(x.J, axis=(-2, -1)) * np.linalg.norm(x.J_inv, axis=(-2, -1))
@@ -232,10 +230,10 @@ def _magnitude(run: Replay) -> np.ndarray:
     inertial = np.abs(np.matvec(x.M, x.a_ref - x.v_dot))
     kinetic = size * (x.Y_size + np.abs(x.tau) + inertial)
     command = np.abs(x.u) + np.abs(x.r) + controller.Lambda * np.abs(x.e_star)
-    coupling = command * controller.K_eps * np.abs(x.sigma)
+    coupling = command * np.abs(np.vecmat(x.force, x.c_inv))
     per_robot = condition * (kinetic.sum(axis=-1) + coupling.sum(axis=-1))
     learned = _sum(np.abs(x.s_q) * x.Y_size)
-    return per_robot.sum(axis=-1) + learned + sum(_sum(np.abs(summand)) for summand in _summands(run))
+    return per_robot.sum(axis=-1) + learned + sum(_sum(np.abs(summand)) for summand in _summands(run, proof))
 
 
 def _sum(term: np.ndarray) -> np.ndarray:
@@ -246,7 +244,7 @@ def _sum(term: np.ndarray) -> np.ndarray:
 # -- the balance over time --------------------------------------------------------------------------------
 
 
-def _drift(run: Replay, V: np.ndarray, V_dot: np.ndarray) -> tuple[np.ndarray, float]:
+def _drift(run: Replay, proof: Proof, V: np.ndarray, V_dot: np.ndarray) -> tuple[np.ndarray, float]:
     """V - V(0) - integral of V', (T,), and a bound of its numerical error.
 
     V' is integrated by a cubic spline, which like the Runge-Kutta method errs with the fourth power of the
@@ -254,7 +252,7 @@ def _drift(run: Replay, V: np.ndarray, V_dot: np.ndarray) -> tuple[np.ndarray, f
     15 times its error. Summed over the terms of V, which exchange much, it stands for both errors.
     """
     drift, bound = np.zeros(len(run.logged)), 0.0
-    rates = _rates(run)
+    rates = _rates(run, proof)
     for first, last, rows in run.stretches:
         t = run.result.t[first : last + 1]
         missing = V[rows] - V[rows][0] - _integral(t, V_dot[rows])

@@ -16,7 +16,7 @@ from ..robots.forest import Forest, forests
 from ..simulation.clock import before
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.disturbances import DisturbanceSchedule
-from ..simulation.recorder import ADAPTATION_STATE, PLANT_STATE, own_states
+from ..simulation.recorder import ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE, own_states
 from ..simulation.result import LAYOUT, Result
 from ..simulation.simulate import Experiment
 from ..tasks.cell import Reference
@@ -46,7 +46,8 @@ class Row(NamedTuple):
         storage, storage_rate: V_th of the adaptation, and its rate by the chain rule, N·m and N·m/s.
         learning: what V_th' has beside -s_q^T Y tilde, in the order of `Replay.learning`, N·m/s.
         epsilon, epsilon_dot: (p, m).
-        E, sigma, e_star, u, r: (n, m).
+        E, sigma, sigma_dot, e_star, u, r: (n, m).
+        force: what the law asks for in task space, (n, m).
         c, c_dot, c_inv: (n, m, m).
         J, J_inv: (n, m, nv) and (n, nv, m); identities in joint space.
         M: mass matrices, (n, nv, nv).
@@ -71,9 +72,11 @@ class Row(NamedTuple):
     epsilon_dot: np.ndarray
     E: np.ndarray
     sigma: np.ndarray
+    sigma_dot: np.ndarray
     e_star: np.ndarray
     u: np.ndarray
     r: np.ndarray
+    force: np.ndarray
     c: np.ndarray
     c_dot: np.ndarray
     c_inv: np.ndarray
@@ -169,6 +172,7 @@ def _row(
     y_dot, s = loop.evaluate(reference, y, disturbance)
     theta, adaptation, z = loop.cell.theta, loop.controller.adaptation, loop.state(y).z
     J, J_inv = _jacobians(loop, s)
+    E, sigma, sigma_dot = s.command.shares
     M, C_s = _dynamics(bodies, q, v, s.s_q)
     friction, friction_damping = _friction(loop, bodies, q, v, s)
     return Row(
@@ -176,7 +180,8 @@ def _row(
         s.tau - loop.plant.applied(s.tau), np.array(adaptation.storage(z, theta)),
         np.array(adaptation.storage_rate(z, s.z_dot, theta)),
         np.array([*adaptation.powers(z, theta, s.seen).values()]), s.epsilon, s.epsilon_dot,
-        s.E, s.sigma, s.e_star, s.u, s.r, reference.c, reference.c_dot, reference.c_inv, J, J_inv, M, C_s,
+        E, sigma, sigma_dot, s.e_star, s.u, s.r, s.command.force, reference.c,
+        reference.c_dot, reference.c_inv, J, J_inv, M, C_s,
         s.regressor.size(np.abs(s.theta_hat) + np.abs(theta)),
     )  # fmt: skip
 
@@ -184,8 +189,9 @@ def _row(
 def _state(result: Result, k: int) -> np.ndarray:
     """The state of the loop at logged instant k."""
     z = result.outputs.get(ADAPTATION_STATE, result.theta_hat)[k]
+    memory = result.outputs.get(NETWORK_STATE, result.sync_integral)[k]
     hidden = result.outputs[PLANT_STATE][k] if PLANT_STATE in result.outputs else np.zeros(0)
-    parts = result.q[k], result.v[k], z, result.sync_integral[k], hidden
+    parts = result.q[k], result.v[k], z, memory, hidden
     return np.concatenate([part.ravel() for part in parts])
 
 

@@ -1,26 +1,25 @@
-"""From errors to reference motion in task space: the lines of the law in order, and the coupling in between.
+"""From errors to reference motion in task space: what a law makes of what a network brings.
 
-Everything is a pair, a quantity and its derivative. Constant weights have a way of their own, because every
-line then serves quantity and derivative at once.
+The paper's law over an ideal network has a way of its own while weights are constant: everything is a pair, a
+quantity and its derivative, and every line then serves both at once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, Protocol, cast
 
 import numpy as np
 
+from ..errors import InputError
 from ..tasks.cell import Cell, Reference
 from ..tasks.coupling import Coupling
 from ..tasks.spaces import Measurement
 from . import law
+from .laws import Asked, BoundLaw, Errors
+from .laws.sun_mills import REFERENCE_ACCELERATIONS as REFERENCE_ACCELERATIONS
+from .network import BoundNetwork
 from .structure import ABSENT, structured
-
-REFERENCE_ACCELERATIONS = {
-    "exact": law.reference_acceleration_exact,
-    "paper": law.reference_acceleration_paper,
-}
 
 
 class Command(Protocol):
@@ -54,6 +53,10 @@ class Command(Protocol):
     def force(self) -> np.ndarray:
         """The synchronizing force, (n, m)."""
 
+    @property
+    def memory_dot(self) -> np.ndarray:
+        """Rate of the network's memory, of its shape."""
+
 
 class Lines(NamedTuple):
     """A `Command`, as the lines of the law make it."""
@@ -65,14 +68,15 @@ class Lines(NamedTuple):
     u: np.ndarray
     xref: tuple[np.ndarray, np.ndarray]
     force: np.ndarray
+    memory_dot: np.ndarray
 
 
-Law = Callable[[Measurement, Reference, np.ndarray], Command]
-"""Measurement, what is desired, and the integrals of the synchronization errors, (p, m) -> `Command`."""
+Commander = Callable[[Measurement, Reference, np.ndarray], Command]
+"""Measurement, what is desired, and the memory of the network -> `Command`."""
 
 
 class ConstantWeights:
-    """The law for weights that do not change.
+    """`SunMills` over `Ideal`, for weights that do not change.
 
     Args:
         cell: the cell, with constant weights.
@@ -102,46 +106,81 @@ class ConstantWeights:
         u = law.command(c, ABSENT, rates, error, sigma, e_star, beta, Lambda)
         xref = law.reference_velocity(self._c_inv, u)
         force = law.synchronizing_force(self._c_single, sigma[0], self._K_eps)
-        return Lines(compared[0], compared[1], shares, e_star[0], u, (xref[0], xref[1]), force)
+        return Lines(compared[0], compared[1], shares, e_star[0], u, (xref[0], xref[1]), force, compared[0])
 
 
-class MovingWeights:
-    """The law for weights that change with time.
+class Composed:
+    """Any law over any network, for weights of any kind.
 
     Args:
-        cell: the cell.
-        Lambda, beta, K_eps: gains, (m,).
-        reference_acceleration: "exact" or "paper".
+        law, network: for the robots of one cell.
     """
 
-    def __init__(
-        self,
-        cell: Cell,
-        Lambda: np.ndarray,
-        beta: np.ndarray,
-        K_eps: np.ndarray,
-        reference_acceleration: str,
-    ):
-        self._Lambda, self._beta, self._K_eps, self._coupling = Lambda, beta, K_eps, cell.coupling
-        self._reference_acceleration = REFERENCE_ACCELERATIONS[reference_acceleration]
+    def __init__(self, law: BoundLaw, network: BoundNetwork):
+        self.law, self.network = law, network
 
-    def __call__(self, task: Measurement, reference: Reference, integral: np.ndarray) -> Lines:
-        Lambda, beta = self._Lambda, self._beta
+    def __call__(self, task: Measurement, reference: Reference, memory: np.ndarray) -> Lines:
         c, c_dot, c_ddot, c_inv = reference.weights
         (e, e_dot), (xd_dot, xd_ddot) = task.error, task.rates
         w, w_dot = law.weighted_error(c, e), law.weighted_error_dot(c, c_dot, e, e_dot)
-        compared, shares = couple(self._coupling, np.stack((w, w_dot)), integral)
-        E, sigma, sigma_dot = shares
-        e_star = law.coupled_error(w, E, beta)
-        u = law.command(c, c_dot, xd_dot, e, sigma, e_star, beta, Lambda)
-        u_dot = law.command_dot(
-            c, c_dot, c_ddot, xd_dot, xd_ddot, e, e_dot, w_dot, sigma, sigma_dot, beta, Lambda
-        )
-        xref_dot = law.reference_velocity(c_inv, u)
-        xref_ddot = self._reference_acceleration(c_inv, c_dot, u_dot, xref_dot, task.x_dot)
-        force = law.synchronizing_force(c, sigma, self._K_eps)
-        u = np.stack((u, u_dot))
-        return Lines(compared[0], compared[1], shares, e_star, u, (xref_dot, xref_ddot), force)
+        heard = self.network.exchange(reference.t, np.stack((w, w_dot)), memory)
+        E, sigma, sigma_dot = heard.shares
+        errors = Errors(
+            reference.t, e, e_dot, task.x_dot, xd_dot, xd_ddot, w, w_dot, E, sigma, sigma_dot,
+            c, c_dot, c_ddot, c_inv,
+        )  # fmt: skip
+        asked = completed(self.law.command(errors), errors)
+        xref = asked.xref_dot, asked.xref_ddot
+        return Lines(
+            heard.epsilon, heard.epsilon_dot, heard.shares, cast(np.ndarray, asked.e_star),
+            cast(np.ndarray, asked.u), xref, asked.force, heard.memory_dot,
+        )  # fmt: skip
+
+    def check(self, n: int, p: int, m: int) -> None:
+        """Look once at what law and network give, before anything runs.
+
+        Raises:
+            InputError: something of another shape than it should have.
+        """
+        memory = self.network.start()
+        integral = self.network.integral(memory)
+        heard = self.network.exchange(0.0, np.zeros((2, n, m)), memory)
+        asked = self.law.command(_no_errors(n, m))
+        _check_shapes("network", self.network, {
+            "epsilon": (heard.epsilon, (p, m)), "epsilon_dot": (heard.epsilon_dot, (p, m)),
+            "shares": (heard.shares, (3, n, m)), "memory_dot": (heard.memory_dot, np.shape(memory)),
+            "integral": (integral, (p, m)),
+        })  # fmt: skip
+        _check_shapes("law", self.law, {
+            "xref_dot": (asked.xref_dot, (n, m)), "xref_ddot": (asked.xref_ddot, (n, m)),
+            "force": (asked.force, (n, m)),
+        })  # fmt: skip
+
+
+def _no_errors(n: int, m: int) -> Errors:
+    """Errors that are all zero, under weights of one."""
+    o, one, zero = np.zeros((n, m)), np.broadcast_to(np.eye(m), (n, m, m)), np.zeros((n, m, m))
+    return Errors(0.0, o, o, o, o, o, o, o, o, o, o, one, zero, zero, one)
+
+
+def completed(asked: Asked, errors: Errors) -> Asked:
+    """What a law asks for, with w for e*, and c xref' and its rate for u, where it does not say."""
+    if asked.e_star is None:
+        asked = asked._replace(e_star=errors.w)
+    if asked.u is None:
+        u = law.times(errors.c, asked.xref_dot)
+        u_dot = law.times(errors.c, asked.xref_ddot) + law.times(errors.c_dot, asked.xref_dot)
+        asked = asked._replace(u=np.stack((u, u_dot)))
+    return asked
+
+
+def _check_shapes(role: str, part: Any, parts: Mapping[str, tuple[Any, tuple[int, ...]]]) -> None:
+    for name, (value, shape) in parts.items():
+        if np.shape(value) != shape:
+            raise InputError(
+                f"{role} {type(part).__qualname__}, {name}: expected an array of shape {shape}, found "
+                f"{np.shape(value)}"
+            )
 
 
 def couple(coupling: Coupling, w: np.ndarray, integral: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

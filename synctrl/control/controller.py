@@ -9,15 +9,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import choice, finite_array, instance
+from ..checks import finite_array, instance
 from ..robots.regressors import RegressorBlocks, regressors
 from ..tasks.cell import Cell, Reference
 from ..tasks.spaces import Measurement
-from . import law
+from . import law, laws
 from .adaptation import Adaptation, Seen, chosen
-from .commands import REFERENCE_ACCELERATIONS, Command, ConstantWeights, Law, MovingWeights
+from .commands import Command, Commander, Composed, ConstantWeights
 from .folded import folded
 from .gains import Gains, spread, spread_rows
+from .laws import Law
+from .laws.sun_mills import BoundSunMills
+from .network import BoundIdeal, Network, connected
 
 
 @dataclass(slots=True)
@@ -45,6 +48,7 @@ class Signals:
         """The regressors, (n, nv, P)."""
         return self.regressor.matrices()
 
+    memory_dot = property(lambda self: self.command.memory_dot)
     e = property(lambda self: self.task.error[0])
     e_dot = property(lambda self: self.task.error[1])
     epsilon = property(lambda self: self.command.epsilon)
@@ -60,18 +64,21 @@ class Signals:
 class Controller:
     """Adaptive synchronized control of a cell, eqs. (7)-(14) and (28)-(32).
 
-    Its state is that of its adaptation, z, (n, Z), which is theta_hat itself for the paper's, and the
-    integrals of the synchronization errors, (p, m).
+    Its state is that of its adaptation, z, (n, Z), which is theta_hat itself for the paper's, and the memory
+    of its network, which by default are the integrals of the synchronization errors, (p, m).
 
     Args:
         cell: the robots and their task.
         gains: the gains.
         adaptation: how it learns; by default `Gradient(gains.Gamma)`, eq. (14).
-        reference_acceleration: "exact", the derivative of xref', or "paper", as (13) prints it.
-        k_r_space: "joint" for damping K_r s_q, or "task" for J^T K_r c^-1 r.
+        law: from errors to reference motion and force; by default `SunMills`.
+        network: what the robots know of each other; by default `Ideal`.
+        reference_acceleration, k_r_space: shorthand for the options of `SunMills`. Where the damping acts,
+            "joint" or "task", may be said beside any law.
 
     Raises:
-        InputError: gains of the wrong size, an unknown option, or Gamma and an adaptation, or neither.
+        InputError: gains of the wrong size, an unknown option or one that the law contradicts, Gamma and an
+            adaptation, or neither, or parts that give something of another shape than they should.
     """
 
     def __init__(
@@ -80,44 +87,55 @@ class Controller:
         gains: Gains,
         *,
         adaptation: Adaptation | None = None,
-        reference_acceleration: str = "exact",
-        k_r_space: str = "joint",
+        law: Law | None = None,
+        network: Network | None = None,
+        reference_acceleration: str | None = None,
+        k_r_space: str | None = None,
     ):
         instance("cell", cell, Cell, "a Cell")
         instance("gains", gains, Gains, "Gains")
         m = cell.m
         self.cell = cell
         self.gains = gains
-        self.reference_acceleration = choice(
-            "reference_acceleration", reference_acceleration, tuple(REFERENCE_ACCELERATIONS)
-        )
-        self.k_r_space = choice("k_r_space", k_r_space, ("joint", "task"))
+        options = laws.chosen(law, reference_acceleration, k_r_space)
+        self.reference_acceleration, self.k_r_space = options.reference_acceleration, options.k_r_space
         self.Lambda = spread("Lambda", gains.Lambda, (m,))
         self.beta = spread("beta", gains.beta, (m,))
         self.K_eps = spread("K_eps", gains.K_eps, (m,))
-        joints = [robot.nv if k_r_space == "joint" else m for robot in cell.robots]
+        joints = [robot.nv if self.k_r_space == "joint" else m for robot in cell.robots]
         self.K_r = spread_rows("K_r", gains.K_r, joints)
         learning = chosen(gains.Gamma, adaptation)
         self.adaptation, self.adaptation_settings = learning.bind(cell), learning.as_dict()
-        self._damping = self._joint_damping if k_r_space == "joint" else self._task_damping
-        if cell.coupling.is_constant:
-            self._command: Law = folded(cell, ConstantWeights(cell, self.Lambda, self.beta, self.K_eps))
-        else:
-            self._command = MovingWeights(cell, self.Lambda, self.beta, self.K_eps, reference_acceleration)
+        self.law, self.law_settings = options.law.bind(cell, gains), options.law.as_dict()
+        connection = connected(network)
+        self.network, self.network_settings = connection.bind(cell), connection.as_dict()
+        self._damping = self._joint_damping if self.k_r_space == "joint" else self._task_damping
+        self._command = self._commander()
+
+    def _commander(self) -> Commander:
+        """The law over the network, in the way that costs least."""
+        cell = self.cell
+        usual = type(self.law) is BoundSunMills and type(self.network) is BoundIdeal
+        if usual and cell.coupling.is_constant:
+            return folded(cell, ConstantWeights(cell, self.Lambda, self.beta, self.K_eps))
+        composed = Composed(self.law, self.network)
+        if not usual:
+            composed.check(cell.n, cell.coupling.pairs, cell.m)
+        return composed
 
     @cached_property
     def _regressor(self) -> Callable[..., RegressorBlocks]:
         """q, v, v_ref and a_ref, (n, nv), -> the regressors."""
         return regressors(self.cell.parameters, [robot.nv for robot in self.cell.robots])
 
-    def evaluate(self, reference: Reference, motion: ArrayLike, z: ArrayLike, integral: ArrayLike) -> Signals:
+    def evaluate(self, reference: Reference, motion: ArrayLike, z: ArrayLike, memory: ArrayLike) -> Signals:
         """The law at one instant.
 
         Args:
             reference: desired motion, (3, n, m), and weights, (n, m, m) each.
             motion: joint positions and velocities, (2, n, nv).
             z: state of the adaptation, (n, Z).
-            integral: integrals of the synchronization errors, (p, m).
+            memory: of the network; with `Ideal` the integrals of the synchronization errors, (p, m).
 
         Raises:
             InputError: another size, or numbers that are not finite.
@@ -128,7 +146,7 @@ class Controller:
             reference,
             finite_array("motion", motion, (2, cell.n, cell.nv)),
             finite_array("z", z, self.adaptation.start().shape),
-            finite_array("integral", integral, (cell.coupling.pairs, cell.m)),
+            finite_array("memory", memory, np.shape(self.network.start())),
         )
 
     @property
@@ -136,13 +154,11 @@ class Controller:
         """What a simulation calls: `signals`, or the `evaluate` of a subclass that has one of its own."""
         return self.signals if type(self).evaluate is Controller.evaluate else self.evaluate
 
-    def signals(
-        self, reference: Reference, motion: np.ndarray, z: np.ndarray, integral: np.ndarray
-    ) -> Signals:
+    def signals(self, reference: Reference, motion: np.ndarray, z: np.ndarray, memory: np.ndarray) -> Signals:
         """`evaluate` without its checks, for many evaluations: numbers that are not finite go through."""
         space = self.cell.task
         task = space.measure(motion, reference.desired)
-        command = self._command(task, reference, integral)
+        command = self._command(task, reference, memory)
         v_ref, a_ref = space.to_joints(task, *command.xref)
         q, v = motion
         s_q = v_ref - v

@@ -27,7 +27,7 @@ FAULTS = "error", "hold"
 class DiscreteController:
     """A controller with memory that is asked for torque once a period.
 
-    With x = (state of the adaptation, integrals of epsilon), x' = f by (14) and (28), tau by (13) or (32):
+    With x = (state of the adaptation, memory of the network), x' = f by (14) and (28), tau by (13) or (32):
 
         tau_k = tau(t_k, q_k, v_k, x_k),   x_{k+1} = x_k + period f(t_k, q_k, v_k, x_k).
 
@@ -116,12 +116,12 @@ class DiscreteController:
         """Everything that the next step depends on, as plain arrays.
 
         `z`, (n, Z), state of the adaptation, which is theta_hat for the paper's; `sync_integral`, (p, m),
-        unit of c e times s; `tau`, (n, nv), N·m, the torque that is held; `start`, s, and `samples`, the
-        place on the grid; `held`.
+        unit of c e times s, or `network_state`, memory of a network that keeps something else; `tau`,
+        (n, nv), N·m, the torque that is held; `start`, s, and `samples`, the place on the grid; `held`.
         """
         return {
             "z": self.z.copy(),
-            "sync_integral": self.sync_integral.copy(),
+            self._memory_name: self.memory.copy(),
             "tau": self._tau.copy(),
             "start": np.array(self._t0),
             "samples": np.array(float(self._samples)),
@@ -135,7 +135,7 @@ class DiscreteController:
             found = sorted(state) if isinstance(state, Mapping) else type(state).__name__
             raise InputError(f"state: expected arrays called {', '.join(sorted(kept))}, found {found}")
         new = {name: finite_array(f"state, {name}", state[name], kept[name].shape) for name in kept}
-        self.z, self.sync_integral = new["z"].copy(), new["sync_integral"].copy()
+        self.z, self.memory = new["z"].copy(), new[self._memory_name].copy()
         self._tau, self._t0 = new["tau"].copy(), float(new["start"])
         self._samples, self.held = int(new["samples"]), int(new["held"])
 
@@ -167,12 +167,22 @@ class DiscreteController:
         except Exception as error:  # whatever a damaged archive makes its readers raise
             raise ResultError(f"'{path}' has no state of this controller: {error}") from error
 
+    @property
+    def sync_integral(self) -> np.ndarray:
+        """Integrals of the synchronization errors, (p, m), unit of c e times s."""
+        return self.controller.network.integral(self.memory)
+
     # -- internals ----------------------------------------------------------------------------------------
+
+    @property
+    def _memory_name(self) -> str:
+        """What the memory of the network is called in `state`."""
+        return "sync_integral" if self.sync_integral is self.memory else "network_state"
 
     def _start(self, t: float = 0.0) -> None:
         self._t0, self._samples, self.held = t, 0, 0
         self.z = self.controller.adaptation.start()
-        self.sync_integral = np.zeros((self.cell.coupling.pairs, self.cell.m))
+        self.memory = np.array(self.controller.network.start(), dtype=float)
         self._tau = np.zeros(self._shape)
         self.signals: Signals | None = None
 
@@ -207,11 +217,11 @@ class DiscreteController:
     def _sample(self, t: float, motion: np.ndarray, desired: np.ndarray | None) -> np.ndarray:
         reference = self.cell.references(np.array([t]))[0]
         if desired is not None:
-            reference = Reference(desired, reference.weights)
-        signals = self.controller.unchecked(reference, motion, self.z, self.sync_integral)
+            reference = Reference(desired, reference.weights, reference.t)
+        signals = self.controller.unchecked(reference, motion, self.z, self.memory)
         self._tau = self._commanded(t, motion[0], signals)
         self.z = self.controller.adaptation.settle(self.z + self.period * signals.z_dot)
-        self.sync_integral = self.sync_integral + self.period * signals.epsilon
+        self.memory = self.memory + self.period * signals.memory_dot
         self._samples, self.signals = self._samples + 1, signals
         return self._tau.copy()
 

@@ -45,6 +45,10 @@ class FoldedCommand:
         return self._part("epsilon_dot", self._law.p)
 
     @property
+    def memory_dot(self) -> np.ndarray:
+        return self.epsilon
+
+    @property
     def shares(self) -> np.ndarray:
         return self._part("shares", 3, self._law.n)
 

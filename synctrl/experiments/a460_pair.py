@@ -9,10 +9,11 @@ travel.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Unpack
 
 import numpy as np
 
-from ..checks import boolean, instance
+from ..checks import boolean
 from ..control.gains import Gains
 from ..robots.friction import Friction
 from ..robots.friction_parameters import FrictionParameters
@@ -22,6 +23,7 @@ from ..tasks.cell import Cell, Member
 from ..tasks.coupling import Coupling
 from ..tasks.spaces import JointSpace
 from ..tasks.trajectories import Cubic
+from .parts import Parts, chosen_gains
 
 INITIAL = np.deg2rad([[73.3340, 60.3330, -169.8120], [15.2520, 71.6830, -181.9800]])  # Table I
 FINAL = np.deg2rad([[90.0, 63.6090, -174.7290], [-2.9730, 74.1070, -185.1080]])
@@ -40,9 +42,10 @@ def a460_pair(
     synchronized: bool = True,
     friction: bool = True,
     gains: Gains | None = None,
-    reference_acceleration: str = "exact",
-    k_r_space: str = "joint",
+    reference_acceleration: str | None = None,
+    k_r_space: str | None = None,
     adapt_friction: bool = False,
+    **parts: Unpack[Parts],
 ) -> Experiment:
     """The two-arm cell of section V-A, in joint space with epsilon = e_1 - e_2, eq. (45).
 
@@ -52,6 +55,7 @@ def a460_pair(
         gains: by default the paper's.
         reference_acceleration, k_r_space: see `Controller`.
         adapt_friction: whether the controller's model has friction too, see `FrictionParameters`.
+        parts: `adaptation`, `law`, `network`, see `Experiment`.
     """
     words = {"synchronized": synchronized, "friction": friction, "adapt_friction": adapt_friction}
     for name, value in words.items():
@@ -60,8 +64,7 @@ def a460_pair(
     members = [_member(robot, i, FRICTION if friction else Friction()) for i in range(2)]
     if adapt_friction:
         members = [_knowing_friction(member) for member in members]
-    gains = _gains(adapt_friction) if gains is None else gains
-    instance("gains", gains, Gains, "Gains")
+    gains = chosen_gains(gains, _gains(adapt_friction), parts)
     kind = "synchronized" if synchronized else "independent"
     return Experiment(
         Cell(members, Coupling.pair(c=(1.0, -1.0)), JointSpace(), name="A460 pair"),
@@ -70,6 +73,7 @@ def a460_pair(
         (),
         reference_acceleration,
         k_r_space,
+        **parts,
         title=f"A460 pair, {kind}{'' if friction else ', without friction'}"
         f"{', friction adapted' if adapt_friction else ''}",
     )

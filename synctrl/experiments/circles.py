@@ -21,6 +21,7 @@ from ..tasks.reachability import reach
 from ..tasks.redundancy import Redundancy
 from ..tasks.spaces import CartesianSpace
 from ..tasks.trajectories import Circle
+from .parts import Parts, chosen_gains
 
 FORMATION = 0.30  # m, distance of every circle's centre from the middle
 HEIGHT = 0.40  # m
@@ -58,10 +59,15 @@ class Station:
 
 
 def circle_cell(
-    stations: Sequence[Station], name: str, gains: Gains | None, synchronized: bool
+    stations: Sequence[Station],
+    name: str,
+    gains: Gains | None,
+    synchronized: bool,
+    parts: Parts | None = None,
 ) -> Experiment:
     """Robots at equal angles around the middle, each on its circle, coupled in a ring."""
-    gains = _gains(stations) if gains is None else gains
+    parts = Parts() if parts is None else parts
+    gains = chosen_gains(gains, _gains(stations), parts)
     postures = [np.array(station.posture) for station in stations]
     members = [_member(s, 2 * np.pi * i / len(stations), OFFSETS[i]) for i, s in enumerate(stations)]
     space = CartesianSpace("xyz", redundancy=Redundancy(postures, POSTURE_GAIN))
@@ -70,6 +76,7 @@ def circle_cell(
         gains if synchronized else gains.independent(),
         DURATION,
         title=f"{name}, {'synchronized' if synchronized else 'independent'}",
+        **parts,
     )
 
 

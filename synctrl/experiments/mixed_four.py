@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Unpack
+
 from ..control.gains import Gains
 from ..simulation.simulate import Experiment
 from .circles import Station, circle_cell
 from .panda_four import DISTANCE, K_R, POSTURE
+from .parts import Parts
 
 UR_POSTURE = (0.0, -1.3, 1.9, -2.17, -1.57, 0.0)
 STATIONS = (
@@ -18,7 +21,7 @@ STATIONS = (
 )
 
 
-def mixed_four(synchronized: bool = True, gains: Gains | None = None) -> Experiment:
+def mixed_four(synchronized: bool = True, gains: Gains | None = None, **parts: Unpack[Parts]) -> Experiment:
     """Arms with six and with seven joints on tilted circles, position only: the rest is free for a posture.
 
     Without friction, and with 0.7 of the true inertial parameters as the first estimate.
@@ -26,5 +29,6 @@ def mixed_four(synchronized: bool = True, gains: Gains | None = None) -> Experim
     Args:
         synchronized: False sets beta = K_eps = 0, independent adaptive control.
         gains: by default ones that converge within the run.
+        parts: `adaptation`, `law`, `network`, see `Experiment`.
     """
-    return circle_cell(STATIONS, "mixed cell", gains, synchronized)
+    return circle_cell(STATIONS, "mixed cell", gains, synchronized, parts)

@@ -17,6 +17,8 @@ the vehicle and the gains are our choice.
 
 from __future__ import annotations
 
+from typing import Unpack
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -29,6 +31,7 @@ from ..tasks.cell import Cell, Member
 from ..tasks.spaces import JointSpace
 from ..tasks.synchronization import SynchronizationFunction
 from ..tasks.trajectories import Motion
+from .parts import Parts, chosen_gains
 
 WHEEL_RADIUS, TRACK = 0.1, 0.4  # m
 INERTIA = 0.05  # kg·m^2, about the axle
@@ -89,18 +92,21 @@ def wheel_synchronization() -> SynchronizationFunction:
     )
 
 
-def mobile_robot(synchronized: bool = True, disturbed: bool = True, gains: Gains | None = None) -> Experiment:
+def mobile_robot(
+    synchronized: bool = True, disturbed: bool = True, gains: Gains | None = None, **parts: Unpack[Parts]
+) -> Experiment:
     """Two wheels, each a robot with one joint, on a path whose radii change with time.
 
     Args:
         synchronized: False sets beta = K_eps = 0.
         disturbed: whether the left wheel meets an obstacle, -1.5 N·m for 3 <= t < 3.5 s.
         gains: by default ours.
+        parts: `adaptation`, `law`, `network`, see `Experiment`.
     """
     wheel = load_robot("wheel")
     members = [_member(wheel, i) for i in range(2)]
     coupling = wheel_synchronization().coupling([member.trajectory for member in members], DURATION)
-    gains = GAINS if gains is None else gains
+    gains = chosen_gains(gains, GAINS, parts)
     kind = "synchronized" if synchronized else "independent"
     return Experiment(
         Cell(members, coupling, JointSpace(), name="wheels of a mobile robot"),
@@ -108,6 +114,7 @@ def mobile_robot(synchronized: bool = True, disturbed: bool = True, gains: Gains
         DURATION,
         (OBSTACLE,) if disturbed else (),
         title=f"wheels of a mobile robot, {kind}{', disturbed' if disturbed else ''}",
+        **parts,
     )
 
 

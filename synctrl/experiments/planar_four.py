@@ -7,10 +7,11 @@ of Table II is never given, and Table II contradicts the text on which robots mo
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Unpack
 
 import numpy as np
 
-from ..checks import boolean, choice, finite_number, instance
+from ..checks import boolean, choice, finite_number
 from ..control.gains import Gains
 from ..errors import InputError
 from ..robots.parameters import planar_two_link_parameters, theta_50
@@ -21,6 +22,7 @@ from ..tasks.cell import Cell, Member
 from ..tasks.coupling import Coupling
 from ..tasks.spaces import CartesianSpace
 from ..tasks.trajectories import ExponentialApproach
+from .parts import Parts, chosen_gains
 
 R, D = 5.0, 1.0  # m
 TURN = 0.02  # rad, how far each desired path goes along its circle
@@ -43,8 +45,9 @@ def planar_four(
     phi: float = 0.1,
     radii: str = "text",
     gains: Gains | None = None,
-    reference_acceleration: str = "exact",
-    k_r_space: str = "joint",
+    reference_acceleration: str | None = None,
+    k_r_space: str | None = None,
+    **parts: Unpack[Parts],
 ) -> Experiment:
     """The four-arm cell of section V-B, in Cartesian space with the ring (47)-(48).
 
@@ -56,6 +59,7 @@ def planar_four(
             Table II.
         gains: by default the paper's.
         reference_acceleration, k_r_space: see `Controller`.
+        parts: `adaptation`, `law`, `network`, see `Experiment`.
 
     Raises:
         InputError: an unknown word, or a number that is not finite.
@@ -67,8 +71,7 @@ def planar_four(
     arm = load_robot("planar2r")
     members = [_member(arm, i, phi, RADII[radii][i]) for i in range(4)]
     coupling = Coupling.ring(4, c=(R + D, -R, R, -(R + D)), unit="m")
-    gains = GAINS if gains is None else gains
-    instance("gains", gains, Gains, "Gains")
+    gains = chosen_gains(gains, GAINS, parts)
     return Experiment(
         Cell(members, coupling, CartesianSpace("xy"), name="four planar arms"),
         gains if synchronized else gains.independent(),
@@ -76,6 +79,7 @@ def planar_four(
         _disturbances(disturbance),
         reference_acceleration,
         k_r_space,
+        **parts,
         title=_title(synchronized, disturbance),
     )
 

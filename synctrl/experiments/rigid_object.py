@@ -8,6 +8,8 @@ are our choice.
 
 from __future__ import annotations
 
+from typing import Unpack
+
 import numpy as np
 
 from ..control.gains import Gains
@@ -20,6 +22,7 @@ from ..tasks.reachability import inverse_kinematics
 from ..tasks.spaces import CartesianSpace
 from ..tasks.synchronization import SynchronizationFunction
 from ..tasks.trajectories import Circle
+from .parts import Parts, chosen_gains
 
 A = np.array([-0.3, 0.0])  # m, x_1 - x_2
 BASES = ((-0.35, 0.0, 0.0), (0.35, 0.0, 0.0))  # m
@@ -39,17 +42,20 @@ def object_synchronization() -> SynchronizationFunction:
     return SynchronizationFunction(lambda x_1, x_2, t: x_1 - x_2 - A, robots=2, dimension=2)
 
 
-def rigid_object(synchronized: bool = True, disturbed: bool = True, gains: Gains | None = None) -> Experiment:
+def rigid_object(
+    synchronized: bool = True, disturbed: bool = True, gains: Gains | None = None, **parts: Unpack[Parts]
+) -> Experiment:
     """Two arms and the object between them, in Cartesian space.
 
     Args:
         synchronized: False sets beta = K_eps = 0.
         disturbed: whether the first arm is pushed, 1 N·m on both joints for 2 <= t < 2.2 s.
         gains: by default ours.
+        parts: `adaptation`, `law`, `network`, see `Experiment`.
     """
     members = [_member(i) for i in range(2)]
     coupling = object_synchronization().coupling([member.trajectory for member in members], DURATION)
-    gains = GAINS if gains is None else gains
+    gains = chosen_gains(gains, GAINS, parts)
     kind = "synchronized" if synchronized else "independent"
     return Experiment(
         Cell(members, coupling, SPACE, name="rigid object"),
@@ -57,6 +63,7 @@ def rigid_object(synchronized: bool = True, disturbed: bool = True, gains: Gains
         DURATION,
         (PUSH,) if disturbed else (),
         title=f"rigid object, {kind}{', disturbed' if disturbed else ''}",
+        **parts,
     )
 
 

@@ -7,6 +7,8 @@ choice and not the paper's.
 
 from __future__ import annotations
 
+from typing import Unpack
+
 import numpy as np
 
 from ..control.gains import Gains
@@ -19,6 +21,7 @@ from ..tasks.poses import Attached, AxisRotation, PoseTrajectory
 from ..tasks.reachability import reach
 from ..tasks.rotations import exp
 from ..tasks.trajectories import FunctionTrajectory
+from .parts import Parts, chosen_gains
 
 DISTANCE = 0.65  # m, of each base from the middle
 LENGTH = 0.40  # m, of the payload: from hand to hand
@@ -41,7 +44,7 @@ GAINS = Gains(
 )
 
 
-def ur5_payload(synchronized: bool = True, gains: Gains | None = None) -> Experiment:
+def ur5_payload(synchronized: bool = True, gains: Gains | None = None, **parts: Unpack[Parts]) -> Experiment:
     """The two-arm cell in pose space, with epsilon = e_1 - e_2 in position and orientation.
 
     Without friction, and with 0.7 of the true inertial parameters as the first estimate. The arms start at
@@ -50,14 +53,16 @@ def ur5_payload(synchronized: bool = True, gains: Gains | None = None) -> Experi
     Args:
         synchronized: False sets beta = K_eps = 0, independent adaptive control.
         gains: by default ones that converge within the run.
+        parts: `adaptation`, `law`, `network`, see `Experiment`.
     """
-    gains = GAINS if gains is None else gains
+    gains = chosen_gains(gains, GAINS, parts)
     kind = "synchronized" if synchronized else "independent"
     return Experiment(
         Cell([_member(i) for i in range(2)], Coupling.pair(), PoseSpace(), name="UR5 pair with payload"),
         gains if synchronized else gains.independent(),
         DURATION,
         title=f"UR5 pair with payload, {kind}",
+        **parts,
     )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from ..analysis.lyapunov import ENERGIES, THEOREM, Growth, Lyapunov
+from ..analysis.lyapunov import Growth, Lyapunov
 from .panels import GAP, LEGEND, power_of_ten, stacked_panels
 from .plots import style
 from .style import ACCENT, DESIRED, PALETTE
@@ -33,7 +33,7 @@ def lyapunov_figure(record: Lyapunov) -> Figure:
         record: of `synctrl.analysis.lyapunov.lyapunov`.
     """
     with style():
-        energies, powers = _visible(record.energy, ENERGIES), _visible(record.power, tuple(record.power))
+        energies, powers = (_visible(terms, tuple(terms)) for terms in (record.energy, record.power))
         above = [GAP + LEGEND * -(-(len(terms) + 1) // COLUMNS) for terms in (energies, powers)]
         figure, panels = stacked_panels([PANEL, PANEL], above)
         _energies(panels[0], record, energies)
@@ -75,7 +75,7 @@ def _powers(panel: Axes, record: Lyapunov, shown: Terms) -> None:
     largest = float(np.abs(list(record.power.values())).max())
     panel.set_yscale("symlog", linthresh=max(LINEAR * largest, float(record.rounding.max()), 1e-300))
     for name, color in shown:
-        inside = "-" if name in THEOREM else "--"
+        inside = "-" if name in record.inside else "--"
         panel.plot(record.t, record.power[name], inside, color=color, label=name)
     panel.plot(record.t, record.V_dot, color=DESIRED, linewidth=2.0, label="V'", zorder=1)
     panel.axhline(0.0, color="#8a929c", linewidth=0.8)

@@ -12,7 +12,7 @@ from .state import Layout, State
 
 
 class ClosedLoop:
-    """y' = f(t, y) with y = (q, v, z, integrals of epsilon, state of the plant's own), see `State`.
+    """y' = f(t, y) with y = (q, v, z, memory of the network, state of the plant's own), see `State`.
 
     Args:
         controller: the controller of a cell.
@@ -22,17 +22,17 @@ class ClosedLoop:
     def __init__(self, controller: Controller, plant: Plant):
         self.controller, self.plant = controller, plant
         self.cell, self._law = controller.cell, controller.unchecked
-        self._z0 = controller.adaptation.start()
-        self._layout = Layout(self.cell, self._z0.shape, plant.hidden0.size)
+        self._z0, self._memory0 = controller.adaptation.start(), np.asarray(controller.network.start())
+        self._layout = Layout(self.cell, self._z0.shape, self._memory0.shape, plant.hidden0.size)
         self.size = self._layout.size
-        parts = (controller, controller.adaptation, plant, self.cell.space, *self.cell.parameters)
+        seams = controller.adaptation, controller.law, controller.network
+        parts = (controller, *seams, plant, self.cell.space, *self.cell.parameters)
         self._foreign = [type(part) for part in parts if not _is_ours(type(part))]
 
     def initial_state(self) -> np.ndarray:
         """y at t = 0."""
         cell = self.cell
-        integral = np.zeros(cell.coupling.pairs * cell.m)
-        parts = (cell.q0, cell.v0, self._z0, integral, self.plant.hidden0)
+        parts = (cell.q0, cell.v0, self._z0, self._memory0, self.plant.hidden0)
         return np.concatenate([part.ravel() for part in parts])
 
     def state(self, y: np.ndarray | None = None) -> State:
@@ -45,9 +45,9 @@ class ClosedLoop:
         return self if plant is self.plant else ClosedLoop(self.controller, plant)
 
     def split(self, y: np.ndarray) -> list[np.ndarray]:
-        """Views of q, v, z and the integrals in y."""
+        """Views of q, v, z and the memory of the network in y."""
         state = self.state(y)
-        return [state.q, state.v, state.z, state.integral]
+        return [state.q, state.v, state.z, state.memory]
 
     def hidden(self, y: np.ndarray) -> np.ndarray:
         """View of the state of the plant's own in y."""
@@ -71,7 +71,7 @@ class ClosedLoop:
         self, reference: Reference, state: State, disturbance: np.ndarray | None, rate: State
     ) -> Signals:
         """`evaluate` for states whose views are at hand: y' is written into `rate`."""
-        signals = self._law(reference, state.motion, state.z, state.integral)
+        signals = self._law(reference, state.motion, state.z, state.memory)
         tau = self.plant.applied(signals.tau)
         if disturbance is not None:
             tau = tau + disturbance
@@ -79,7 +79,7 @@ class ClosedLoop:
         if self._foreign:
             self._watch(state, signals, v_dot)
         rate.q[...], rate.v[...] = state.v, v_dot
-        rate.z[...], rate.integral[...] = signals.z_dot, signals.command.epsilon
+        rate.z[...], rate.memory[...] = signals.z_dot, signals.command.memory_dot
         if hidden_dot.size:
             rate.hidden[...] = hidden_dot
         return signals

@@ -122,8 +122,8 @@ def _maps(
     task = cell.task.measure(motion, reference.desired)
     wanted = cell.task.to_joints(task, *task.rates)
     if driven:
-        integral = np.zeros((cell.coupling.pairs, cell.m))
-        signals = loop.controller.evaluate(reference, motion, loop.controller.adaptation.start(), integral)
+        memory, z = loop.controller.network.start(), loop.controller.adaptation.start()
+        signals = loop.controller.evaluate(reference, motion, z, memory)
         wanted = signals.v_ref, signals.a_ref
     regressor = regressors(cell.parameters, [robot.nv for robot in cell.robots])
     Y = regressor(*motion, *wanted).matrices()

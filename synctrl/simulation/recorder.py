@@ -103,7 +103,8 @@ class SampleRecorder(Recorder):
     def _allocate(self, shapes: Mapping[str, list[int]]) -> dict[str, np.ndarray]:
         order = {name: shapes[name] for name in (*_SIGNALS, *_STATE, *own_states(self._loop))}
         ends = np.cumsum([int(np.prod(shape[1:])) for shape in order.values()])
-        self._log, self._logs_z = np.zeros((order["t"][0], ends[-1])), ADAPTATION_STATE in order
+        self._log = np.zeros((order["t"][0], ends[-1]))
+        self._logs_z, self._logs_memory = ADAPTATION_STATE in order, NETWORK_STATE in order
         columns = np.split(self._log, ends[:-1], axis=1)
         arrays = {name: part.reshape(order[name]) for name, part in zip(order, columns, strict=True)}
         return {name: arrays[name] for name in shapes}
@@ -111,12 +112,13 @@ class SampleRecorder(Recorder):
     def add(self, sample: Sample) -> None:
         """Log one instant."""
         s, row, y = sample.signals, self._log[self.count], self._loop.state(sample.y)
+        integral = self._loop.controller.network.integral(y.memory)
         task, command = s.task, s.command
         row[0] = sample.t
         values = (
             task.motion[0], s.reference.desired[0], task.error[0], command.epsilon, command.e_star,
-            s.s_q, s.tau, sample.disturbance, y.motion, s.theta_hat, y.integral,
-            *([y.z] if self._logs_z else []), y.hidden,
+            s.s_q, s.tau, sample.disturbance, y.motion, s.theta_hat, integral,
+            *([y.z] if self._logs_z else []), *([y.memory] if self._logs_memory else []), y.hidden,
         )  # fmt: skip
         np.concatenate([value.ravel() for value in values], out=row[1:])
         self._damping.add(self.count, s)
@@ -128,18 +130,25 @@ _SIGNALS = (
     "t", "x", "x_desired", "tracking_error", "sync_error", "coupled_error", "v_error", "tau", "disturbance",
 )  # fmt: skip
 _STATE = "q", "v", "theta_hat", "sync_integral"
-#: outputs that have what an adaptation and a plant have of their own in the state of the loop
-ADAPTATION_STATE, PLANT_STATE = "adaptation_state", "plant_state"
-_STATE_AXES = {ADAPTATION_STATE: ("time", "robot", "state"), PLANT_STATE: ("time", "plant state")}
+#: outputs that have what an adaptation, a network and a plant have of their own in the state of the loop
+ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE = "adaptation_state", "network_state", "plant_state"
+_STATE_AXES = {
+    ADAPTATION_STATE: ("time", "robot", "state"),
+    NETWORK_STATE: ("time", "network state"),
+    PLANT_STATE: ("time", "plant state"),
+}
 
 
 def own_states(loop: ClosedLoop) -> dict[str, tuple[int, ...]]:
     """Shapes of the parts of the state that are in no array of `LAYOUT`, under the names of outputs.
 
-    The state of an adaptation that is theta_hat itself is logged as that.
+    The state of an adaptation that is theta_hat itself is logged as that, and so is the memory of a network
+    that is the integrals of epsilon.
     """
     z, adaptation = loop.controller.adaptation.start(), loop.controller.adaptation
+    memory, network = loop.controller.network.start(), loop.controller.network
     found = {} if adaptation.estimate(z) is z else {ADAPTATION_STATE: z.shape}
+    found |= {} if network.integral(memory) is memory else {NETWORK_STATE: (np.size(memory),)}
     return found | ({PLANT_STATE: loop.plant.hidden0.shape} if loop.plant.hidden0.size else {})
 
 
@@ -188,6 +197,8 @@ def describe(loop: ClosedLoop) -> dict[str, Any]:
         "sizes": sizes(loop),
         "gains": controller.gains.as_dict(),
         "adaptation": controller.adaptation_settings,
+        "law": controller.law_settings,
+        "network": controller.network_settings,
         "reference_acceleration": controller.reference_acceleration,
         "k_r_space": controller.k_r_space,
         "versions": versions(),

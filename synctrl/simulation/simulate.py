@@ -11,6 +11,8 @@ from ..control.adaptation import Adaptation
 from ..control.controller import Controller
 from ..control.discrete import DiscreteController
 from ..control.gains import Gains
+from ..control.laws import Law
+from ..control.network import Network
 from ..errors import InputError
 from ..tasks.cell import Cell
 from .clock import make_clock
@@ -36,26 +38,30 @@ class Experiment:
         gains: gains of the controller.
         duration: how long it runs unless told otherwise, s.
         disturbances: torques from outside.
-        reference_acceleration: "exact" or "paper", see `Controller`.
-        k_r_space: "joint" or "task", see `Controller`.
+        reference_acceleration: "exact" or "paper", shorthand for the option of `SunMills`.
+        k_r_space: "joint" or "task", where the damping acts, see `Controller`.
         title: for figures and files.
         payloads: what robots pick up and put down, of which the controller is not told.
         saturate: whether the plant cuts torques off at the limits of the robots' descriptions.
         plant_type: `Plant`, or a kind of plant with a state of its own.
         adaptation: how the controller learns; by default `Gradient(gains.Gamma)`, eq. (14).
+        law: from errors to reference motion and force; by default `SunMills`.
+        network: what the robots know of each other; by default `Ideal`.
     """
 
     cell: Cell
     gains: Gains
     duration: float
     disturbances: Sequence[Disturbance] = ()
-    reference_acceleration: str = "exact"
-    k_r_space: str = "joint"
+    reference_acceleration: str | None = None
+    k_r_space: str | None = None
     title: str | None = None
     payloads: Sequence[Payload] = ()
     saturate: bool = False
     plant_type: Callable[..., Plant] = Plant
     adaptation: Adaptation | None = None
+    law: Law | None = None
+    network: Network | None = None
 
     def __post_init__(self) -> None:
         instance("cell", self.cell, Cell, "a Cell")
@@ -73,6 +79,8 @@ class Experiment:
             self.cell,
             self.gains,
             adaptation=self.adaptation,
+            law=self.law,
+            network=self.network,
             reference_acceleration=self.reference_acceleration,
             k_r_space=self.k_r_space,
         )
@@ -198,13 +206,15 @@ def simulate(
     integrator: str = "rk4",
     *,
     disturbances: Sequence[Disturbance] = (),
-    reference_acceleration: str = "exact",
-    k_r_space: str = "joint",
+    reference_acceleration: str | None = None,
+    k_r_space: str | None = None,
     title: str | None = None,
     payloads: Sequence[Payload] = (),
     saturate: bool = False,
     plant_type: Callable[..., Plant] = Plant,
     adaptation: Adaptation | None = None,
+    law: Law | None = None,
+    network: Network | None = None,
     engine: str = "pinocchio",
     plant: str = "pinocchio",
     control_period: float | None = None,
@@ -218,7 +228,7 @@ def simulate(
     Args:
         cell, gains, duration: as in `Experiment`.
         disturbances, reference_acceleration, k_r_space, title: as in `Experiment`.
-        payloads, saturate, plant_type, adaptation: as in `Experiment`.
+        payloads, saturate, plant_type, adaptation, law, network: as in `Experiment`.
         dt, integrator, engine, plant, control_period, log_dt: as in `Experiment.simulate`.
         rtol, atol, progress: as in `Experiment.simulate`.
 
@@ -238,6 +248,8 @@ def simulate(
         saturate,
         plant_type,
         adaptation,
+        law,
+        network,
     )
     return experiment.simulate(
         dt=dt,

@@ -1,4 +1,4 @@
-"""The state of a closed loop, y = (q, v, z, integrals of epsilon, the plant's own)."""
+"""The state of a closed loop, y = (q, v, z, memory of the network, the plant's own)."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ class State:
         motion: q and v together, (2, n, nv).
         q, v: joint positions and velocities, (n, nv).
         z: state of the adaptation, (n, Z).
-        integral: integrals of the synchronization errors, (p, m).
+        memory: of the network; with `Ideal` the integrals of the synchronization errors, (p, m).
         hidden: state of the plant's own.
     """
 
-    __slots__ = ("flat", "hidden", "integral", "motion", "q", "v", "z")
+    __slots__ = ("flat", "hidden", "memory", "motion", "q", "v", "z")
 
     def __init__(self, layout: Layout, flat: np.ndarray):
         a, b, c = layout.ends
@@ -27,7 +27,7 @@ class State:
         self.motion = flat[:a].reshape(layout.motion)
         self.q, self.v = self.motion
         self.z = flat[a:b].reshape(layout.z)
-        self.integral = flat[b:c].reshape(layout.integral)
+        self.memory = flat[b:c].reshape(layout.memory)
         self.hidden = flat[c:]
 
     def ahead(self, y: State, h: float, rate: np.ndarray) -> State:
@@ -42,12 +42,11 @@ class Layout:
 
     Args:
         cell: the cell.
-        z: shape of the state of the adaptation.
+        z, memory: shapes of the state of the adaptation and of the memory of the network.
         hidden: size of the plant's own state.
     """
 
-    def __init__(self, cell: Cell, z: tuple[int, ...], hidden: int):
-        self.motion, self.z = (2, cell.n, cell.nv), z
-        self.integral = cell.coupling.pairs, cell.m
-        self.ends = tuple(np.cumsum([np.prod(s) for s in (self.motion, self.z, self.integral)]).tolist())
+    def __init__(self, cell: Cell, z: tuple[int, ...], memory: tuple[int, ...], hidden: int):
+        self.motion, self.z, self.memory = (2, cell.n, cell.nv), z, memory
+        self.ends = tuple(np.cumsum([np.prod(s) for s in (self.motion, self.z, self.memory)]).tolist())
         self.size = self.ends[-1] + hidden

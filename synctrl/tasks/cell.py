@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from math import nan
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,10 +68,12 @@ class Reference:
     Attributes:
         desired: xd, xd' and xd'', (3, n, m).
         weights: c, c', c'' and c^-1, each (n, m, m).
+        t: the instant, s, or all of them, (T,); NaN where nobody asks.
     """
 
     desired: np.ndarray
     weights: Weights
+    t: Any = nan
 
     xd = property(lambda self: self.desired[..., 0, :, :])
     xd_dot = property(lambda self: self.desired[..., 1, :, :])
@@ -156,7 +160,7 @@ class Cell:
     def reference_table(self, times: np.ndarray) -> Reference:
         """What is desired at all of the times, (T,), with time as the first axis."""
         motions = np.stack([self.motion(i, times) for i in range(self.n)])  # (n, 3, T, m)
-        return Reference(motions.transpose(2, 1, 0, 3), self.weights(times))
+        return Reference(motions.transpose(2, 1, 0, 3), self.weights(times), times)
 
     def motion(self, robot: int, times: np.ndarray) -> Motion:
         """What is desired of one robot at the times, (T,); see `desired_motion`."""
@@ -172,12 +176,12 @@ class Cell:
 
     def instants(self, table: Reference, part: slice = slice(None)) -> Iterator[Reference]:
         """The instants in a part of a table, one after another."""
-        desired = np.ascontiguousarray(table.desired[part])
+        desired, times = np.ascontiguousarray(table.desired[part]), table.t[part].tolist()
         if self.coupling.is_constant:
             constant = Weights(*(weight[0] for weight in table.weights))
-            return (Reference(row, constant) for row in desired)
-        rows = zip(desired, *(weight[part] for weight in table.weights), strict=True)
-        return (Reference(row, Weights(*weights)) for row, *weights in rows)
+            return (Reference(row, constant, t) for row, t in zip(desired, times, strict=True))
+        rows = zip(desired, times, *(weight[part] for weight in table.weights), strict=True)
+        return (Reference(row, Weights(*weights), t) for row, t, *weights in rows)
 
     # -- internals ----------------------------------------------------------------------------------------
 

@@ -14,6 +14,7 @@ from ...robots.friction_parameters import FrictionParameters
 from ...robots.mechanism import Mechanism, mechanism
 from ...tasks.pose import PoseSpace
 from ...tasks.spaces import CartesianSpace
+from .lawful import TracedLaw, trace_law
 from .learning import Learning, trace_learning
 
 
@@ -32,6 +33,7 @@ class Kind:
         rotors: whether rotors are adapted too.
         made_of: names of the types that the user has plugged in.
         learning: how it learns, or None for (14).
+        law: what it does, or None for `SunMills`.
     """
 
     fixed: Mechanism
@@ -46,6 +48,7 @@ class Kind:
     rotors: bool = False
     made_of: tuple[str, ...] = ()
     learning: Learning | None = None
+    law: TracedLaw | None = None
 
     @property
     def nv(self) -> int:
@@ -84,7 +87,7 @@ class Kind:
         matrix = None if self.matrix is None else self.matrix.tolist()
         options: list[Any] = [self.reference_acceleration, self.k_r_space, list(self.gravity)]
         options += [self.smoothing, self.rotors, list(self.made_of)]
-        options += [None if self.learning is None else self.learning.key()]
+        options += [None if part is None else part.key() for part in (self.learning, self.law)]
         return [self.fixed.key(), self.space, list(self.rows), matrix, shared, options]
 
 
@@ -114,10 +117,10 @@ def classify(controller: Controller) -> Classified:
     for name, (_, base) in zip(names, found, strict=True):
         rotations.setdefault(name, set()).add((base.rotation + 0.0).tobytes())  # -0 counts as 0
     kinds: dict[str, Kind] = {}
-    index, learning = [], trace_learning(controller)
+    index, learning, laws = [], trace_learning(controller), trace_law(controller)
     for i, (name, (fixed, base)) in enumerate(zip(names, found, strict=True)):
         same = len(rotations[name]) == 1
-        kind = _kind(controller, i, fixed, base.rotation if same else None, learning[i])
+        kind = _kind(controller, i, fixed, base.rotation if same else None, learning[i], laws[i])
         key = repr(kind.key())
         kinds.setdefault(key, kind)
         index.append(list(kinds).index(key))
@@ -130,6 +133,7 @@ def _kind(
     fixed: Mechanism,
     rotation: np.ndarray | None,
     learning: Learning | None,
+    law: TracedLaw | None,
 ) -> Kind:
     cell, parameters = controller.cell, controller.cell.parameters[i]
     rigid: Any = parameters.base if isinstance(parameters, FrictionParameters) else parameters
@@ -148,6 +152,7 @@ def _kind(
         getattr(parameters, "armature", False),
         tuple(type(part).__qualname__ for part in (cell.space, parameters, rigid)),
         learning,
+        law,
     )
 
 

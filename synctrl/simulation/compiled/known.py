@@ -17,10 +17,12 @@ import numpy as np
 
 from ...control import law
 from ...control.adaptation.gradient import BoundGradient
-from ...control.commands import REFERENCE_ACCELERATIONS, ConstantWeights, MovingWeights
+from ...control.commands import REFERENCE_ACCELERATIONS, Composed, ConstantWeights
 from ...control.controller import Controller
 from ...control.folded import FoldedWeights
 from ...control.gains import Gains
+from ...control.laws.sun_mills import BoundSunMills
+from ...control.network import BoundIdeal
 from ...errors import InputError
 from ...robots.base_parameters import BaseParameters
 from ...robots.friction_parameters import FrictionParameters
@@ -41,7 +43,7 @@ SPACES = (JointSpace, CartesianSpace, PoseSpace)
 BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace)
 RIGID = (FullParameters, LinearParameters, BaseParameters)
 INVERSES = (Inverse, Pseudoinverse, DampedInverse)
-LAWS = (FoldedWeights, ConstantWeights, MovingWeights)
+WAYS = (FoldedWeights, ConstantWeights, Composed)
 
 
 class Part(NamedTuple):
@@ -90,7 +92,10 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     yield Part("closed loop", loop, (ClosedLoop,))
     yield Part("plant", loop.plant, (Plant,))
     yield Part("controller", controller, (Controller,))
-    yield Part("law of the controller", controller._command, LAWS)
+    if isinstance(controller.law, BoundSunMills):  # others are traced
+        yield Part("law", controller.law, (BoundSunMills,))
+    yield Part("network", controller.network, (BoundIdeal,))
+    yield Part("law of the controller", controller._command, WAYS)
     if isinstance(controller.adaptation, BoundGradient):  # others are traced
         yield Part("adaptation", controller.adaptation, (BoundGradient,))
     yield Part("gains", controller.gains, (Gains,))
@@ -152,13 +157,30 @@ def _check_controller(controller: Controller) -> None:
     damping = controller._joint_damping if controller.k_r_space == "joint" else controller._task_damping
     if controller._damping != damping:
         raise _replaced("damping of the controller", controller._damping)
+    _check_law(controller)
     for name in ("Lambda", "beta", "K_eps"):
-        now, then = getattr(controller, name), getattr(controller.gains, name)
-        if np.shape(now) != (controller.cell.m,) or not (now == then).all():
+        then = getattr(controller.gains, name)
+        own = [part for part in (controller, controller.law) if isinstance(part, (Controller, BoundSunMills))]
+        if any(_changed(getattr(part, name), then, controller.cell.m) for part in own):
             raise InputError(
                 f"engine='compiled' does not have a controller whose {name} was changed after its law was "
                 f"made of it; make another one of changed gains, or {WAY_OUT}"
             )
+
+
+def _check_law(controller: Controller) -> None:
+    """Refuse a controller that has got another law than the one that its commands come from."""
+    way: Any = controller._command
+    if type(way) is Composed:
+        same = way.law is controller.law and way.network is controller.network
+    else:
+        same = type(controller.law) is BoundSunMills
+    if not same:
+        raise _replaced("law", controller.law)
+
+
+def _changed(now: Any, then: np.ndarray, m: int) -> bool:
+    return np.shape(now) != (m,) or not bool((now == then).all())
 
 
 def _check_plant(loop: ClosedLoop) -> None:

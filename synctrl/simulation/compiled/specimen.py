@@ -16,6 +16,8 @@ import numpy as np
 from ...control.adaptation.gradient import BoundGradient
 from ...control.controller import Controller
 from ...control.gains import Gains
+from ...control.laws import Law, SunMills
+from ...control.laws.sun_mills import BoundSunMills
 from ...robots.friction import Friction
 from ...robots.friction_parameters import FrictionParameters
 from ...robots.parameters import FullParameters, LinearParameters, Parameters
@@ -31,6 +33,7 @@ from ..closed_loop import ClosedLoop
 from ..plant import Plant
 from .chosen import Chosen
 from .kind import Classified
+from .lawful import ChosenLaw
 
 #: robots at least: with three in a ring, each is in two pairs, and each pair leaves one out
 ROBOTS = 3
@@ -102,8 +105,7 @@ class Specimen:
             cell,
             gains,
             adaptation=adaptation,
-            reference_acceleration=original.reference_acceleration,
-            k_r_space=original.k_r_space,
+            law=_law(original, robots),
         )
         return ClosedLoop(controller, Plant(cell))
 
@@ -184,6 +186,13 @@ def _most_turned(classified: Classified, kind: int) -> int:
     """The robot of a kind whose base is turned furthest: where code could forget to turn it, it shows."""
     robots = [i for i, found in enumerate(classified.kind_of) if found == kind]
     return min(robots, key=lambda i: float(np.trace(classified.bases[i].rotation)))
+
+
+def _law(original: Controller, robots: Sequence[int]) -> Law:
+    """The paper's law with the same options, or the law of the larger cell for some of its robots."""
+    if type(original.law) is BoundSunMills:
+        return SunMills(original.reference_acceleration, original.k_r_space)
+    return ChosenLaw(original, robots)
 
 
 def _member(cell: Cell, i: int) -> Member:

@@ -15,6 +15,7 @@ from ...control import law
 from ...control.commands import REFERENCE_ACCELERATIONS
 from ...robots.symbolic import Symbols
 from .kind import Kind
+from .lawful import TracedLaw
 
 
 class Trace:
@@ -125,6 +126,9 @@ class Trace:
         c, c_dot, c_ddot, c_inv = self._weights()
         E, sigma, sigma_dot = (self._array(part, m) for part in shares)
         e, x_dot, xd_dot, xd_ddot, w, w_dot = (self._array(part, m) for part in task)
+        if self.kind.law is not None:
+            given = [e, xd_dot - x_dot, x_dot, xd_dot, xd_ddot, w, w_dot, E, sigma, sigma_dot]
+            return self._other_law(self.kind.law, given)
         Lambda, beta, K_eps = (self._array(part, m) for part in gains)
         e_star = law.coupled_error(w, E, beta)
         u = law.command(c, c_dot, xd_dot, e, sigma, e_star, beta, Lambda)
@@ -136,6 +140,13 @@ class Trace:
         acceleration = REFERENCE_ACCELERATIONS[self.kind.reference_acceleration]
         xref_ddot = acceleration(c_inv, c_dot, u_dot, xref_dot, x_dot)
         return e_star, r, xref_dot, xref_ddot, law.synchronizing_force(c, sigma, K_eps)
+
+    def _other_law(self, other: TracedLaw, given: list) -> tuple:
+        """e*, r, xref', xref'' and force of a law that was traced."""
+        asked = other.command(*map(self._back, given), self.weights)
+        xref_dot, xref_ddot, force, e_star, u = (self._array(part, self.kind.m) for part in asked)
+        r = law.coupled_velocity_error(u, self._weights()[0], given[2])
+        return e_star, r, xref_dot, xref_ddot, force
 
     def _to_joints(self, xref_dot: np.ndarray, xref_ddot: np.ndarray, posture: list) -> tuple:
         """v_ref and a_ref, by the formulas of `Inverse` and `Pseudoinverse` in tasks/redundancy.py."""

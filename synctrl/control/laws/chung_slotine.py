@@ -1,0 +1,82 @@
+"""Damping between robots instead of springs, after Chung and Slotine (2009), for any coupling."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import finite_array
+from ...errors import InputError
+from ...tasks.cell import Cell
+from ...tasks.coupling import Coupling
+from .. import law
+from ..gains import Gains, spread
+from .protocol import Along, Asked, Errors, Proof
+
+
+class ChungSlotine:
+    """Every robot tracks, and differences between their velocity errors are damped.
+
+        r = w' + Lambda w,  rho = S r,  xref' = c^-1 (c xd' + c' e + Lambda w),
+        f_i = c_i^T K_2 sum_k S_ki rho_k,  so that  V' = -s_q^T K_r s_q - sum_k rho_k^T K_2 rho_k.
+
+    Of the gains it takes Lambda; it has no place for beta and K_eps, which have to be zero.
+
+    Args:
+        K_2: damping between robots, a number or (m,), N·m·s/rad when c has no unit, not below 0.
+
+    Raises:
+        InputError: not numbers, not finite, or below 0.
+    """
+
+    def __init__(self, K_2: ArrayLike):
+        self.K_2 = finite_array("K_2", K_2)
+        if self.K_2.size and self.K_2.min() < 0:
+            raise InputError(f"K_2: expected entries of at least 0, found {self.K_2.min():g}")
+
+    def bind(self, cell: Cell, gains: Gains) -> BoundChungSlotine:
+        """This law for a cell.
+
+        Raises:
+            InputError: gains of another size, or beta or K_eps that are not zero.
+        """
+        for name in ("beta", "K_eps"):
+            if getattr(gains, name).any():
+                raise InputError(
+                    f"gains: expected {name} = 0 with the law ChungSlotine, which has no place for it, found "
+                    f"{getattr(gains, name).tolist()}; gains.independent() sets beta and K_eps to zero"
+                )
+        m = cell.m
+        return BoundChungSlotine(
+            spread("Lambda", gains.Lambda, (m,)), spread("K_2", self.K_2, (m,)), cell.coupling
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        return {"name": "ChungSlotine", "K_2": self.K_2.tolist()}
+
+
+class BoundChungSlotine:
+    """`ChungSlotine` with gains, (m,), and the coupling that compares r."""
+
+    def __init__(self, Lambda: np.ndarray, K_2: np.ndarray, coupling: Coupling):
+        self.Lambda, self.K_2, self._coupling = Lambda, K_2, coupling
+
+    def command(self, errors: Errors) -> Asked:
+        x, Lambda = errors, self.Lambda
+        none = np.zeros_like(Lambda)
+        u = law.command(x.c, x.c_dot, x.xd_dot, x.e, x.sigma, x.w, none, Lambda)
+        u_dot = law.command_dot(
+            x.c, x.c_dot, x.c_ddot, x.xd_dot, x.xd_ddot, x.e, x.e_dot, x.w_dot, x.sigma, x.sigma_dot,
+            none, Lambda,
+        )  # fmt: skip
+        xref_dot = law.reference_velocity(x.c_inv, u)
+        xref_ddot = law.reference_acceleration_exact(x.c_inv, x.c_dot, u_dot, xref_dot, x.x_dot)
+        force = law.transposed_times(x.c, self.K_2 * (x.sigma_dot + Lambda * x.sigma))
+        return Asked(xref_dot, xref_ddot, force, x.w, np.stack((u, u_dot)))
+
+    def proof(self, along: Along) -> Proof:
+        """No energy of its own; it only takes."""
+        rho = self._coupling.compare(along.r)
+        return Proof({}, {}, {"mutual damping": -rho * self.K_2 * rho})

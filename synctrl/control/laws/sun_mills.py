@@ -1,0 +1,96 @@
+"""The paper's law: coupled errors, and a force on synchronization errors, eqs. (7)-(13) and (28)-(32)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...checks import choice
+from ...tasks.cell import Cell
+from .. import law
+from ..gains import Gains, spread
+from .protocol import Along, Asked, Errors, Proof
+
+REFERENCE_ACCELERATIONS = {
+    "exact": law.reference_acceleration_exact,
+    "paper": law.reference_acceleration_paper,
+}
+#: where the damping K_r may act
+K_R_SPACES = "joint", "task"
+
+
+class SunMills:
+    """The law of the paper, with the gains Lambda, beta and K_eps, eqs. (7)-(13) and (28)-(32).
+
+    Args:
+        reference_acceleration: "exact", the derivative of xref', or "paper", as (13) prints it.
+        k_r_space: "joint" for damping K_r s_q, or "task" for J^T K_r c^-1 r.
+
+    Raises:
+        InputError: an unknown word.
+    """
+
+    def __init__(self, reference_acceleration: str = "exact", k_r_space: str = "joint"):
+        self.reference_acceleration = choice(
+            "reference_acceleration", reference_acceleration, tuple(REFERENCE_ACCELERATIONS)
+        )
+        self.k_r_space = choice("k_r_space", k_r_space, K_R_SPACES)
+
+    def bind(self, cell: Cell, gains: Gains) -> BoundSunMills:
+        """This law for a cell.
+
+        Raises:
+            InputError: gains of another size.
+        """
+        Lambda, beta, K_eps = (
+            spread(name, getattr(gains, name), (cell.m,)) for name in ("Lambda", "beta", "K_eps")
+        )
+        return BoundSunMills(Lambda, beta, K_eps, self.reference_acceleration)
+
+    def as_dict(self) -> dict[str, Any]:
+        return {
+            "name": "SunMills",
+            "reference_acceleration": self.reference_acceleration,
+            "k_r_space": self.k_r_space,
+        }
+
+
+class BoundSunMills:
+    """`SunMills` with gains, (m,)."""
+
+    def __init__(self, Lambda: np.ndarray, beta: np.ndarray, K_eps: np.ndarray, reference_acceleration: str):
+        self.Lambda, self.beta, self.K_eps = Lambda, beta, K_eps
+        self._acceleration = REFERENCE_ACCELERATIONS[reference_acceleration]
+
+    def command(self, errors: Errors) -> Asked:
+        x, Lambda, beta = errors, self.Lambda, self.beta
+        e_star = law.coupled_error(x.w, x.E, beta)
+        u = law.command(x.c, x.c_dot, x.xd_dot, x.e, x.sigma, e_star, beta, Lambda)
+        u_dot = law.command_dot(
+            x.c, x.c_dot, x.c_ddot, x.xd_dot, x.xd_ddot, x.e, x.e_dot, x.w_dot, x.sigma, x.sigma_dot,
+            beta, Lambda,
+        )  # fmt: skip
+        xref_dot = law.reference_velocity(x.c_inv, u)
+        xref_ddot = self._acceleration(x.c_inv, x.c_dot, u_dot, xref_dot, x.x_dot)
+        force = law.synchronizing_force(x.c, x.sigma, self.K_eps)
+        return Asked(xref_dot, xref_ddot, force, e_star, np.stack((u, u_dot)))
+
+    def proof(self, along: Along) -> Proof:
+        """Springs on epsilon and E, and what they lose, (19), (24), (34) and (39)."""
+        K_eps, beta, Lambda = self.K_eps, self.beta, self.Lambda
+        epsilon, E, sigma = along.epsilon, along.E, along.sigma
+        return Proof(
+            {
+                "synchronization": 0.5 * epsilon * K_eps * epsilon,
+                "integral": 0.5 * E * K_eps * Lambda * beta * E,
+            },
+            {
+                "synchronization": epsilon * K_eps * along.epsilon_dot,
+                "integral": E * K_eps * Lambda * beta * sigma,
+            },
+            {
+                "synchronization rate": -epsilon * K_eps * Lambda * epsilon,
+                "coupling": -sigma * K_eps * beta * sigma,
+            },
+        )
