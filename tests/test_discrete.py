@@ -13,7 +13,7 @@ import pytest
 from cells import SMALL_GAINS, random_experiment, small_cell
 from hypothesis import given
 from hypothesis import strategies as st
-from seams.leaky_adaptation import Leaky
+from seams.leaky_adaptation import BoundLeaky, Leaky
 
 from synctrl import (
     CartesianSpace,
@@ -60,6 +60,18 @@ def weak() -> Experiment:
     return Experiment(cell, Gains(10.0, 5.0, 4.0, 2.0, 0.5), 0.1, saturate=True)
 
 
+class Bounded(Leaky):
+    """Estimates that move by no more than a little, once in a period."""
+
+    def bind(self, cell: Cell) -> BoundLeaky:
+        return BoundBounded(self.Gamma, self.nu, cell.theta_hat0)
+
+
+class BoundBounded(BoundLeaky):
+    def settle(self, z):
+        return self.theta_hat0 + 1e-5 * np.tanh((z - self.theta_hat0) / 1e-5)
+
+
 #: every ready cell, and whatever else a run may have
 CELLS: dict[str, Callable[[], Experiment]] = {
     "four planar arms": planar_four,
@@ -69,6 +81,7 @@ CELLS: dict[str, Callable[[], Experiment]] = {
     "two A460, (13) as printed": lambda: a460_pair(friction=False, reference_acceleration="paper"),
     "two A460, natural adaptation": lambda: learning(a460_pair(), Natural(0.1)),
     "two A460, an adaptation of one's own": lambda: learning(a460_pair(), Leaky(0.3, 0.1)),
+    "two A460, bounded estimates": lambda: learning(a460_pair(), Bounded(0.3, 0.1)),
     "two arms, saturated": weak,
     "two A460 with a payload": lambda: replace(a460_pair(), payloads=[Payload(0, 3.0, start=0.013)]),
     "two six-joint A460": a460_full_pair,
@@ -80,7 +93,13 @@ CELLS: dict[str, Callable[[], Experiment]] = {
     "moving weights": lambda: random_experiment(3),
 }
 #: of which the compiled engine has some not
-INTERPRETED = {"two six-joint A460", "two arms, saturated", "two A460 with a payload", "moving weights"}
+INTERPRETED = {
+    "two A460, bounded estimates",
+    "two six-joint A460",
+    "two arms, saturated",
+    "two A460 with a payload",
+    "moving weights",
+}
 
 
 def small(**options: object) -> Experiment:
@@ -134,6 +153,16 @@ def test_the_compiled_engine_agrees(name):
     for array in LAYOUT:
         expected, found = (getattr(run, array) for run in runs)
         assert np.abs(found - expected).max() <= 1e-9 * (np.abs(expected).max() + 1e-12), array
+
+
+def test_what_an_adaptation_makes_of_its_state_is_made_once_a_period_and_not_compiled():
+    experiment = CELLS["two A460, bounded estimates"]()
+    run = experiment.simulate(0.04, control_period=PERIOD)
+    moved = np.abs(run.theta_hat - run.theta_hat[0]).max(axis=(1, 2))
+    assert 0.9e-5 < moved[::4].max() < 1.001e-5 < moved.max()
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    with pytest.raises(InputError, match=r"BoundBounded.* settle that does more"):
+        experiment.simulate(0.04, control_period=PERIOD, engine="compiled")
 
 
 def on_the_way(run: Result, state: np.ndarray, every: int) -> None:
