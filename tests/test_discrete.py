@@ -304,6 +304,24 @@ def test_periods_that_were_missed_teach_nothing():
     assert_same_state(gap, other)
 
 
+@given(st.lists(st.tuples(st.floats(-5, 30), st.sampled_from([0.0, np.nan, np.inf])), max_size=12))
+def test_where_faults_are_held_every_call_has_a_torque_and_the_next_sample_is_taken(calls):
+    controller, q, v = started("hold")
+    controller.step(0.0, q, v)
+    good = 1
+    for periods, number in calls:
+        known = controller.state
+        assert np.isfinite(controller.step(periods * PERIOD, q, v + number)).all()
+        taken = (controller.state["z"] != known["z"]).any()
+        good += taken
+        assert taken or controller.held > known["held"]
+        assert controller.state["samples"] >= known["samples"]
+        assert controller.state["samples"] <= good + controller.held
+    known = controller.state
+    controller.step(float(known["samples"]) * PERIOD, q, v)
+    assert (controller.state["z"] != known["z"]).any() and controller.held == known["held"]
+
+
 def test_before_the_first_sample_there_is_nothing_to_hold():
     controller, q, v = started("hold")
     for t, position in ((0.0, np.nan), (2 * PERIOD, 1.0)):
@@ -499,6 +517,7 @@ def files(folder: Path) -> dict[str, Path]:
         "turned round": {**state, "z": state["z"].T},
         "objects": {**state, "z": np.array([[Bomb()]], dtype=object)},
         "not finite": {**state, "z": state["z"] * np.nan},
+        "another period": {**state, "period": 2 * state["period"]},
         "large": {**state, "more": np.zeros(10**6)},
     }
     for name, content in contents.items():
