@@ -1,7 +1,7 @@
 """Engines: what takes a planned run through time, by name in one table, or a user's own.
 
-An engine of one's own is an object with `refuses` and `run`. It has the closed loop as `run.loop`, the
-instants as `run.clock` and what pushes as `run.schedule`; `collect` of run.py watches and logs what it yields.
+An engine of one's own is an object with `refuses` and `run`. It finds the closed loop in `run.loop`,
+instants in `run.clock` and pushes in `run.schedule`; `collect` of run.py watches and logs what it yields.
 """
 
 from __future__ import annotations

@@ -70,7 +70,8 @@ def run_reference(run: Run, progress: Progress | None = None) -> Result:
     """A planned run by the reference engine and the fixed-step integrator."""
     plan = run.loop, run.clock, run.schedule
     if run.every is not None:
-        return collect(run, sampled_rk4(*plan, run.every, run.step_error), progress)
+        period = float(run.info["control_period"])
+        return collect(run, sampled_rk4(*plan, run.every, period, run.step_error), progress)
     return collect(run, rk4(*plan, run.step_error), progress)
 
 
