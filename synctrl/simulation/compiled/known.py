@@ -33,6 +33,7 @@ from ...tasks.redundancy import DampedInverse, Inverse, Pseudoinverse, Redundanc
 from ...tasks.spaces import BoundCartesianSpace, BoundJointSpace, CartesianSpace, JointSpace
 from ...tasks.tips import Tips
 from ..closed_loop import ClosedLoop
+from ..payloads import PayloadSchedule
 from ..plant import Plant
 
 WAY_OUT = "use engine='pinocchio'"
@@ -89,6 +90,7 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     task: Any = cell.task
     yield Part("closed loop", loop, (ClosedLoop,))
     yield Part("plant", loop.plant, (Plant,))
+    yield Part("schedule of payloads", loop.plant.schedule, (PayloadSchedule,))
     yield Part("controller", controller, (Controller,))
     yield Part("law of the controller", controller._command, LAWS)
     if isinstance(controller.adaptation, BoundGradient):  # others are traced
@@ -165,10 +167,9 @@ def _check_plant(loop: ClosedLoop) -> None:
     plant, robots = loop.plant, loop.controller.cell.robots
     special = {
         f"plant='{plant.physics}'": plant.physics != "pinocchio",
-        "saturation": plant.saturate,
-        "payloads": bool(plant.payloads),
         "a plant with a state of its own": plant.hidden0.size > 0,
-        "a plant with other robots than the cell": list(map(id, plant.robots)) != list(map(id, robots)),
+        "a plant with other robots than the cell": list(map(id, plant.schedule.free))
+        != list(map(id, robots)),
     }
     for name in (name for name, found in special.items() if found):
         raise InputError(f"engine='compiled' does not have {name}; {WAY_OUT}")
