@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..simulation.plant import Plant
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .convergence import Convergence, convergence_of
@@ -118,11 +119,20 @@ def _outside(run: Replay, record: Lyapunov, condition: GainCondition) -> list[st
         if name in run.learning and name not in _WORDS and not (power > record.rounding).any():
             continue  # a power of the adaptation that only takes from V
         if name != "weight rate" and (np.abs(power) > record.rounding).any():
-            words = _WORDS.get(name, f"the adaptation's {name}")
+            words = _in_words(run, name)
             found.append(f"{words}: power from {power.min():.3g} to {power.max():.3g}")
     if condition.needed and not condition.holds:
         found.append(f"the gain condition fails: {_condition_in_words(run, condition)}")
     return found
+
+
+def _in_words(run: Replay, name: str) -> str:
+    """A power that the theorem does not know, with the plant that it comes from if that is a special one."""
+    plant = type(run.loop.plant)
+    special = name == "other" and plant is not Plant
+    return _WORDS.get(name, f"the adaptation's {name}") + (
+        f", of the plant {plant.__qualname__}" if special else ""
+    )
 
 
 _WORDS = {
