@@ -160,12 +160,19 @@ def _doubts(
         found.append(
             f"the balance of V does not close: V - V(0) - integral of V' reaches {record.largest_drift:.3g}, "
             f"numerical errors explain {record.drift_bound:.3g}; the step is too long to follow this motion"
+            + _advice(run.result)
         )
     if growth is not None and not outside:
         found.append(f"V grows at t = {growth.time:g} s by the term '{growth.term}'")
     if not errors.identity_holds:
         found.append(f"w = N e* + S+ epsilon is off by {errors.identity:.3g}")
     return found
+
+
+def _advice(result: Result) -> str:
+    """The step that the run itself advises, in words; nothing if it does not."""
+    step = (result.info.get("step_error") or {}).get("advised_step")
+    return "" if step is None else f", expected at most dt = {step:g} s"
 
 
 def _condition_in_words(run: Replay, condition: GainCondition) -> str:
