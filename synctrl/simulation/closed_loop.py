@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..control.controller import Controller, Signals
-from ..errors import NonFiniteError
+from ..errors import InputError, NonFiniteError
 from ..tasks.cell import Reference
 from .plant import Plant
 from .state import Layout, State
@@ -34,6 +34,22 @@ class ClosedLoop:
         cell = self.cell
         parts = (cell.q0, cell.v0, self._z0, self._memory0, self.plant.hidden0)
         return np.concatenate([part.ravel() for part in parts])
+
+    def check_plant(self) -> None:
+        """Refuse a plant whose rates do not fit what they are the rates of.
+
+        Raises:
+            InputError: of another shape.
+        """
+        q, hidden = self.cell.q0, self.plant.hidden0
+        rates = self.plant.move(q, self.cell.v0, np.zeros(q.shape), hidden)
+        shapes = {"acceleration": q.shape, "rate of its own state": hidden.shape}
+        for (what, expected), rate in zip(shapes.items(), rates, strict=True):
+            if np.shape(rate) != expected:
+                raise InputError(
+                    f"plant, {type(self.plant).__qualname__}: expected {expected} numbers as its {what}, "
+                    f"found {np.shape(rate)}"
+                )
 
     def state(self, y: np.ndarray | None = None) -> State:
         """The parts of y, or of a new y that holds nothing yet."""

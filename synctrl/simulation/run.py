@@ -61,6 +61,7 @@ class Run(NamedTuple):
         cell = self.loop.cell
         with _before_the_start(self):
             self.loop.plant.prepare()
+            self.loop.check_plant()
             check_motions(cell, np.array([0.0, self.clock.end]))
             check_reachable(cell, self.clock.spread(SAMPLES))
             cell.coupling.check_weights(self.clock.spread(WEIGHT_SAMPLES), cell.m)
