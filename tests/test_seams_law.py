@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from synctrl.analysis.lyapunov import first_growth, lyapunov
 from synctrl.control.adaptation import Gradient
 from synctrl.control.laws import Along, Asked, ChungSlotine, Errors, SunMills
 from synctrl.control.network import Ideal
-from synctrl.errors import InputError
+from synctrl.errors import InputError, NonFiniteError
 from synctrl.experiments import (
     a460_full_pair,
     a460_pair,
@@ -125,6 +126,14 @@ def test_gains_it_has_no_place_for_are_refused():
         ChungSlotine(-1.0)
     with pytest.raises(InputError, match="K_2"):
         replace(planar_four(synchronized=False), law=ChungSlotine((1.0, 2.0, 3.0)))
+
+
+def test_a_step_too_long_for_a_law_is_named():
+    run = replace(planar_four(synchronized=False), law=ChungSlotine(30.0))
+    with pytest.raises(NonFiniteError, match="its law needs at most") as caught:
+        run.simulate(0.1, 1e-3)
+    needed = float(re.search("at most ([0-9.e-]+) s", str(caught.value)).group(1))
+    assert run.simulate(0.01, needed / 2).status == "completed"
 
 
 # -- the paper's law by its name --------------------------------------------------------------------------

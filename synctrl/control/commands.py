@@ -145,7 +145,7 @@ class Composed:
         memory = self.network.start()
         integral = self.network.integral(memory)
         heard = self.network.exchange(0.0, np.zeros((2, n, m)), memory)
-        asked = self.law.command(_no_errors(n, m))
+        asked = self.law.command(no_errors(n, m))
         _check_shapes("network", self.network, {
             "epsilon": (heard.epsilon, (p, m)), "epsilon_dot": (heard.epsilon_dot, (p, m)),
             "shares": (heard.shares, (3, n, m)), "memory_dot": (heard.memory_dot, np.shape(memory)),
@@ -157,7 +157,7 @@ class Composed:
         })  # fmt: skip
 
 
-def _no_errors(n: int, m: int) -> Errors:
+def no_errors(n: int, m: int) -> Errors:
     """Errors that are all zero, under weights of one."""
     o, one, zero = np.zeros((n, m)), np.broadcast_to(np.eye(m), (n, m, m)), np.zeros((n, m, m))
     return Errors(0.0, o, o, o, o, o, o, o, o, o, o, one, zero, zero, one)
