@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -32,6 +33,10 @@ from synctrl.experiments import (
 )
 from synctrl.simulation.prepared import Prepared
 
+compiled = pytest.mark.skipif(
+    find_spec("casadi") is None, reason="CasADi is an extra: pip install 'synctrl[compiled]'"
+)
+ENGINES = ["pinocchio", pytest.param("compiled", marks=compiled)]
 SEEDS = st.integers(0, 2**32 - 1)
 GAINS = Gains(Lambda=4.0, beta=3.0, K_r=2.0, K_eps=1.5, Gamma=0.02)
 LAWS = {
@@ -139,7 +144,7 @@ def test_a_step_too_long_for_a_law_is_named():
 # -- the paper's law by its name --------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("engine", ["pinocchio", "compiled"])
+@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("acceleration", ["exact", "paper"])
 @pytest.mark.parametrize("space", ["joint", "task"])
 def test_options_beside_the_law_are_shorthand_for_its_own(engine, acceleration, space):
@@ -184,6 +189,7 @@ CASES = {
 }
 
 
+@compiled
 @pytest.mark.parametrize("name", CASES)
 def test_both_engines_agree_on_any_law(name):
     run = CASES[name]()
@@ -193,6 +199,7 @@ def test_both_engines_agree_on_any_law(name):
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * (1 + np.abs(expected).max()))
 
 
+@compiled
 def test_the_settings_of_a_law_are_compiled_and_not_mixed_up():
     for k in (0.3, 3.0):
         run = replace(planar_four(), law=Pulling(k))
@@ -200,7 +207,7 @@ def test_the_settings_of_a_law_are_compiled_and_not_mixed_up():
         np.testing.assert_allclose(one.tau, other.tau, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("engine", ["pinocchio", "compiled"])
+@pytest.mark.parametrize("engine", ENGINES)
 def test_a_law_without_a_proof_is_outside_the_theorem_by_name(engine):
     certificate = certify(replace(planar_four(), law=Pulling(0.3)).simulate(0.05, engine=engine))
     assert certificate.verdict == "outside the theorem"
@@ -210,6 +217,7 @@ def test_a_law_without_a_proof_is_outside_the_theorem_by_name(engine):
     assert certificate.as_dict()["verdict"] == "outside the theorem"
 
 
+@compiled
 def test_a_sweep_runs_with_a_law_of_ones_own():
     run = replace(planar_four(), law=Pulling(0.3))
     prepared = Prepared(run, 0.02)
@@ -239,6 +247,7 @@ class Gossip(Pulling):
         return Listening(self.k, gains.Lambda)
 
 
+@compiled
 @pytest.mark.parametrize("law", [Clockwork(1.0), Gossip(1.0)])
 def test_a_law_that_cannot_be_traced_is_refused_by_name_and_runs_in_the_reference_engine(law):
     run = replace(planar_four(), law=law)
@@ -314,6 +323,7 @@ def test_another_network_than_the_one_that_made_a_result_is_noticed():
         certify(experiment(CELLS["ring"]).simulate(0.01), lagging())
 
 
+@compiled
 def test_a_network_of_ones_own_is_refused_by_name_in_the_compiled_engine():
     with pytest.raises(InputError, match=r"network .*BoundLagging.*engine='pinocchio'"):
         lagging().simulate(0.01, engine="compiled")

@@ -128,14 +128,15 @@ class Controller:
         """q, v, v_ref and a_ref, (n, nv), -> the regressors."""
         return regressors(self.cell.parameters, [robot.nv for robot in self.cell.robots])
 
-    def evaluate(self, reference: Reference, motion: ArrayLike, z: ArrayLike, memory: ArrayLike) -> Signals:
+    def evaluate(self, reference: Reference, motion: ArrayLike, z: ArrayLike, integral: ArrayLike) -> Signals:
         """The law at one instant.
 
         Args:
             reference: desired motion, (3, n, m), and weights, (n, m, m) each.
             motion: joint positions and velocities, (2, n, nv).
             z: state of the adaptation, (n, Z).
-            memory: of the network; with `Ideal` the integrals of the synchronization errors, (p, m).
+            integral: integrals of the synchronization errors, (p, m); with another network than `Ideal`
+                its memory.
 
         Raises:
             InputError: another size, or numbers that are not finite.
@@ -146,7 +147,7 @@ class Controller:
             reference,
             finite_array("motion", motion, (2, cell.n, cell.nv)),
             finite_array("z", z, self.adaptation.start().shape),
-            finite_array("memory", memory, np.shape(self.network.start())),
+            finite_array("integral", integral, np.shape(self.network.start())),
         )
 
     @property
