@@ -18,7 +18,7 @@ from synctrl import Controller, Gains, Result, simulate
 from synctrl.analysis.certify import certify
 from synctrl.analysis.lyapunov import first_growth, lyapunov
 from synctrl.control.adaptation import Gradient
-from synctrl.control.laws import Along, Asked, ChungSlotine, Errors, SunMills
+from synctrl.control.laws import Along, Asked, ChungSlotine, Errors, Proof, SunMills
 from synctrl.control.network import Ideal
 from synctrl.errors import InputError, NonFiniteError
 from synctrl.experiments import (
@@ -256,6 +256,59 @@ def test_a_law_that_cannot_be_traced_is_refused_by_name_and_runs_in_the_referenc
     assert run.simulate(0.01).status == "completed"
 
 
+class Springs:
+    """A law of one's own that knows its part in V; Lambda as one number, for constant weights."""
+
+    def __init__(self, k: float, promised: float = 1.0):
+        self.k, self.promised = k, promised
+
+    def bind(self, cell, gains):
+        self.Lambda = gains.Lambda
+        return self
+
+    def as_dict(self):
+        return {"k": self.k}
+
+    def command(self, errors: Errors) -> Asked:
+        xref_dot = errors.xd_dot + self.Lambda * errors.e
+        force = np.matvec(errors.c.mT, self.k * errors.sigma)
+        return Asked(xref_dot, errors.xd_ddot + self.Lambda * errors.e_dot, force)
+
+    def proof(self, along: Along) -> Proof:
+        eps, k = along.epsilon, self.k * self.promised
+        return Proof(
+            {"springs": eps * k * eps / 2},
+            {"springs": eps * k * along.epsilon_dot},
+            {"dampers": -eps * k * self.Lambda * eps},
+        )
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_law_with_a_proof_of_its_own_is_certified_with_its_energies_and_powers(engine):
+    result = replace(experiment(CELLS["pair, full weights"]), law=Springs(1.5)).simulate(0.05, engine=engine)
+    certificate = certify(result)
+    assert certificate.certified
+    assert set(certificate.lyapunov.energy) == {"kinetic", "parameter", "springs"}
+    assert (certificate.lyapunov.power["dampers"] <= 0).all()
+    assert result.info["law"] == {"name": "Springs", "k": 1.5}
+
+
+def test_a_law_whose_proof_promises_more_than_it_does_is_found_out():
+    run = replace(experiment(CELLS["pair, full weights"]), law=Springs(1.5, promised=1.1))
+    certificate = certify(run.simulate(0.05))
+    assert not certificate.certified
+    assert (np.abs(certificate.lyapunov.power["other"]) > certificate.lyapunov.rounding).any()
+
+
+def test_a_law_that_fails_is_named_before_it_runs():
+    class Failing(Springs):
+        def command(self, errors: Errors) -> Asked:
+            raise ZeroDivisionError("no")
+
+    with pytest.raises(InputError, match=r"law .*Failing.*ZeroDivisionError"):
+        replace(planar_four(), law=Failing(1.0))
+
+
 def test_a_law_that_gives_another_shape_is_refused_by_name_before_it_runs():
     class Wrong(Pulling):
         def bind(self, cell, gains):
@@ -309,6 +362,13 @@ def test_a_network_with_memory_is_logged_replayed_and_outside_the_theorem_by_nam
         assert any("the network Lagging" in text for text in certificate.outside)
         assert certificate.closes, "what it changes is named"
         assert (np.abs(certificate.lyapunov.power["other"]) <= certificate.lyapunov.rounding).all()
+
+
+def test_a_network_with_memory_runs_with_other_integrators_too():
+    one, other = lagging().simulate(0.05), lagging().simulate(0.05, integrator="DOP853")
+    np.testing.assert_allclose(one.q, other.q, rtol=0, atol=1e-5)
+    states = (run.outputs["network_state"] for run in (one, other))
+    np.testing.assert_allclose(*states, rtol=0, atol=1e-4)
 
 
 def test_the_log_has_the_integrals_of_the_synchronization_errors_whatever_the_network_keeps():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -106,9 +107,9 @@ class Controller:
         self.K_r = spread_rows("K_r", gains.K_r, joints)
         learning = chosen(gains.Gamma, adaptation)
         self.adaptation, self.adaptation_settings = learning.bind(cell), learning.as_dict()
-        self.law, self.law_settings = options.law.bind(cell, gains), options.law.as_dict()
+        self.law, self.law_settings = options.law.bind(cell, gains), _settings(options.law)
         connection = connected(network)
-        self.network, self.network_settings = connection.bind(cell), connection.as_dict()
+        self.network, self.network_settings = connection.bind(cell), _settings(connection)
         self._damping = self._joint_damping if self.k_r_space == "joint" else self._task_damping
         self._command = self._commander()
 
@@ -181,6 +182,11 @@ class Controller:
     ) -> np.ndarray:
         r = law.coupled_velocity_error(command.u[0], reference.c, task.x_dot)
         return self.cell.task.to_torque(task, self.K_r * law.times(reference.c_inv, r))
+
+
+def _settings(part: Law | Network) -> dict[str, Any]:
+    """Name and settings of a part, by default the name of its type."""
+    return {"name": type(part).__name__, **part.as_dict()}
 
 
 def check_reference(reference: Reference, n: int, m: int) -> None:
