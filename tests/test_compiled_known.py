@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from cells import SMALL_GAINS, small_cell
+from seams.lagging_network import Lagging
+from seams.pulling_law import BoundPulling
 
 from synctrl import (
     CartesianSpace,
@@ -233,6 +235,22 @@ REPLACED = {
     "the law of one controller": (
         lambda: with_own(lambda loop: loop.controller, "_command", print),
         "law of the controller",
+    ),
+    "the law behind one controller": (
+        lambda: with_own(lambda loop: loop.controller, "law", BoundPulling(1.0, np.ones(2))),
+        "law that was replaced",
+    ),
+    "a gain of one law": (
+        lambda: with_own(lambda loop: loop.controller.law, "beta", np.full(2, 7.0)),
+        "beta was changed",
+    ),
+    "a method of one law": (
+        lambda: with_own(lambda loop: loop.controller.law, "command", print),
+        r"BoundSunMills\.command",
+    ),
+    "the network of one controller": (
+        lambda: with_own(lambda loop: loop.controller, "network", Lagging(0.1).bind(small_cell())),
+        "network .*BoundLagging",
     ),
     "the options of one controller": (
         lambda: with_own(lambda loop: loop.controller, "k_r_space", "task"),

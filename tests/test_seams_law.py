@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -16,9 +18,9 @@ from synctrl import Controller, Gains, Result, simulate
 from synctrl.analysis.certify import certify
 from synctrl.analysis.lyapunov import first_growth, lyapunov
 from synctrl.control.adaptation import Gradient
-from synctrl.control.laws import Along, Asked, ChungSlotine, Errors, SunMills
+from synctrl.control.laws import Along, Asked, ChungSlotine, Errors, Proof, SunMills
 from synctrl.control.network import Ideal
-from synctrl.errors import InputError
+from synctrl.errors import InputError, NonFiniteError
 from synctrl.experiments import (
     a460_full_pair,
     a460_pair,
@@ -31,6 +33,10 @@ from synctrl.experiments import (
 )
 from synctrl.simulation.prepared import Prepared
 
+compiled = pytest.mark.skipif(
+    find_spec("casadi") is None, reason="CasADi is an extra: pip install 'synctrl[compiled]'"
+)
+ENGINES = ["pinocchio", pytest.param("compiled", marks=compiled)]
 SEEDS = st.integers(0, 2**32 - 1)
 GAINS = Gains(Lambda=4.0, beta=3.0, K_r=2.0, K_eps=1.5, Gamma=0.02)
 LAWS = {
@@ -127,10 +133,18 @@ def test_gains_it_has_no_place_for_are_refused():
         replace(planar_four(synchronized=False), law=ChungSlotine((1.0, 2.0, 3.0)))
 
 
+def test_a_step_too_long_for_a_law_is_named():
+    run = replace(planar_four(synchronized=False), law=ChungSlotine(30.0))
+    with pytest.raises(NonFiniteError, match="its law needs at most") as caught:
+        run.simulate(0.1, 1e-3)
+    needed = float(re.search("at most ([0-9.e-]+) s", str(caught.value)).group(1))
+    assert run.simulate(0.01, needed / 2).status == "completed"
+
+
 # -- the paper's law by its name --------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("engine", ["pinocchio", "compiled"])
+@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("acceleration", ["exact", "paper"])
 @pytest.mark.parametrize("space", ["joint", "task"])
 def test_options_beside_the_law_are_shorthand_for_its_own(engine, acceleration, space):
@@ -175,6 +189,7 @@ CASES = {
 }
 
 
+@compiled
 @pytest.mark.parametrize("name", CASES)
 def test_both_engines_agree_on_any_law(name):
     run = CASES[name]()
@@ -184,6 +199,7 @@ def test_both_engines_agree_on_any_law(name):
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * (1 + np.abs(expected).max()))
 
 
+@compiled
 def test_the_settings_of_a_law_are_compiled_and_not_mixed_up():
     for k in (0.3, 3.0):
         run = replace(planar_four(), law=Pulling(k))
@@ -191,7 +207,7 @@ def test_the_settings_of_a_law_are_compiled_and_not_mixed_up():
         np.testing.assert_allclose(one.tau, other.tau, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("engine", ["pinocchio", "compiled"])
+@pytest.mark.parametrize("engine", ENGINES)
 def test_a_law_without_a_proof_is_outside_the_theorem_by_name(engine):
     certificate = certify(replace(planar_four(), law=Pulling(0.3)).simulate(0.05, engine=engine))
     assert certificate.verdict == "outside the theorem"
@@ -201,6 +217,7 @@ def test_a_law_without_a_proof_is_outside_the_theorem_by_name(engine):
     assert certificate.as_dict()["verdict"] == "outside the theorem"
 
 
+@compiled
 def test_a_sweep_runs_with_a_law_of_ones_own():
     run = replace(planar_four(), law=Pulling(0.3))
     prepared = Prepared(run, 0.02)
@@ -230,12 +247,66 @@ class Gossip(Pulling):
         return Listening(self.k, gains.Lambda)
 
 
+@compiled
 @pytest.mark.parametrize("law", [Clockwork(1.0), Gossip(1.0)])
 def test_a_law_that_cannot_be_traced_is_refused_by_name_and_runs_in_the_reference_engine(law):
     run = replace(planar_four(), law=law)
     with pytest.raises(InputError, match=r"cannot trace the law .*(Ticking|Listening)"):
         run.simulate(0.01, engine="compiled")
     assert run.simulate(0.01).status == "completed"
+
+
+class Springs:
+    """A law of one's own that knows its part in V; Lambda as one number, for constant weights."""
+
+    def __init__(self, k: float, promised: float = 1.0):
+        self.k, self.promised = k, promised
+
+    def bind(self, cell, gains):
+        self.Lambda = gains.Lambda
+        return self
+
+    def as_dict(self):
+        return {"k": self.k}
+
+    def command(self, errors: Errors) -> Asked:
+        xref_dot = errors.xd_dot + self.Lambda * errors.e
+        force = np.matvec(errors.c.mT, self.k * errors.sigma)
+        return Asked(xref_dot, errors.xd_ddot + self.Lambda * errors.e_dot, force)
+
+    def proof(self, along: Along) -> Proof:
+        eps, k = along.epsilon, self.k * self.promised
+        return Proof(
+            {"springs": eps * k * eps / 2},
+            {"springs": eps * k * along.epsilon_dot},
+            {"dampers": -eps * k * self.Lambda * eps},
+        )
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_law_with_a_proof_of_its_own_is_certified_with_its_energies_and_powers(engine):
+    result = replace(experiment(CELLS["pair, full weights"]), law=Springs(1.5)).simulate(0.05, engine=engine)
+    certificate = certify(result)
+    assert certificate.certified
+    assert set(certificate.lyapunov.energy) == {"kinetic", "parameter", "springs"}
+    assert (certificate.lyapunov.power["dampers"] <= 0).all()
+    assert result.info["law"] == {"name": "Springs", "k": 1.5}
+
+
+def test_a_law_whose_proof_promises_more_than_it_does_is_found_out():
+    run = replace(experiment(CELLS["pair, full weights"]), law=Springs(1.5, promised=1.1))
+    certificate = certify(run.simulate(0.05))
+    assert not certificate.certified
+    assert (np.abs(certificate.lyapunov.power["other"]) > certificate.lyapunov.rounding).any()
+
+
+def test_a_law_that_fails_is_named_before_it_runs():
+    class Failing(Springs):
+        def command(self, errors: Errors) -> Asked:
+            raise ZeroDivisionError("no")
+
+    with pytest.raises(InputError, match=r"law .*Failing.*ZeroDivisionError"):
+        replace(planar_four(), law=Failing(1.0))
 
 
 def test_a_law_that_gives_another_shape_is_refused_by_name_before_it_runs():
@@ -293,6 +364,13 @@ def test_a_network_with_memory_is_logged_replayed_and_outside_the_theorem_by_nam
         assert (np.abs(certificate.lyapunov.power["other"]) <= certificate.lyapunov.rounding).all()
 
 
+def test_a_network_with_memory_runs_with_other_integrators_too():
+    one, other = lagging().simulate(0.05), lagging().simulate(0.05, integrator="DOP853")
+    np.testing.assert_allclose(one.q, other.q, rtol=0, atol=1e-5)
+    states = (run.outputs["network_state"] for run in (one, other))
+    np.testing.assert_allclose(*states, rtol=0, atol=1e-4)
+
+
 def test_the_log_has_the_integrals_of_the_synchronization_errors_whatever_the_network_keeps():
     result = lagging().simulate(0.05)
     steps = np.diff(result.t)[:, None, None] * (result.sync_error[1:] + result.sync_error[:-1]) / 2
@@ -305,6 +383,7 @@ def test_another_network_than_the_one_that_made_a_result_is_noticed():
         certify(experiment(CELLS["ring"]).simulate(0.01), lagging())
 
 
+@compiled
 def test_a_network_of_ones_own_is_refused_by_name_in_the_compiled_engine():
     with pytest.raises(InputError, match=r"network .*BoundLagging.*engine='pinocchio'"):
         lagging().simulate(0.01, engine="compiled")

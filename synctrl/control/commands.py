@@ -6,12 +6,13 @@ quantity and its derivative, and every line then serves both at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, NamedTuple, Protocol, cast
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, SynctrlError
 from ..tasks.cell import Cell, Reference
 from ..tasks.coupling import Coupling
 from ..tasks.spaces import Measurement
@@ -140,12 +141,15 @@ class Composed:
         """Look once at what law and network give, before anything runs.
 
         Raises:
-            InputError: something of another shape than it should have.
+            InputError: something of another shape than it should have, or one that fails where there are no
+                errors.
         """
-        memory = self.network.start()
-        integral = self.network.integral(memory)
-        heard = self.network.exchange(0.0, np.zeros((2, n, m)), memory)
-        asked = self.law.command(_no_errors(n, m))
+        with _named("network", self.network):
+            memory = self.network.start()
+            integral = self.network.integral(memory)
+            heard = self.network.exchange(0.0, np.zeros((2, n, m)), memory)
+        with _named("law", self.law):
+            asked = self.law.command(no_errors(n, m))
         _check_shapes("network", self.network, {
             "epsilon": (heard.epsilon, (p, m)), "epsilon_dot": (heard.epsilon_dot, (p, m)),
             "shares": (heard.shares, (3, n, m)), "memory_dot": (heard.memory_dot, np.shape(memory)),
@@ -157,7 +161,7 @@ class Composed:
         })  # fmt: skip
 
 
-def _no_errors(n: int, m: int) -> Errors:
+def no_errors(n: int, m: int) -> Errors:
     """Errors that are all zero, under weights of one."""
     o, one, zero = np.zeros((n, m)), np.broadcast_to(np.eye(m), (n, m, m)), np.zeros((n, m, m))
     return Errors(0.0, o, o, o, o, o, o, o, o, o, o, one, zero, zero, one)
@@ -172,6 +176,20 @@ def completed(asked: Asked, errors: Errors) -> Asked:
         u_dot = law.times(errors.c, asked.xref_ddot) + law.times(errors.c_dot, asked.xref_dot)
         asked = asked._replace(u=np.stack((u, u_dot)))
     return asked
+
+
+@contextmanager
+def _named(role: str, part: Any) -> Iterator[None]:
+    """Name the part that fails in between."""
+    try:
+        yield
+    except SynctrlError:
+        raise
+    except Exception as error:  # whatever a user's code raises
+        raise InputError(
+            f"{role} {type(part).__qualname__}: expected one that works where there are no errors, found "
+            f"{type(error).__name__}: {error}"
+        ) from error
 
 
 def _check_shapes(role: str, part: Any, parts: Mapping[str, tuple[Any, tuple[int, ...]]]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -106,9 +107,9 @@ class Controller:
         self.K_r = spread_rows("K_r", gains.K_r, joints)
         learning = chosen(gains.Gamma, adaptation)
         self.adaptation, self.adaptation_settings = learning.bind(cell), learning.as_dict()
-        self.law, self.law_settings = options.law.bind(cell, gains), options.law.as_dict()
+        self.law, self.law_settings = options.law.bind(cell, gains), _settings(options.law)
         connection = connected(network)
-        self.network, self.network_settings = connection.bind(cell), connection.as_dict()
+        self.network, self.network_settings = connection.bind(cell), _settings(connection)
         self._damping = self._joint_damping if self.k_r_space == "joint" else self._task_damping
         self._command = self._commander()
 
@@ -128,14 +129,15 @@ class Controller:
         """q, v, v_ref and a_ref, (n, nv), -> the regressors."""
         return regressors(self.cell.parameters, [robot.nv for robot in self.cell.robots])
 
-    def evaluate(self, reference: Reference, motion: ArrayLike, z: ArrayLike, memory: ArrayLike) -> Signals:
+    def evaluate(self, reference: Reference, motion: ArrayLike, z: ArrayLike, integral: ArrayLike) -> Signals:
         """The law at one instant.
 
         Args:
             reference: desired motion, (3, n, m), and weights, (n, m, m) each.
             motion: joint positions and velocities, (2, n, nv).
             z: state of the adaptation, (n, Z).
-            memory: of the network; with `Ideal` the integrals of the synchronization errors, (p, m).
+            integral: integrals of the synchronization errors, (p, m); with another network than `Ideal`
+                its memory.
 
         Raises:
             InputError: another size, or numbers that are not finite.
@@ -146,7 +148,7 @@ class Controller:
             reference,
             finite_array("motion", motion, (2, cell.n, cell.nv)),
             finite_array("z", z, self.adaptation.start().shape),
-            finite_array("memory", memory, np.shape(self.network.start())),
+            finite_array("integral", integral, np.shape(self.network.start())),
         )
 
     @property
@@ -180,6 +182,11 @@ class Controller:
     ) -> np.ndarray:
         r = law.coupled_velocity_error(command.u[0], reference.c, task.x_dot)
         return self.cell.task.to_torque(task, self.K_r * law.times(reference.c_inv, r))
+
+
+def _settings(part: Law | Network) -> dict[str, Any]:
+    """Name and settings of a part, by default the name of its type."""
+    return {"name": type(part).__name__, **part.as_dict()}
 
 
 def check_reference(reference: Reference, n: int, m: int) -> None:

@@ -154,7 +154,7 @@ def _too_fast(stop: Stop, excesses: list[Excess]) -> Cause:
     if worst.used > USUAL and worst.longest >= SHORT:
         words = f"the {name} of {worst.used:g} s is too long; {needs}"
         return Cause("period" if held else "step", words, robot, joint)
-    lower = "" if gain == "friction" else "lower the gain, or "
+    lower = "" if gain in ("friction", "law") else "lower the gain, or "
     return Cause(
         gain, f"{needs}, but the {name} is {worst.used:g} s; {lower}shorten the {name}", robot, joint
     )
@@ -174,8 +174,8 @@ def _unclear(stop: Stop) -> Cause:
 def _gain(stop: Stop, gain: str, robot: int, joint: int) -> str:
     """A gain with its value for a joint."""
     controller = stop.loop.controller
-    if gain == "friction":
-        return "its friction"
+    if gain in ("friction", "law"):
+        return f"its {gain}"
     values = getattr(controller, gain)
     if gain == "K_r" and controller.k_r_space == "joint":
         return f"K_r = {values[robot, joint]:g}{UNITS[gain]}"

@@ -8,19 +8,24 @@ lambda_n, the largest eigenvalue of S^T S:
     Lambda     Lambda
     beta       beta lambda_n
     K_eps      root of the largest eigenvalue of M^-1 lambda_n J^T c^T K_eps c J
+    law        of another law than the paper's: largest eigenvalue of M^-1 J^T B J, where its force answers a
+               velocity with B; and a spring likewise
     Gamma      root of the largest eigenvalue of M^-1 Y Gamma Y^T
 
-The first four damp, and add up; the last two are springs, that swing. Held torque damps a spring late: what
-counts then is the largest eigenvalue of (D + F)^-1 Y Gamma Y^T, against the period.
+The first four damp, and add up; K_eps and Gamma are springs, that swing. Held torque damps a spring late:
+what counts then is the largest eigenvalue of (D + F)^-1 Y Gamma Y^T, against the period.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ..control.adaptation import Seen
+from ..control.commands import no_errors
+from ..control.laws.sun_mills import BoundSunMills
 from ..robots.regressors import regressors
 from ..tasks.cell import Reference
 from .closed_loop import ClosedLoop
@@ -76,6 +81,10 @@ def loop_rates(
         friction = np.diag(rest_friction(loop)[i, :nv])
         found += [Rate(name, i, None, rate) for name, rate in shared]
         found += [_rate("K_r", i, M, damping), _rate("friction", i, M, friction)]
+        if type(loop.controller.law) is not BoundSunMills:
+            dampers, spring = (J[i, :, :nv].T @ A @ J[i, :, :nv] for A in _answers(loop, reference, i))
+            damping, springs = damping + dampers, [*springs, ("law", spring)]
+            found.append(_rate("law", i, M, dampers))
         against = damping + friction + 1e-12 * np.eye(nv) if sampled else M
         found += [_rate(name, i, against, spring, True, sampled) for name, spring in springs]
     return found
@@ -142,6 +151,28 @@ def _matrices(
     cJ = reference.c[i] @ J
     coupling = _largest_share(loop) * cJ.T @ np.diag(K_eps) @ cJ
     return damping, [("K_eps", coupling), ("Gamma", _learned(loop, i, Y))]
+
+
+def _answers(loop: ClosedLoop, reference: Reference, i: int) -> tuple[np.ndarray, np.ndarray]:
+    """How the force of a law answers the velocity and the position of a robot, (m, m) each.
+
+    The other robots move with it in the way that the coupling answers most.
+    """
+    n, m = loop.cell.n, loop.cell.m
+    weights, share = reference.weights, _largest_share(loop)
+    still = replace(no_errors(n, m), t=reference.t, **weights._asdict())
+    rest = loop.controller.law.command(still).force[i]
+    found = np.zeros((2, m, m))
+    for k in range(m):
+        e = np.zeros((n, m))
+        e[i, k] = -1.0
+        w = np.matvec(weights.c, e)
+        moving = replace(still, e_dot=e, x_dot=-e, w_dot=w, sigma_dot=share * w)
+        away = replace(still, e=e, w=w, sigma=share * w)
+        for matrix, errors in zip(found, (moving, away), strict=True):
+            matrix[:, k] = rest - loop.controller.law.command(errors).force[i]
+    damping, spring = (np.clip(np.nan_to_num(A + A.T) / 2, -HUGE, HUGE) for A in found)
+    return damping, spring
 
 
 def _learned(loop: ClosedLoop, i: int, Y: np.ndarray) -> np.ndarray:

@@ -1,6 +1,5 @@
 """A network of one's own: what neighbours say arrives through a lag, T h' = w - h, h(0) = 0.
-
-Its memory is h, (n, m), the integrals of epsilon, (p, m), and E, (n, m), one after another."""
+Its memory is h, (n, m), the integrals of epsilon, (p, m), and E, (n, m)."""
 
 import numpy as np
 

@@ -114,7 +114,11 @@ class BoundLaw(Protocol):
     """A law for the robots of one cell. It may also have a method `proof`, from `Along` to `Proof`."""
 
     def command(self, errors: Errors) -> Asked:
-        """What the law asks for; plain array arithmetic, robot by robot, where it is to be compiled."""
+        """What the law asks for.
+
+        Where it is to be compiled, it is plain array arithmetic, robot by robot; `np.matvec` takes symbols,
+        `np.vecmat` does not.
+        """
 
 
 class Law(Protocol):
