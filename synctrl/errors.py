@@ -1,13 +1,17 @@
 """Every error this package raises on purpose.
 
 Each message says what was wrong, where, what was found and what is expected. All kinds derive from
-`SynctrlError`, so one `except` clause catches whatever the package has to say about its input.
+`SynctrlError`, so one `except` clause catches whatever the package has to say about its input. Warnings point
+to the line outside the package that led to them, see `warn`.
 """
 
 from __future__ import annotations
 
+import sys
+import warnings
 from collections.abc import Iterable
 from difflib import get_close_matches
+from types import FrameType
 from typing import Any
 
 
@@ -159,6 +163,20 @@ class CompilationError(SynctrlError):
 
 class MissingDependencyError(SynctrlError, ImportError):
     """An optional package is needed for what was asked."""
+
+
+def warn(message: str, category: type[Warning]) -> None:
+    """Warn whoever called the package: the warning has the nearest line on the stack that is outside of it.
+
+    Args:
+        message: what is odd, where, and what to do.
+        category: kind of the warning.
+    """
+    package, level = __name__.partition(".")[0], 1
+    frame: FrameType | None = sys._getframe()
+    while frame is not None and str(frame.f_globals.get("__name__")).partition(".")[0] == package:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, category, stacklevel=level - (frame is None))
 
 
 def failed(what: str, t: float, error: Exception, robot: int | None = None) -> SimulationError:

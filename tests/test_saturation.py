@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from synctrl import Cell, Coupling, Cubic, Experiment, Gains, Member, Result, load_robot
 from synctrl.errors import SaturationWarning, SimulationError
 from synctrl.simulation.limits import applied_torque, torque_limits
+from synctrl.simulation.saturation import warn_of_saturation
 
 ARM = load_robot("planar2r")
 LIMITS = torque_limits(Cell([Member(ARM, Cubic([0, 0], [1, 1], 1.0))] * 2, Coupling.pair()))[0]
@@ -74,6 +76,15 @@ def test_the_warning_says_what_was_learned_meanwhile():
     assert f"theta_hat went from {start:.3g} to {largest:.3g}" in text
     assert "Estimates and integrals" in text
     assert run.names[1] in text
+
+
+@pytest.mark.parametrize(("largest", "mentioned"), [(5.88, False), (5.9, False), (6.0, True)])
+def test_estimates_that_hardly_grew_are_not_mentioned(largest, mentioned):
+    run = cut_run()
+    found = [{**entry, "theta_hat": [5.88, largest]} for entry in run.info["saturation"]]
+    with pytest.warns(SaturationWarning) as caught:
+        warn_of_saturation(replace(run, info={**run.info, "saturation": found}))
+    assert ("theta_hat" in str(caught[0].message)) is mentioned
 
 
 @pytest.mark.parametrize("experiment", [pair(way=0.01, K_r=0.1), pair(saturate=False)])

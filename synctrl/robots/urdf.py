@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
-import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -20,7 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from ..checks import finite_number, instance
-from ..errors import FrameNotFound, InputError, RobotError, RobotWarning, near
+from ..errors import FrameNotFound, InputError, RobotError, RobotWarning, near, warn
 from .urdf_checks import check_bodies, check_model, check_tree
 from .urdf_document import Document, Geometry, Joint, Link
 from .urdf_meshes import data_folder, find_mesh
@@ -264,9 +263,7 @@ def _shape(
     file = find_mesh(shape.filename or "", folder, package_dirs)
     if file is None:
         where = document.where(link, geometry.line)
-        warnings.warn(
-            RobotWarning(f"{where}: mesh '{shape.filename}' is missing and will not be shown"), stacklevel=2
-        )
+        warn(f"{where}: mesh '{shape.filename}' is missing and will not be shown", RobotWarning)
         return None
     return coal.BVHModelOBBRSS(), str(file), np.array(shape.size)
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable
 
 import numpy as np
 import pinocchio as pin
 
-from ..errors import RobotError, RobotWarning, near
+from ..errors import RobotError, RobotWarning, near, warn
 from .urdf_document import Document, Inertial, Joint, Link
 
 MAX_LINKS = 1000
@@ -194,7 +193,7 @@ def _check_links(document: Document) -> None:
         message = f"{document.where(link, link.inertial.line)}, inertial: {fault}"
         if carrier[link.name][0] is not None:
             raise RobotError(message)
-        warnings.warn(RobotWarning(f"{message}; the link does not move, so this plays no part"), stacklevel=2)
+        warn(f"{message}; the link does not move, so this plays no part", RobotWarning)
 
 
 def _joint_fault(joint: Joint, links: set[str]) -> str | None:

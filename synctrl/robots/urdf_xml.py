@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import re
-import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -17,7 +16,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 from xml.parsers import expat
 
-from ..errors import RobotError, RobotWarning
+from ..errors import RobotError, RobotWarning, warn
 
 MAX_BYTES = 10_000_000
 MAX_DEPTH = 50
@@ -70,7 +69,7 @@ class Element:
 
     def warn(self, message: str) -> None:
         """Warn about this element."""
-        warnings.warn(RobotWarning(f"{self.file}:{self.line}: {self.place}: {message}"), stacklevel=2)
+        warn(f"{self.file}:{self.line}: {self.place}: {message}", RobotWarning)
 
     # -- children -----------------------------------------------------------------------------------------
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import SaturationWarning
+from ..errors import SaturationWarning, warn
 from .limits import torque_limits
 from .plant import Output, Plant
 
@@ -17,6 +16,8 @@ if TYPE_CHECKING:
 
 #: the output that has what was left of the torque
 APPLIED = "applied_torque"
+#: growth of the estimates that is worth a word, as a share of what they were
+GROWN = 0.01
 
 
 def saturation_report(plant: Plant, arrays: Mapping[str, np.ndarray]) -> list[dict[str, Any]]:
@@ -60,20 +61,26 @@ def applied_output(plant: Plant, tau: np.ndarray) -> dict[str, Output]:
 
 
 def warn_of_saturation(result: Result) -> None:
-    """Warn the caller of the caller if torque was cut off while the controller went on as if it were not."""
+    """Warn whoever called the package of torque that was cut off while the controller went on regardless."""
     found = result.info["saturation"]
     if not found:
         return
     worst = max(found, key=lambda entry: entry["largest"] - entry["limit"])
-    start, largest = max((entry["theta_hat"] for entry in found), key=lambda pair: pair[1])
-    grown = f", {largest / start:.3g} times as much" if start > 0 else ""
-    warnings.warn(
+    warn(
         f"{result.info['title']}: torque was cut off at {len(found)} joints, for up to "
         f"{max(entry['share'] for entry in found):.0%} of the time; {result.names[worst['robot']]}, joint "
         f"{worst['joint'] + 1} asked for {worst['largest']:.3g} N·m of its {worst['limit']:.3g}. Estimates "
-        "and integrals of the synchronization errors went on meanwhile as if it had got it: the largest "
-        f"entry of theta_hat went from {start:.3g} to {largest:.3g}{grown}. See info['saturation'] and "
+        "and integrals of the synchronization errors went on meanwhile as if it had got it"
+        f"{_learned(found)}. See info['saturation'] and "
         f"outputs['{APPLIED}']; lower the gains, or ask for a slower motion",
         SaturationWarning,
-        stacklevel=3,
     )
+
+
+def _learned(found: list[dict[str, Any]]) -> str:
+    """How far the estimates grew, in words; empty if they hardly did."""
+    start, largest = max((entry["theta_hat"] for entry in found), key=lambda pair: pair[1])
+    if largest <= (1 + GROWN) * start:
+        return ""
+    times = f", {largest / start:.3g} times as much" if start > 0 else ""
+    return f": the largest entry of theta_hat went from {start:.3g} to {largest:.3g}{times}"

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from math import ceil, floor, log10
+from sys import float_info
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import StepWarning
+from ..errors import StepWarning, warn
 from .closed_loop import ClosedLoop
 from .rates import damping_rate
 
@@ -98,7 +98,8 @@ class StepError:
         self._sum_up()
         if self.at < 0 or not self.speed > 0:
             return None
-        return Worst(self.largest / self.speed, *divmod(self.at, self._joints), self.time)
+        estimate = min(self.largest / self.speed, float_info.max)  # nothing infinite: files hold numbers
+        return Worst(estimate, *divmod(self.at, self._joints), self.time)
 
     def _sum_up(self) -> None:
         """Keep the worst of the instants seen one by one, and the last two of them for those that follow."""
@@ -157,7 +158,7 @@ def step_report(
 
 
 def warn_of_step(report: Mapping[str, Any] | None, names: Sequence[str], dt: float) -> None:
-    """Warn the caller of the caller if a step was too long.
+    """Warn whoever called the package if a step was too long.
 
     Args:
         report: as `step_report` gives it.
@@ -166,12 +167,11 @@ def warn_of_step(report: Mapping[str, Any] | None, names: Sequence[str], dt: flo
     """
     if report is None or report["advised_step"] is None:
         return
-    warnings.warn(
+    warn(
         f"dt = {dt:g} s is too long: at t = {report['time']:g} s a step errs by {report['estimate']:.2g} of "
         f"the largest velocity, at joint {report['joint'] + 1} of {names[report['robot']]}; expected at most "
-        f"{LIMIT:g}, as with dt = {report['advised_step']:g}",
+        f"{LIMIT:g}, as with dt = {report['advised_step']:g} s",
         StepWarning,
-        stacklevel=3,
     )
 
 

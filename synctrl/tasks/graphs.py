@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
 from ..checks import finite_array
-from ..errors import CouplingError, CouplingWarning, InputError
+from ..errors import CouplingError, CouplingWarning, InputError, warn
 
 Edge = tuple[int, int]
 
@@ -109,23 +108,21 @@ def _warn_of_repetition(name: str, n: int, ordered: np.ndarray) -> None:
     if counts.max() > 1:
         i, j = ordered[first[np.argmax(counts)]]
         way_out = "Coupling.pair is the coupling of two" if n == 2 else "name the edge once"
-        _warn(
+        warn(
             f"{name}: robots {i} and {j} are compared {counts.max()} times, which multiplies the effect of "
-            f"beta and K_eps on them by {counts.max()}; {way_out}, or use edge weights"
+            f"beta and K_eps on them by {counts.max()}; {way_out}, or use edge weights",
+            CouplingWarning,
         )
 
 
 def _warn_of_rest(name: str, motion_left: bool) -> None:
     if not motion_left:
-        _warn(
+        warn(
             f"{name}: all synchronization errors vanish only where all tracking errors do, so there is no "
             "synchronized motion and every robot is held in place, as on the paper's ring of an odd number "
-            "of robots; take differences instead, for example Coupling.signed_ring"
+            "of robots; take differences instead, for example Coupling.signed_ring",
+            CouplingWarning,
         )
-
-
-def _warn(message: str) -> None:
-    warnings.warn(message, CouplingWarning, stacklevel=6)
 
 
 def carried_motion(n: int, edges: np.ndarray, signs: np.ndarray) -> np.ndarray:

@@ -6,7 +6,6 @@ is placed: with parameters of another one the controller would adapt towards a r
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from itertools import product
 from typing import Any
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..checks import finite_array
-from ..errors import InputError
+from ..errors import InputError, warn
 from ..robots.base_parameters import parameters_of
 from ..robots.friction import Friction
 from ..robots.friction_parameters import FrictionParameters
@@ -75,11 +74,10 @@ def _check_agreement(name: str, friction: Friction, stated: Friction) -> None:
             f"{name}, parameters: FrictionParameters say {stated}, but the member's friction is {friction}; "
             "expected the true friction stated once, as Member(friction=...)"
         )
-    warnings.warn(
+    warn(
         f"{name}: its friction is stated twice; give it to the member alone, FrictionParameters(robot) takes "
         "it from there",
         DeprecationWarning,
-        stacklevel=6,
     )
 
 
