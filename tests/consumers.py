@@ -20,6 +20,7 @@ from synctrl.show.layout import cell_layout
 from synctrl.show.lyapunov_plots import lyapunov_figure
 from synctrl.show.plots import common_limits, joint_trajectories, sync_errors, tracking_errors
 from synctrl.show.real_cells import error_colors, formation_scene, payload_scene
+from synctrl.show.step_section import step_section
 from synctrl.show.vehicle import vehicle_animation
 
 FIGURES: dict[str, Callable[[Any, Any], Any]] = {
@@ -49,6 +50,7 @@ OTHERS: dict[str, Callable[[Any, Any], Any]] = {
     "convergence": convergence,
     "gain_condition": gain_condition,
     "identify": identify,
+    "step_section": lambda r, e: step_section({"run": r}),
 }
 CONSUMERS = {**FIGURES, **SCENES, **OTHERS}
 

@@ -83,7 +83,7 @@ def test_files_of_format_1_are_read_and_have_no_outputs(tmp_path):
 
 
 def test_entries_that_nobody_here_reads_are_kept(result, tmp_path):
-    more = {"step_error": {"estimate": 1e-5, "times": [0.1, None, True]}, "note": "two\nlines", "odd": 1e400}
+    more = {"remark": {"estimate": 1e-5, "times": [0.1, None, True]}, "note": "two\nlines", "odd": 1e400}
     run = replace(result, info={**result.info, **more})
     loaded = Result.load(run.save(tmp_path / "run.npz"))
     assert loaded == run and {key: loaded.info[key] for key in more} == more
@@ -212,6 +212,17 @@ WRONG_INFO = [
     (("damping",), [{"robot": "first", "start": 0, "stop": 1}]),
     (("payloads",), [{"robot": 0}]),
     (("held_joints",), [{"joints": [], "largest": [], "final": []}]),
+    *((("step_error",), value) for value in ("x", [1], 5, {}, {"estimate": 1.0}, {"estimate": None})),
+    (("step_error", "estimate"), -1.0),
+    (("step_error", "estimate"), None),
+    (("step_error", "limit"), None),
+    (("step_error", "robot"), 2),
+    (("step_error", "joint"), -1),
+    (("step_error", "time"), "late"),
+    (("step_error", "time"), None),
+    (("step_error", "advised_step"), 0.0),
+    (("saturation",), [{"robot": 0, "joint": 0, "limit": 1, "share": 1, "largest": 2, "theta_hat": [0]}]),
+    *(((part,), value) for part in ("adaptation", "law", "network") for value in ("x", [], {}, {"name": 1})),
     (("outputs",), {}),
     (("outputs", "applied", "axes"), ["robot", "time", "joint"]),
     (("outputs", "applied", "axes"), ["time", "robot"]),
@@ -324,6 +335,23 @@ def test_any_other_name_survives_the_disk_and_every_figure(result, experiment, t
     assert {*consume(run, experiment).values()} <= {"done", "InputError"}
 
 
+@pytest.mark.parametrize("advised", [None, 5e-4])
+@pytest.mark.parametrize("missing", [None, "dt"])
+def test_a_step_that_was_too_long_is_shown_whatever_else_is_known(result, tmp_path, advised, missing):
+    step = {"estimate": 0.1, "limit": 1e-3, "robot": 1, "joint": 0, "time": 0.1, "advised_step": advised}
+    info = {key: value for key, value in result.info.items() if key != missing} | {"step_error": step}
+    run = Result.load(replace(result, info=info).save(tmp_path / "run.npz"))
+    assert consume(run, None, ["step_section"]) == {"step_section": "done"}
+
+
+def test_a_run_whose_steps_could_not_be_looked_at_survives_the_disk(result, tmp_path):
+    unseen = dict.fromkeys(("estimate", "robot", "joint", "time", "advised_step"))
+    for step in (None, {**unseen, "limit": 1e-3}):
+        run = replace(result, info={**result.info, "step_error": step})
+        assert Result.load(run.save(tmp_path / "run.npz")) == run
+        assert consume(run, None, ["step_section"]) == {"step_section": "done"}
+
+
 # -- whatever is valid can be used ------------------------------------------------------------------------
 
 
@@ -343,7 +371,7 @@ def test_a_run_of_no_instants_is_a_result_of_which_nothing_can_be_shown(result, 
     loaded = Result.load(nothing.save(tmp_path / "run.npz"))
     assert loaded == nothing and len(loaded.decimated(3).t) == 0
     ended = consume(loaded, experiment)
-    assert {name for name, end in ended.items() if end == "done"} == {"row_names"}
+    assert {name for name, end in ended.items() if end == "done"} == {"row_names", "step_section"}
 
 
 def test_a_run_of_one_instant_can_be_used(result, experiment, tmp_path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..checks import instance
 from ..simulation.result import Result
 from .report import Section, Table, Text
 
@@ -16,7 +17,12 @@ def step_section(runs: Mapping[str, Result]) -> Section:
 
     Args:
         runs: by name; those of methods that choose their steps, or from before estimates, are left out.
+
+    Raises:
+        InputError: something that is no result.
     """
+    for name, run in runs.items():
+        instance(f"runs, {name}", run, Result, "a Result")
     known = {name: run for name, run in runs.items() if (run.info.get("step_error") or {}).get("estimate")}
     over = [run for run in known.values() if run.info["step_error"]["advised_step"] is not None]
     words = (
@@ -36,7 +42,7 @@ def _table(runs: list[Result]) -> Table:
 def _row(run: Result, found: Mapping[str, Any]) -> tuple[str, ...]:
     return (
         str(run.info["title"]),
-        f"{1e3 * run.info['dt']:g}",
+        f"{1e3 * run.info['dt']:g}" if "dt" in run.info else "",
         f"{100 * found['estimate']:.2g}",
         f"{100 * found['limit']:.2g}",
         f"{run.names[found['robot']]}, joint {found['joint'] + 1}",

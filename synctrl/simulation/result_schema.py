@@ -16,6 +16,7 @@ from .schema import (
     each,
     entries,
     label,
+    nothing,
     number,
     numbers,
     optional,
@@ -79,9 +80,28 @@ _CUT_OFF = entries(
         "robot": whole(below="robot"),
         "joint": whole(below="joint"),
         **{name: above(0, or_equal=True) for name in ("limit", "share", "largest")},
-        "theta_hat": rows(above(0, or_equal=True)),
+        "theta_hat": rows(above(0, or_equal=True), least=2),
     }
 )
+_STEP = {
+    "estimate": above(0, or_equal=True),
+    "robot": whole(below="robot"),
+    "joint": whole(below="joint"),
+    "time": number,
+}
+_LIMIT = {"limit": above(0)}
+#: a step that was looked at, and what is said where none was
+_WORST = entries({**_STEP, **_LIMIT, "advised_step": optional(above(0))})
+_NO_STEP = entries({**dict.fromkeys((*_STEP, "advised_step"), nothing), **_LIMIT})
+_PART = entries({"name": label})
+
+
+def _step_error(where: str, value: Any, sizes: Mapping[str, int]) -> None:
+    """What `step_report` gives: all of the worst step, or nothing but the limit."""
+    unseen = isinstance(value, dict) and value.get("estimate", 0) is None
+    (_NO_STEP if unseen else _WORST)(where, value, sizes)
+
+
 _HELD = entries({"joints": rows(label), "largest": rows(number), "final": rows(number)})
 
 INFO = entries(
@@ -115,6 +135,10 @@ INFO = entries(
         "damping": rows(entries({**_WINDOW, "stop": number})),
         "limits": rows(_LEFT_LIMIT),
         "saturation": rows(_CUT_OFF),
+        "step_error": optional(_step_error),
+        "adaptation": _PART,
+        "law": _PART,
+        "network": _PART,
         "held_joints": rows(_HELD, "robot"),
     },
 )

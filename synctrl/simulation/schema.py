@@ -71,6 +71,12 @@ def boolean(where: str, value: Any, sizes: Sizes) -> None:
         _refuse(where, "true or false", value)
 
 
+def nothing(where: str, value: Any, sizes: Sizes) -> None:
+    """Null."""
+    if value is not None:
+        _refuse(where, "null", value)
+
+
 def number(where: str, value: Any, sizes: Sizes) -> None:
     """A finite number."""
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
