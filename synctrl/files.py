@@ -38,6 +38,18 @@ def whole_file(path: str | Path) -> Iterator[BinaryIO]:
     _keep_name(target.parent)
 
 
+def read_regular(path: str | Path) -> bytes:
+    """What a file holds. What is none is refused before it is opened: a pipe would keep its reader waiting.
+
+    Raises:
+        OSError: there is none, it cannot be read, or it is no regular file.
+    """
+    path = Path(path)
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, "expected a regular file, found a folder, a pipe, a device or the like")
+    return path.read_bytes()
+
+
 def write_whole(path: str | Path, content: str | bytes) -> None:
     """Write text, as UTF-8 with lines as they are, or bytes, as `whole_file` does.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,17 @@ def made(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("mixed")
     quiet(mixed_sweep(), folder, backend="serial")
     return folder
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes with names")
+@pytest.mark.parametrize("name", ["sweep.json", "runs.jsonl"])
+def test_a_pipe_instead_of_a_file_is_refused_and_not_waited_for(name, made, tmp_path):
+    rewritten(made, tmp_path, lambda rows: rows)
+    (tmp_path / name).unlink()
+    os.mkfifo(tmp_path / name)
+    for read in (load, lambda folder: quiet(mixed_sweep(), folder, backend="serial")):
+        with pytest.raises(ResultError, match="expected a regular file, found a folder, a pipe"):
+            read(tmp_path)
 
 
 def rewritten(made: Path, folder: Path, change) -> None:

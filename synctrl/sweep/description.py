@@ -10,6 +10,7 @@ from typing import Any
 from ..analysis.metrics import ERRORS
 from ..checks import count, instance, non_negative_number, positive_number
 from ..errors import InputError, ResultError
+from ..files import read_regular
 from .distributions import Values, described
 from .draws import Draws, Generations
 from .rows import Format, columns
@@ -26,7 +27,7 @@ def read_about(folder: str | Path) -> dict[str, Any]:
     """
     path = Path(folder) / ABOUT
     try:
-        about = json.loads(path.read_text(encoding="utf-8"))
+        about = json.loads(read_regular(path).decode("utf-8"))
     except FileNotFoundError:
         raise ResultError(f"no sweep in '{folder}': it has no {ABOUT}") from None
     except (OSError, ValueError, RecursionError) as error:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import IO, Any, Self
 
 from ..errors import ResultError
-from ..files import write_whole
+from ..files import read_regular, write_whole
 from .description import ABOUT, FORMAT, difference, read_about, row_format
 from .distributions import Value
 from .rows import Format, Row, Runs, fault_of_values, line_of, wrong_line
@@ -80,7 +80,7 @@ class Journal:
                 write_whole(self.folder / ABOUT, json.dumps(self.about, ensure_ascii=False, indent=1) + "\n")
             elif found := difference(known, json.loads(json.dumps(self.about))):
                 raise ResultError(f"'{self.folder}' holds another sweep: {found}; choose another folder")
-            content = (self.folder / RUNS).read_bytes()
+            content = read_regular(self.folder / RUNS)
             self.rows = Format(about["columns"], runs, about["duration"]).read(self.folder / RUNS, content)
             self._file.truncate(content.rfind(b"\n") + 1)  # an incomplete last line does not count
 
@@ -156,7 +156,7 @@ def read_rows(folder: str | Path, about: Mapping[str, Any]) -> dict[int, Row]:
     """
     path = Path(folder) / RUNS
     try:
-        content = path.read_bytes() if path.exists() else b""
+        content = read_regular(path) if path.exists() else b""
     except OSError as error:
         raise ResultError(f"'{path}' cannot be read: {error.strerror or error}") from error
     return row_format(about).read(path, content)
