@@ -101,6 +101,9 @@ def tune(
             written.
         SweepFileError: a line in the folder cannot be of this search.
         SweepError: no run stayed below the torque limit and ran to its end.
+
+    Warns:
+        StepWarning, SaturationWarning: see `Sweep.run`.
     """
     study = Study(experiment, _factors(search), seed, duration, dt, engine, control_period, bands)
     finder = _Search(study, minimize, torque_limit, population)
@@ -117,6 +120,7 @@ def tune(
         finder.run(generations, evaluation, bar)
         if journal is not None:
             journal.finish()
+    evaluation.doubts.warn("tune", study.base.dt)
     return finder.best()
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from ..checks import choice, count
 from . import backends
+from .doubts import Doubts
 from .journal import KEPT, Journal
 from .rows import Row
 from .worker import Job, Outcome, Runner, Task
@@ -34,6 +35,10 @@ class Evaluation:
         backend: "joblib", "dask" or "serial".
         client: for "dask", a client or the address of a scheduler.
         batch: runs per task; by default as many as take about a second.
+
+    Attributes:
+        rows: of all runs that are made, by number of the run.
+        doubts: what is to be doubted of those that were made here.
     """
 
     def __init__(
@@ -51,6 +56,7 @@ class Evaluation:
             count("batch", batch)
         self._runner, self._journal = Runner(job), journal  # whatever has to be compiled is compiled here
         self.rows: dict[int, Row] = {} if journal is None else journal.rows
+        self.doubts = Doubts()
 
     @contextlib.contextmanager
     def open(self) -> Iterator[None]:
@@ -102,6 +108,8 @@ class Evaluation:
 
     def _write(self, outcomes: Sequence[Outcome]) -> list[Row]:
         rows = [outcome.row for outcome in outcomes]
+        for outcome in outcomes:
+            self.doubts.add(outcome.row[0], outcome.doubt)
         if self._journal is None:
             self.rows.update({row[0]: row for row in rows})
             return rows

@@ -135,6 +135,10 @@ class Sweep:
                 written.
             SweepFileError: a line in the folder cannot be of this sweep.
             SweepError: workers die again and again, or a function of a factor fails.
+
+        Warns:
+            StepWarning, SaturationWarning: once, of all runs made by this call to their end: how many had
+                too long a step or torque cut off, and which was the worst.
         """
         if keep_every is not None:
             count("keep_every", keep_every)
@@ -146,7 +150,9 @@ class Sweep:
             with progress_bar(len(tasks), len(journal.rows), progress) as bar, evaluation.open():
                 for rows in evaluation.run(tasks):
                     bar.update(len(rows))
-            return journal.finish()
+            table = journal.finish()
+        evaluation.doubts.warn("sweep", self.study.base.dt)
+        return table
 
     def about(self, job: Job) -> dict[str, Any]:
         """What the sweep is, as plain data."""

@@ -12,6 +12,7 @@ from ..errors import SimulationError, SweepError, SynctrlError
 from ..simulation.prepared import Prepared
 from ..simulation.result import Result
 from .distributions import Value
+from .doubts import Doubt, doubt_of
 from .factors import Factor, Setup
 from .measures import MEASURES, measures
 from .rows import COMPLETED, REFUSED, STOPPED, Row, columns
@@ -25,10 +26,17 @@ class Task(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """A run that was made: its row and, if it is to be kept, its decimated result."""
+    """A run that was made.
+
+    Attributes:
+        row: its row.
+        kept: its decimated result, if it is to be kept.
+        doubt: why its measures are to be doubted; None if it did not go to its end.
+    """
 
     row: Row
     kept: Result | None = None
+    doubt: Doubt | None = None
 
 
 class Job(NamedTuple):
@@ -111,10 +119,11 @@ class Runner:
         cause = None if error is None else _written(f"{type(error).__name__}: {error}")
         time = error.time if isinstance(error, SimulationError) else None
         values: list[Any] = [None] * len(MEASURES)
+        doubt = None
         if status == COMPLETED and result is not None:
-            values = measures(result, self.job.bands)
+            values, doubt = measures(result, self.job.bands), doubt_of(result)
         row = [task.run, *task.values, status, cause, None if time is None else float(time), *values]
-        return Outcome(row, self._keep(task, result))
+        return Outcome(row, self._keep(task, result), doubt)
 
     def _keep(self, task: Task, result: Result | None) -> Result | None:
         if self.job.keep_every is None or result is None:
