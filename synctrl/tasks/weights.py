@@ -101,7 +101,10 @@ class FunctionWeights:
     def _call(self, t: float) -> Sequence[np.ndarray]:
         value = self.function(float(t))
         if not isinstance(value, (tuple, list)) or len(value) != 3:
-            raise CouplingError(f"c: expected a function of t returning c, c' and c'', found {value!r}")
+            raise CouplingError(
+                f"c: expected a function of t returning c, c' and c'', found {value!r}; SmoothWeights.from_function "
+                "takes one that returns c alone"
+            )
         try:
             parts = [finite_array(name, part) for name, part in zip(("c", "c'", "c''"), value, strict=True)]
             if any(part.ndim == 0 or len(part) != self.robots for part in parts):
