@@ -102,8 +102,8 @@ class FunctionWeights:
         value = self.function(float(t))
         if not isinstance(value, (tuple, list)) or len(value) != 3:
             raise CouplingError(
-                f"c: expected a function of t returning c, c' and c'', found {value!r}; SmoothWeights.from_function "
-                "takes one that returns c alone"
+                f"c: expected a function of t returning c, c' and c'', found {value!r}; "
+                "SmoothWeights.from_function takes one that returns c alone"
             )
         try:
             parts = [finite_array(name, part) for name, part in zip(("c", "c'", "c''"), value, strict=True)]
