@@ -33,6 +33,7 @@ from synctrl.show.paper_sections import (
 )
 from synctrl.show.plant_sections import friction_section, full_a460_section, identification_section
 from synctrl.show.report import Links, Section, write_page
+from synctrl.show.step_section import step_section
 from synctrl.show.style import display
 from synctrl.show.theory_sections import baseline_section, certificate_section
 from synctrl.simulation.result import Result
@@ -92,6 +93,7 @@ def reproduce(out: Path, workers: int, jobs: Mapping[str, Job]) -> Path:
         baseline_section(comparisons),
         certificate_section(certificates, out / "figures"),
         judge_section(judged(every), out / "figures"),
+        step_section(runs),
     ]
     write_metrics(
         out / "metrics.json",

@@ -9,12 +9,16 @@ import numpy as np
 import pytest
 
 from synctrl import Payload, Result, load_robot
+from synctrl.analysis.certify import certify
+from synctrl.analysis.lyapunov import lyapunov
 from synctrl.errors import InputError, NonFiniteError
 from synctrl.experiments import a460_full_pair, a460_pair
 from synctrl.experiments.a460_full import WRIST
 from synctrl.robots.documents import lock
+from synctrl.robots.limits import joint_limits
 from synctrl.robots.urdf import describe
 from synctrl.simulation.guard import Guard
+from synctrl.simulation.held_joints import HELD as OUTPUTS
 from synctrl.simulation.held_joints import HeldJointsPlant, Pid
 from synctrl.simulation.integrators import Sample
 
@@ -85,6 +89,107 @@ def test_the_result_says_how_far_the_wrist_gave_way(full_run, tmp_path) -> None:
         assert 0 < max(held["largest"]) < np.deg2rad(0.5)
         assert all(final <= largest for final, largest in zip(held["final"], held["largest"], strict=True))
     assert Result.load(result.save(tmp_path / "run.npz")) == result
+
+
+# -- the certificate --------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def certified():
+    """A run with half the usual step, and its certificate."""
+    run = a460_full_pair().simulate(1.0, dt=5e-4)
+    return run, certify(run)
+
+
+def test_six_joints_are_outside_the_theorem_by_friction_and_by_the_wrist_and_by_nothing_else(
+    certified,
+) -> None:
+    certificate = certified[1]
+    assert certificate.verdict == "outside the theorem" and certificate.closes
+    friction, wrist = certificate.outside
+    assert "friction that the model does not contain" in friction
+    assert "forces that the model does not contain" in wrist and "HeldJointsPlant" in wrist
+
+
+def test_without_friction_the_wrist_alone_is_outside_and_the_usual_step_will_do() -> None:
+    certificate = certify(a460_full_pair(friction=False).simulate(0.5))
+    (wrist,) = certificate.outside
+    assert certificate.closes and not certificate.doubts and "HeldJointsPlant" in wrist
+
+
+def fastest(friction: bool, six: bool) -> float:
+    """The fastest rate of a plant at rest under no change of torque, 1/s."""
+    loop = (a460_full_pair if six else a460_pair)(friction=friction).closed_loop()
+    plant, q, (n, nv) = loop.plant, loop.cell.q0, loop.cell.q0.shape
+    x0 = np.concatenate((q.ravel(), np.zeros(n * nv), plant.hidden0))
+
+    def rate(x: np.ndarray) -> np.ndarray:
+        position, v = x[: 2 * n * nv].reshape(2, n, nv)
+        v_dot, hidden_dot = plant.move(position, v, np.zeros((n, nv)), x[2 * n * nv :])
+        return np.concatenate((v.ravel(), v_dot.ravel(), hidden_dot))
+
+    columns = [(rate(x0 + 1e-7 * d) - rate(x0 - 1e-7 * d)) / 2e-7 for d in np.eye(x0.size)]
+    return float(np.abs(np.linalg.eigvals(np.stack(columns, axis=1))).max())
+
+
+def test_friction_at_rest_is_faster_with_a_free_wrist_and_at_the_limit_of_the_usual_step() -> None:
+    """The wrist itself is slow; but a joint that does not carry it rigidly is lighter for friction to stop.
+
+    The classical Runge-Kutta method is stable for real rates up to 2.785 per step.
+    """
+    step = 1e-3
+    assert fastest(friction=True, six=False) < 0.9 * fastest(friction=True, six=True)
+    assert 0.95 * 2.785 < step * fastest(friction=True, six=True) < 1.05 * 2.785
+    assert step * fastest(friction=False, six=True) < 0.3
+
+
+def test_what_the_balance_misses_with_the_usual_step_it_misses_while_friction_lets_go() -> None:
+    run = a460_full_pair().simulate(0.5)
+    drift = np.abs(lyapunov(run).drift)
+    assert drift[run.t > 0.02].min() > 0.9 * drift.max()
+    assert run.info["step_error"]["time"] < 0.02
+
+
+def test_motion_and_torque_of_the_held_joints_are_logged_with_units(certified) -> None:
+    run = certified[0]
+    position, velocity, torque = (run.outputs[name] for name in OUTPUTS)
+    assert [run.unit(name) for name in OUTPUTS] == ["rad", "rad/s", "N·m"]
+    assert position.shape == velocity.shape == torque.shape == (len(run.t), 2, 3)
+    assert run.info["outputs"]["held_torque"]["axes"] == ["time", "robot", "held joint"]
+    rate = (position[2:] - position[:-2]) / (run.t[2:] - run.t[:-2])[:, None, None]
+    started = slice(10, None)  # the wrist has been let go of at t = 0
+    np.testing.assert_allclose(rate[started], velocity[1:-1][started], atol=1e-2 * np.abs(velocity).max())
+    for i, held in enumerate(run.info["held_joints"]):
+        assert held["largest"] == np.abs(position[:, i]).max(axis=0).tolist()
+
+
+def test_the_torque_of_the_held_joints_is_the_one_that_moves_them(certified) -> None:
+    run, k = certified[0], 1000
+    plant, (position, velocity, torque) = (
+        a460_full_pair().closed_loop().plant,
+        (run.outputs[n] for n in OUTPUTS),
+    )
+    v_dot = (run.v[k + 1] - run.v[k - 1]) / (run.t[k + 1] - run.t[k - 1])
+    held_dot = (velocity[k + 1] - velocity[k - 1]) / (run.t[k + 1] - run.t[k - 1])
+    for i, robot in enumerate(plant.robots):
+        state = [np.append(a[k, i], b[k, i]) for a, b in ((run.q, position), (run.v, velocity))]
+        needed = robot.inverse_dynamics(*state, np.append(v_dot[i], held_dot[i]))
+        np.testing.assert_allclose(needed[3:], torque[k, i], atol=1e-3 * np.abs(torque[k]).max() + 1e-4)
+
+
+def test_the_certificate_of_six_joints_survives_the_file(certified, tmp_path) -> None:
+    run, certificate = certified
+    loaded = Result.load(run.save(tmp_path / "run.npz"))
+    assert certify(loaded, a460_full_pair()).as_dict() == certificate.as_dict()
+
+
+def test_torque_of_held_joints_stays_within_their_limits_where_the_plant_saturates() -> None:
+    experiment = replace(a460_full_pair(wrist=Pid(1e4, 0.0, 1e2)), saturate=True)
+    plant = experiment.closed_loop().plant
+    limits = joint_limits(plant.robots[0]).torque[3:]
+    torque = plant.outputs(np.full((1, plant.hidden0.size), 0.1))["held_torque"][0]
+    assert np.isfinite(limits).all()
+    np.testing.assert_allclose(torque, np.broadcast_to(-limits, torque.shape))
 
 
 def test_mujoco_moves_six_joints_the_same_way() -> None:

@@ -272,7 +272,7 @@ def test_friction_that_drives_is_refused(make, says):
         ({"dt": [1e-3, 1e-3]}, "dt: expected"),
         ({"dt": True}, "dt: expected"),
         ({"dt": 2.0}, "dt: expected at most the duration"),
-        ({"dt": 1e-9}, "more than 10000000 steps"),
+        ({"dt": 1e-9}, "more than 100000000 steps"),
         ({"duration": 0.0}, "duration: .*above 0"),
         ({"duration": -1.0}, "duration: .*above 0"),
         ({"duration": np.inf}, "duration: expected finite"),

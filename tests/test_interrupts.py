@@ -38,7 +38,7 @@ class Faulty:
 
     Args:
         act: what it does then.
-        always: whether it does so from then on.
+        always: whether it does so from then on, when asked for one instant, as solvers do.
     """
 
     dimension, breaks = 2, ()
@@ -48,7 +48,8 @@ class Faulty:
 
     def __call__(self, t):
         t = np.asarray(t, dtype=float)
-        struck = t > FAULT - 1e-4 if self.always else np.abs(t - FAULT) < 1e-4
+        later = (t > FAULT - 1e-4) & (t.size == 1)
+        struck = later if self.always else np.abs(t - FAULT) < 1e-4
         return self.act(self.path(t), struck) if struck.any() else self.path(t)
 
 

@@ -49,7 +49,8 @@ from synctrl.show.plots import (
 from synctrl.show.real_cells import formation_scene
 from synctrl.show.report import Section, Text, Verdicts, write_page
 from synctrl.show.theory_sections import baseline_section, certificate_section, draw_certificate
-from synctrl.simulation.guard import run_away
+from synctrl.simulation.guard import Finding
+from synctrl.simulation.guard import stopped as stopped_by
 from synctrl.simulation.prepared import Prepared
 from synctrl.sweep.factors import Setup
 from synctrl.sweep.identity import describe_base
@@ -221,7 +222,7 @@ def stopped(name: str, folder: Path) -> None:
     for k in range(4):
         y = loop.initial_state()
         loop.split(y)[k][...] = np.nan
-        error = run_away(loop, 0.1, y, np.ones((loop.cell.n, loop.cell.nv)))
+        error = stopped_by(loop, 0.1, y, np.ones((loop.cell.n, loop.cell.nv)), Finding("state"))
         assert isinstance(error, NonFiniteError) and error.robot in range(loop.cell.n)
 
 

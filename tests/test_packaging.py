@@ -121,7 +121,7 @@ def imported(*folders: str) -> set[str]:
             elif isinstance(node, ast.ImportFrom) and not node.level:
                 found.add(node.module.partition(".")[0])
             elif isinstance(node, ast.Call) and "importorskip" in ast.unparse(node.func):
-                found.add(ast.literal_eval(node.args[0]).partition(".")[0])
+                found |= {n.value.partition(".")[0] for n in node.args if isinstance(n, ast.Constant)}
     return found - sys.stdlib_module_names - {"synctrl"}
 
 

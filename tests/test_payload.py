@@ -9,7 +9,6 @@ from machines import random_robot, seeds
 
 from synctrl import Cell, Coupling, Cubic, Experiment, Gains, Member, Payload, Result, Robot, load_robot
 from synctrl.errors import FrameNotFound, InputError
-from synctrl.experiments import a460_pair
 from synctrl.robots.documents import weld
 from synctrl.robots.payload import Load, carrying
 from synctrl.robots.urdf import describe
@@ -187,10 +186,3 @@ def test_impossible_payloads_are_refused(make, said: str) -> None:
 def test_an_unknown_frame_is_refused_with_the_known_ones() -> None:
     with pytest.raises(FrameNotFound, match="wrist"):
         pair(load_robot("a460"), Payload(0, 1.0, frame="wirst"))
-
-
-def test_the_compiled_engine_says_that_it_has_no_payloads() -> None:
-    experiment = a460_pair()
-    loaded = Experiment(experiment.cell, experiment.gains, 0.1, payloads=(Payload(0, 1.0),))
-    with pytest.raises(InputError, match="payloads"):
-        loaded.simulate(engine="compiled")

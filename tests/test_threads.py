@@ -1,6 +1,6 @@
 """Threads that share a robot, a controller, a cell or a result get what one thread gets, bit for bit.
 
-Here a few pieces of work each; `tests/stress/test_threads.py` has many.
+Here a few pieces of work each; `tests/stress/test_long_threads.py` has many.
 """
 
 from __future__ import annotations

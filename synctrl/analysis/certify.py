@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..simulation.plant import Plant
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .convergence import Convergence, convergence_of
@@ -120,11 +121,20 @@ def _outside(run: Replay, record: Lyapunov, condition: GainCondition) -> list[st
         if name in run.learning and name not in _WORDS and not (power > record.rounding).any():
             continue  # a power of the adaptation that only takes from V
         if name != "weight rate" and (np.abs(power) > record.rounding).any():
-            words = _WORDS.get(name, f"the adaptation's {name}")
+            words = _in_words(run, name)
             found.append(f"{words}: power from {power.min():.3g} to {power.max():.3g}")
     if condition.needed and not condition.holds:
         found.append(f"the gain condition fails: {_condition_in_words(run, condition)}")
     return found
+
+
+def _in_words(run: Replay, name: str) -> str:
+    """A power that the theorem does not know, with the plant that it comes from if that is a special one."""
+    plant = type(run.loop.plant)
+    special = name == "other" and plant is not Plant
+    return _WORDS.get(name, f"the adaptation's {name}") + (
+        f", of the plant {plant.__qualname__}" if special else ""
+    )
 
 
 _WORDS = {
@@ -159,12 +169,19 @@ def _doubts(
         found.append(
             f"the balance of V does not close: V - V(0) - integral of V' reaches {record.largest_drift:.3g}, "
             f"numerical errors explain {record.drift_bound:.3g}; the step is too long to follow this motion"
+            + _advice(run.result)
         )
     if growth is not None and not outside:
         found.append(f"V grows at t = {growth.time:g} s by the term '{growth.term}'")
     if not (errors.identity_holds or unproven):
         found.append(f"w = N e* + S+ epsilon is off by {errors.identity:.3g}")
     return found
+
+
+def _advice(result: Result) -> str:
+    """The step that the run itself advises, in words; nothing if it does not."""
+    step = (result.info.get("step_error") or {}).get("advised_step")
+    return "" if step is None else f", expected at most dt = {step:g} s"
 
 
 def _condition_in_words(run: Replay, condition: GainCondition) -> str:

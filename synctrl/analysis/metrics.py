@@ -154,6 +154,7 @@ def as_data(result: Result, computed: Metrics) -> dict[str, Any]:
         data[kind] = _error_data(result, kind, getattr(computed, kind))
     data["peak_torque"] = {"unit": result.unit("tau"), "values": _torque_data(result, computed)}
     data["gains"], data["versions"] = info["gains"], info["versions"]
+    data["step_error"] = info.get("step_error")
     return data
 
 

@@ -119,7 +119,7 @@ def replay(result: Result, experiment: Experiment | None = None) -> Replay:
 
     Raises:
         InputError: no experiment for a result loaded from a file, another than the one that made it, numbers
-            that have no squares, or a plant with joints whose motion is not in the result.
+            that have no squares, or a state of adaptation or plant that is not in the result.
     """
     instance("result", result, Result, "a Result")
     experiment = experiment_of(result, experiment)

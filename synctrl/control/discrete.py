@@ -9,18 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import boolean, choice, finite_array, finite_number, instance, positive_number
-from ..errors import InputError, NonFiniteError, ResultError
+from ..errors import InputError, ResultError
 from ..tasks.cell import Reference
 from .controller import Controller, Signals
+from .measured import check_limits, check_signals, measurement, not_finite
+from .state_file import read_state, write_state
 
 #: how far from its place on the grid of samples a call may come, as a share of the period
 LATE = 0.1
+#: periods up to which samples can be told from each other
+LONGEST = 2.0**50
 FAULTS = "error", "hold"
 
 
@@ -31,18 +34,23 @@ class DiscreteController:
 
         tau_k = tau(t_k, q_k, v_k, x_k),   x_{k+1} = x_k + period f(t_k, q_k, v_k, x_k).
 
-    Rows are robots; joints that a robot does not have are zeros, on the way in and on the way out.
+    Rows are robots; joints that a robot does not have are zeros, on the way in and on the way out. A call
+    that raises an error leaves the controller as it was before.
 
     Args:
         controller: the law.
         period: time between two calls of `step`, s.
-        torque_limits: (n, nv), N·m, beyond which torque is cut off; by default it is not.
+        torque_limits: (n, nv), N·m, at which the torque of the joints is cut off, gravity included; by
+            default it is not.
         include_gravity: False for robots that add the torque of gravity by themselves: it is then taken off,
             as the robots' descriptions have it.
-        faults: what a measurement that is not finite, a period that was missed, or a time that runs
-            backwards does. "error" refuses it. "hold" keeps the torque and learns nothing from it.
+        faults: what a measurement that is not finite, a period that was missed, or a time that is off the
+            grid or runs backwards does. "error" refuses it. "hold" keeps the torque and learns nothing from
+            it; before the first sample there is nothing to hold, and it is refused.
 
     Attributes:
+        z: state of the adaptation for the next sample, (n, Z).
+        memory: of the network for the next sample; with `Ideal` it is `sync_integral`, (p, m).
         held: how many calls and periods were held until now.
         signals: what the last sample computed, or None before the first.
 
@@ -65,7 +73,10 @@ class DiscreteController:
         self.include_gravity = boolean("include_gravity", include_gravity)
         self.faults = choice("faults", faults, FAULTS)
         self._shape = self.cell.n, self.cell.nv
-        self._limits = _limits(torque_limits, self._shape)
+        self._limits = check_limits(torque_limits, self._shape)
+        self.held: int
+        self.signals: Signals | None
+        self._samples: int
         self._start()
 
     # -- use ----------------------------------------------------------------------------------------------
@@ -80,8 +91,9 @@ class DiscreteController:
         Raises:
             InputError: another shape, or a number that is not finite.
         """
-        self._start(finite_number("t", t))
+        start = finite_number("t", t)
         finite_array("q", q, self._shape), finite_array("v", v, self._shape)
+        self._start(start)
 
     def step(self, t: float, q: ArrayLike, v: ArrayLike, desired: ArrayLike | None = None) -> np.ndarray:
         """Torque for the period that begins now, (n, nv), N·m; the caller's to keep.
@@ -92,22 +104,38 @@ class DiscreteController:
             desired: xd, xd', xd'', (3, n, m), as the cell's trajectories give them; by default theirs at t.
 
         Raises:
-            InputError: another shape; and, unless faults are held, a number that is not finite, a time that
-                runs backwards, or a missed period.
-            NonFiniteError: the law has no finite torque here, as at a singular Jacobian.
+            InputError: another shape, or a time that is no number; and, unless faults are held, a measurement
+                that is not finite, a time that is early or runs backwards, or a missed period.
+            SingularJacobianError: a Jacobian with a larger condition number than the cell's space allows.
+            NonFiniteError: the law has no finite torque here.
+            SimulationError: a desired motion or weight of the user's fails.
         """
-        time, motion = finite_number("t", t), _measured(q, v, self._shape)
+        time, motion = self._time(t), measurement(q, v, self._shape)
         wanted = None if desired is None else finite_array("desired", desired, (3, self.cell.n, self.cell.m))
-        may_hold = self.faults == "hold" and self._samples > 0
-        if may_hold:
-            self._skip_to(self._reached(time))
-        fault = self._off_the_grid(time) or self._not_finite(time, motion)
-        if fault is None:
-            return self._sample(time, motion, wanted)
-        if not may_hold:
-            raise InputError(fault)
-        self._skip_to(self._reached(time) + 1)
+        missed = self._missed(time)
+        fault = self._off_the_grid(time, missed) or not_finite(self.cell, time, motion)
+        if fault is not None:
+            return self._hold(time, missed, fault)
+        with np.errstate(all="ignore"):  # what is not finite is named
+            signals = self._evaluate(time, motion, wanted)
+        check_signals(self.cell, time, signals)
+        self._samples, self.held = self._samples + missed, self.held + missed
+        self._advance(motion[0], signals)
         return self._tau.copy()
+
+    def sample(self, t: float, motion: np.ndarray) -> Signals:
+        """What `step` does with a measurement that is in order, for a simulation that watches by itself.
+
+        Args:
+            t: time of the sample, s.
+            motion: joint positions and velocities, (2, n, nv), of which the signals may keep views.
+
+        Returns:
+            What the law computed, its torque neither cut off nor without gravity.
+        """
+        signals = self._evaluate(t, motion, None)
+        self._advance(motion[0], signals)
+        return signals
 
     # -- memory -------------------------------------------------------------------------------------------
 
@@ -117,54 +145,54 @@ class DiscreteController:
 
         `z`, (n, Z), state of the adaptation, which is theta_hat for the paper's; `sync_integral`, (p, m),
         unit of c e times s, or `network_state`, memory of a network that keeps something else; `tau`,
-        (n, nv), N·m, the torque that is held; `start`, s, and `samples`, the place on the grid; `held`.
+        (n, nv), N·m, the torque that is held; `start`, s, `period`, s, and `samples`, the place on the grid;
+        `held`. What is set has to be of the same cell and period.
         """
-        return {
-            "z": self.z.copy(),
-            self._memory_name: self.memory.copy(),
-            "tau": self._tau.copy(),
-            "start": np.array(self._t0),
-            "samples": np.array(float(self._samples)),
-            "held": np.array(float(self.held)),
+        numbers = {
+            "start": self._t0,
+            "period": self.period,
+            "samples": float(self._samples),
+            "held": float(self.held),
         }
+        arrays = {"z": self.z, self._memory_name: self.memory, "tau": self._tau}
+        return {name: np.array(value) for name, value in {**arrays, **numbers}.items()}
 
     @state.setter
     def state(self, state: Mapping[str, ArrayLike]) -> None:
         kept = self.state
         if not isinstance(state, Mapping) or set(state) != set(kept):
-            found = sorted(state) if isinstance(state, Mapping) else type(state).__name__
+            found = list(map(str, state)) if isinstance(state, Mapping) else type(state).__name__
             raise InputError(f"state: expected arrays called {', '.join(sorted(kept))}, found {found}")
         new = {name: finite_array(f"state, {name}", state[name], kept[name].shape) for name in kept}
-        self.z, self.memory = new["z"].copy(), new[self._memory_name].copy()
-        self._tau, self._t0 = new["tau"].copy(), float(new["start"])
-        self._samples, self.held = int(new["samples"]), int(new["held"])
+        if new["period"] != self.period:
+            raise InputError(
+                f"state, period: expected that of the controller, {self.period:g} s, found {new['period']:g}"
+            )
+        samples, held = (_count(name, float(new[name])) for name in ("samples", "held"))
+        self.z, self.memory, self._tau = (new[k].copy() for k in ("z", self._memory_name, "tau"))
+        self._t0, self._samples, self.held = float(new["start"]), samples, held
+        self.signals = None
 
     def save(self, path: str | Path) -> Path:
-        """Write the state to an .npz file.
+        """Write the state to an .npz file, which appears when it is whole.
 
         Raises:
+            InputError: something else than a path.
             ResultError: the file cannot be written.
         """
-        instance("path", path, (str, Path), "a path")
-        try:
-            with Path(path).open("wb") as file:
-                np.savez(file, **self.state)  # type: ignore[arg-type]
-        except OSError as error:
-            raise ResultError(f"cannot write the controller's state to '{path}': {error}") from error
-        return Path(path)
+        return write_state(path, self.state)
 
     def load(self, path: str | Path) -> None:
-        """Read what `save` wrote, of a controller for the same cell.
+        """Read what `save` wrote, of a controller for the same cell and period.
 
         Raises:
-            ResultError: the file is missing, damaged, or of another cell.
+            InputError: something else than a path.
+            ResultError: the file is missing, damaged, of another controller, or anything else.
         """
-        instance("path", path, (str, Path), "a path")
+        found = read_state(path, self.state)
         try:
-            with np.load(Path(path), allow_pickle=False) as content:
-                state: dict[str, Any] = {name: content[name] for name in content.files}
-            self.state = state
-        except Exception as error:  # whatever a damaged archive makes its readers raise
+            self.state = found
+        except InputError as error:
             raise ResultError(f"'{path}' has no state of this controller: {error}") from error
 
     @property
@@ -184,60 +212,54 @@ class DiscreteController:
         self.z = self.controller.adaptation.start()
         self.memory = np.array(self.controller.network.start(), dtype=float)
         self._tau = np.zeros(self._shape)
-        self.signals: Signals | None = None
+        self.signals = None
 
-    def _reached(self, t: float) -> int:
-        """Number of the last instant of the grid that time t has come to."""
-        return int(np.floor((t - self._t0) / self.period + LATE))
+    def _time(self, t: float) -> float:
+        time = finite_number("t", t)
+        if not abs(time / self.period - self._t0 / self.period) < LONGEST:
+            raise InputError(f"t: expected a time near the start at {self._t0:g} s, found {time:g} s")
+        return time
 
-    def _skip_to(self, sample: int) -> None:
-        """Let the samples before this one go by: nothing was measured then."""
-        missed = max(0, sample - self._samples)
-        self._samples, self.held = self._samples + missed, self.held + missed
+    def _missed(self, t: float) -> int:
+        """How many samples went by without a call before time t; 0 where none may be missed."""
+        reached = int(np.floor((t - self._t0) / self.period + LATE))
+        return max(0, reached - self._samples) if self._may_hold else 0
 
-    def _off_the_grid(self, t: float) -> str | None:
+    @property
+    def _may_hold(self) -> bool:
+        return self.faults == "hold" and self._samples > 0
+
+    def _off_the_grid(self, t: float, missed: int) -> str | None:
         """What is wrong with the time of a call, if anything is."""
-        due = self._t0 + self._samples * self.period
+        due = self._t0 + (self._samples + missed) * self.period
         late = (t - due) / self.period
         if abs(late) <= LATE:
             return None
         how = f"{late:.3g} periods late" if late > 0 else "time runs backwards, or the call is early"
         return f"t: expected the sample at {due:g} s of a period of {self.period:g} s, found {t:g} s: {how}"
 
-    def _not_finite(self, t: float, motion: np.ndarray) -> str | None:
-        """What is wrong with a measurement, if anything is."""
-        if np.isfinite(motion).all():
-            return None
-        part, robot, joint = np.argwhere(~np.isfinite(motion))[0]
-        return (
-            f"{'qv'[part]}: expected finite numbers, found {motion[part, robot, joint]} for joint "
-            f"{joint + 1} of {self.cell.names[robot]} at t = {t:g} s"
-        )
+    def _hold(self, t: float, missed: int, fault: str) -> np.ndarray:
+        """The torque that is held; a sample that is due now, or overdue, is missed as well."""
+        if not self._may_hold:
+            raise InputError(fault)
+        sample = self._samples + missed
+        due = t >= self._t0 + (sample - LATE) * self.period
+        self._samples, self.held = sample + int(due), self.held + missed + 1
+        return self._tau.copy()
 
-    def _sample(self, t: float, motion: np.ndarray, desired: np.ndarray | None) -> np.ndarray:
+    def _evaluate(self, t: float, motion: np.ndarray, desired: np.ndarray | None) -> Signals:
         reference = self.cell.references(np.array([t]))[0]
         if desired is not None:
             reference = Reference(desired, reference.weights, reference.t)
-        signals = self.controller.unchecked(reference, motion, self.z, self.memory)
-        self._tau = self._commanded(t, motion[0], signals)
+        return self.controller.unchecked(reference, motion, self.z, self.memory)
+
+    def _advance(self, q: np.ndarray, signals: Signals) -> None:
+        """Keep what is commanded, and what will be known at the next sample."""
+        tau = np.clip(signals.tau, -self._limits, self._limits)
+        self._tau = tau if self.include_gravity else tau - self._gravity(q)
         self.z = self.controller.adaptation.settle(self.z + self.period * signals.z_dot)
         self.memory = self.memory + self.period * signals.memory_dot
         self._samples, self.signals = self._samples + 1, signals
-        return self._tau.copy()
-
-    def _commanded(self, t: float, q: np.ndarray, signals: Signals) -> np.ndarray:
-        """What goes to the motors of the torque that the law asks for."""
-        bad = np.flatnonzero(~np.isfinite(signals.tau).all(axis=1))
-        if bad.size:
-            name = self.cell.names[bad[0]]
-            raise NonFiniteError(
-                f"the law has no finite torque for {name} at t = {t:g} s: its Jacobian may be singular, or "
-                "the loop unstable; stop the robots and reset the controller",
-                time=t,
-                robot=int(bad[0]),
-            )
-        tau = signals.tau if self.include_gravity else signals.tau - self._gravity(q)
-        return np.clip(tau, -self._limits, self._limits)
 
     def _gravity(self, q: np.ndarray) -> np.ndarray:
         g = np.zeros(self._shape)
@@ -246,24 +268,7 @@ class DiscreteController:
         return g
 
 
-def _measured(q: ArrayLike, v: ArrayLike, shape: tuple[int, int]) -> np.ndarray:
-    """q and v, (2, n, nv), of the right shape; whether they are finite is asked later."""
-    motion = np.empty((2, *shape))
-    for row, name, value in zip(motion, "qv", (q, v), strict=True):
-        try:
-            array = np.asarray(value, dtype=float)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"{name}: expected numbers, found {value!r}") from error
-        if array.shape != shape:
-            raise InputError(f"{name}: expected shape {shape}, one row per robot, found {array.shape}")
-        row[...] = array
-    return motion
-
-
-def _limits(limits: ArrayLike | None, shape: tuple[int, int]) -> np.ndarray:
-    if limits is None:
-        return np.full(shape, np.inf)
-    array = np.asarray(limits, dtype=float)
-    if array.shape != shape or not (array >= 0).all():
-        raise InputError(f"torque_limits: expected numbers of at least 0 of shape {shape}, found {limits!r}")
-    return array.copy()
+def _count(name: str, value: float) -> int:
+    if not 0 <= value < LONGEST or value != int(value):
+        raise InputError(f"state, {name}: expected a whole number of at least 0, found {value:g}")
+    return int(value)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -13,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any, Self
 
-from ..errors import ResultError, SimulationError
+from ..errors import ResultError, SimulationError, StepWarning
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 
@@ -116,7 +117,9 @@ def _work(name: str, job: Job, folder: Path) -> Path:
     duration = job.duration or experiment.duration
     try:
         progress = _reporter(name, duration)
-        return experiment.simulate(duration, plant=job.plant, progress=progress).save(path)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", StepWarning)  # the page has a section on steps
+            return experiment.simulate(duration, plant=job.plant, progress=progress).save(path)
     except SimulationError as error:
         if error.result is not None:
             error.result.save(path)

@@ -16,7 +16,7 @@ from .a460_pair import a460_pair
 from .planar_four import planar_four
 from .reproduction import JOBS
 
-#: all runs but a longer one, and those with six joints, whose wrists a result does not log
+#: all runs but a longer one, and those with six joints, for which the step of the page is too long
 CERTIFIED = (
     "a460_pair_frictionless",
     "a460_pair_friction_adapted",

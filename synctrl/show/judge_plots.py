@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..analysis.judge import AGREEMENT, Comparison
+from .legends import plain
 from .panels import power_of_ten
-from .plots import new_figure, plain, style
+from .plots import new_figure, style
 from .style import ACCENT, robot_color
 
 if TYPE_CHECKING:

@@ -11,7 +11,8 @@ from ..errors import InputError
 from ..robots.robot import Robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .plots import new_figure, plain, style
+from .legends import plain
+from .plots import new_figure, style
 from .runs import check_run, shown_experiment
 from .style import DESIRED, robot_color
 

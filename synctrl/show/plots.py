@@ -6,7 +6,7 @@ it as PNG and SVG, the same bytes every time.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from threading import RLock
@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analysis.metrics import ERRORS, row_names
-from ..checks import choice, finite_array, printable
+from ..analysis.metrics import ERRORS
+from ..checks import choice, finite_array
 from ..errors import InputError, ResultError
 from ..files import whole_file
 from ..simulation.result import Result
+from .legends import axis_handles, legend, line_widths, plain, row_color, row_handles
 from .panels import DPI, GAP, LEGEND, TITLE, WIDTH, stacked_panels
 from .runs import check_run
 from .style import ACCENT, DESIRED, display, line_style, robot_color
@@ -142,7 +143,7 @@ def joint_trajectories(result: Result, robot: int) -> Figure:
             panel.margins(x=0)
         panels[-1].set_xlabel("time, s")
         panels[0].set_title(plain(result.names[robot]), loc="left")
-        _legend(figure, panels[0].get_lines())
+        legend(figure, panels[0].get_lines())
     return figure
 
 
@@ -182,9 +183,6 @@ def common_limits(kind: str, *results: Result) -> tuple[float, float]:
 SMALL = 0.4
 #: heights of the panel of a coordinate, of errors, and of magnified errors, inches
 COORDINATE, PANEL, MAGNIFIED = 1.3, 2.1, 1.5
-#: widths of the first and of the last line of a figure, points
-WIDE, NARROW = 3.0, 1.3
-_INDEX = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
 def _errors(result: Result, kind: str, what: str, limits: tuple[float, float] | None) -> Figure:
@@ -207,7 +205,7 @@ def _errors(result: Result, kind: str, what: str, limits: tuple[float, float] | 
             panels[1].set_title(f"the same, on 1/{times:.2g} of the range", loc="left")
             panels[1].set_ylabel(f"{what.split()[-1]}, {unit}")
         panels[-1].set_xlabel("time, s")
-        _legend(figure, [*_row_handles(result, kind), *_axis_handles(result), *marks])
+        legend(figure, [*row_handles(result, kind), *axis_handles(result), *marks])
     return figure
 
 
@@ -216,60 +214,9 @@ def _error_lines(panel: Axes, result: Result, kind: str, factor: float) -> None:
     e = factor * getattr(result, kind)
     panel.axhline(0.0, color="#8a929c", linewidth=0.7, zorder=1)
     for a in range(e.shape[2]):
-        for k, width in enumerate(_widths(e.shape[1])):
-            color = _row_color(result, kind, k)
+        for k, width in enumerate(line_widths(e.shape[1])):
+            color = row_color(result, kind, k)
             panel.plot(result.t, e[:, k, a], line_style(a), color=color, linewidth=width, zorder=2 + k)
-
-
-def _widths(rows: int) -> np.ndarray:
-    return np.linspace(WIDE, NARROW, rows) if rows > 1 else np.array([1.4])
-
-
-def _row_color(result: Result, kind: str, row: int) -> str:
-    if kind == "tracking_error":
-        return robot_color(row)
-    pairs = result.info["pairs"]
-    return robot_color(pairs[row][0]) if len(pairs) > 1 else DESIRED  # a single pair belongs to both robots
-
-
-def _row_handles(result: Result, kind: str) -> list[Any]:
-    from matplotlib.lines import Line2D
-
-    names = row_names(result, kind)
-    if kind == "sync_error":
-        names = [f"ε{str(k).translate(_INDEX)}" for k in range(1, len(names) + 1)] if len(names) > 1 else []
-    widths = _widths(len(names))
-    return [
-        Line2D([], [], color=_row_color(result, kind, k), linewidth=widths[k], label=plain(name))
-        for k, name in enumerate(names)
-    ]
-
-
-def plain(name: str) -> str:
-    """A name with nothing in it that matplotlib would read as a formula, or could not write."""
-    return printable(name).replace("\n", " ").replace("$", r"\$")
-
-
-def _axis_handles(result: Result) -> list[Any]:
-    from matplotlib.lines import Line2D
-
-    return [
-        Line2D([], [], color="#555555", ls=line_style(a), label=plain(name))
-        for a, name in enumerate(result.info["axes"])
-    ]
-
-
-def _legend(figure: Figure, handles: Sequence[Any]) -> None:
-    columns = min(len(handles), 7)
-    figure.legend(
-        handles=list(handles),
-        loc="upper right",
-        ncols=columns,
-        handlelength=2.0,
-        handletextpad=0.5,
-        columnspacing=1.0,
-        borderaxespad=0.2,
-    )
 
 
 def _mark_disturbances(panel: Axes, result: Result) -> list[Any]:

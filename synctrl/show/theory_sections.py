@@ -71,7 +71,9 @@ _INTRODUCTION = (
     "it, V' ≤ 0 to rounding at every logged instant, and V changes by no more and no less than the integral "
     "of V'. Friction and disturbances are outside the theorem; their power has a name, and the balance "
     "closes with it as well. Friction among the adapted parameters is inside. The arms with six joints are "
-    "left out: what their wrists do is no part of the logged state, so nothing can be said of their V."
+    "left out: with the step of these runs friction of a joint at rest is at the limit of what the method "
+    "follows, and their balance does not close. With half the step it does; their certificate then names the "
+    "friction, and the forces of wrists that the model takes for locked."
 )
 _FAIRNESS = (
     "The paper compares with β = K_ε = 0 and all else unchanged, which takes gain away. Beside that stand an "

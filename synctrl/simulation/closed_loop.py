@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..control.controller import Controller, Signals
-from ..errors import NonFiniteError
+from ..errors import InputError, NonFiniteError
 from ..tasks.cell import Reference
 from .plant import Plant
 from .state import Layout, State
@@ -34,6 +34,22 @@ class ClosedLoop:
         cell = self.cell
         parts = (cell.q0, cell.v0, self._z0, self._memory0, self.plant.hidden0)
         return np.concatenate([part.ravel() for part in parts])
+
+    def check_plant(self) -> None:
+        """Refuse a plant whose rates do not fit what they are the rates of.
+
+        Raises:
+            InputError: of another shape.
+        """
+        q, hidden = self.cell.q0, self.plant.hidden0
+        rates = self.plant.move(q, self.cell.v0, np.zeros(q.shape), hidden)
+        shapes = {"acceleration": q.shape, "rate of its own state": hidden.shape}
+        for (what, expected), rate in zip(shapes.items(), rates, strict=True):
+            if np.shape(rate) != expected:
+                raise InputError(
+                    f"plant, {type(self.plant).__qualname__}: expected {expected} numbers as its {what}, "
+                    f"found {np.shape(rate)}"
+                )
 
     def state(self, y: np.ndarray | None = None) -> State:
         """The parts of y, or of a new y that holds nothing yet."""
@@ -71,18 +87,32 @@ class ClosedLoop:
         self, reference: Reference, state: State, disturbance: np.ndarray | None, rate: State
     ) -> Signals:
         """`evaluate` for states whose views are at hand: y' is written into `rate`."""
-        signals = self._law(reference, state.motion, state.z, state.memory)
-        tau = self.plant.applied(signals.tau)
+        signals = self.look(reference, state)
+        self.respond(state, signals.tau, disturbance, rate)
+        self.watch(state, signals, rate.v)
+        rate.z[...], rate.memory[...] = signals.z_dot, signals.command.memory_dot
+        return signals
+
+    def look(self, reference: Reference, state: State) -> Signals:
+        """What the controller computes in a state, of which it may keep views."""
+        return self._law(reference, state.motion, state.z, state.memory)
+
+    def respond(self, state: State, tau: np.ndarray, disturbance: np.ndarray | None, rate: State) -> None:
+        """Write how the plant moves into `rate`, and leave the rates of the controller's state as they are.
+
+        Args:
+            state: where it is.
+            tau: torque that the controller asks for, (n, nv), N·m.
+            disturbance: torque from outside, (n, nv), N·m, or None.
+            rate: where the rates go.
+        """
+        tau = self.plant.applied(tau)
         if disturbance is not None:
             tau = tau + disturbance
         v_dot, hidden_dot = self.plant.move(state.q, state.v, tau, state.hidden)
-        if self._foreign:
-            self._watch(state, signals, v_dot)
         rate.q[...], rate.v[...] = state.v, v_dot
-        rate.z[...], rate.memory[...] = signals.z_dot, signals.command.memory_dot
         if hidden_dot.size:
             rate.hidden[...] = hidden_dot
-        return signals
 
     def settled(self, state: State) -> State:
         """The state after a step, with what the adaptation makes of its own, for example projected."""
@@ -91,31 +121,14 @@ class ClosedLoop:
             state.z[...] = z
         return state
 
-    def coast(self, y: np.ndarray, held: np.ndarray, tau: np.ndarray, disturbance: np.ndarray) -> np.ndarray:
-        """y' while the controller is not asked: only the plant moves on.
-
-        Args:
-            y: state.
-            held: y' at the last sample, of which the parts of the controller's state are kept.
-            tau: torque of the controller, (n, nv), N·m.
-            disturbance: torque from outside, (n, nv), N·m.
-        """
-        q, v, _, _ = self.split(y)
-        y_dot = held.copy()
-        moved, accelerated, _, _ = self.split(y_dot)
-        moved[:] = v
-        tau = self.plant.applied(tau) + disturbance
-        accelerated[:], self.hidden(y_dot)[:] = self.plant.move(q, v, tau, self.hidden(y))
-        return y_dot
-
-    def _watch(self, state: State, signals: Signals, v_dot: np.ndarray) -> None:
+    def watch(self, state: State, signals: Signals, v_dot: np.ndarray) -> None:
         """Name parts that users wrote when a finite state becomes numbers that mean nothing.
 
         Raises:
             NonFiniteError: a torque, a rate of an estimate or an acceleration that is not finite; without
                 the time, which is not known here.
         """
-        if not np.isfinite(state.flat).all():
+        if not self._foreign or not np.isfinite(state.flat).all():
             return
         found = {
             "torque": signals.tau,

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from math import inf, isfinite
-from typing import NamedTuple
+from math import isfinite
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..errors import NonFiniteError, OrientationError, SimulationError, SingularJacobianError
 from ..tasks.cell import Cell
-from ..tasks.pose import MAX_ANGLE, PoseSpace
-from ..tasks.redundancy import determinant
+from ..tasks.pose import MAX_ANGLE
+from ..tasks.spaces import Measurement
 from .closed_loop import ClosedLoop
 from .integrators import Sample
 
@@ -24,7 +24,7 @@ class Finding(NamedTuple):
     """What made a guard stop a run.
 
     Attributes:
-        check: which of `CHECKS` failed.
+        check: which of `CHECKS` failed, or a space's own word for what is too large, see `Invalid`.
         robot: the first one that failed it; with "orientation" the one that is farthest off.
         value: the number that was too large: an angle, rad, or a condition number.
     """
@@ -35,7 +35,7 @@ class Finding(NamedTuple):
 
 
 class Guard:
-    """Checks every logged instant for non-finite states, orientation errors near pi and singular Jacobians.
+    """Checks every instant for non-finite states, and for task coordinates that their space calls invalid.
 
     A square Jacobian is also singular when its determinant has changed sign since the instant before: the arm
     has jumped across a singular configuration in between. A space with damping may be singular.
@@ -43,11 +43,9 @@ class Guard:
 
     def __init__(self, loop: ClosedLoop):
         self._loop = loop
-        self._limit = getattr(loop.cell.space, "max_condition", np.inf)
-        square = np.array([robot.nv == loop.cell.m for robot in loop.cell.robots])
-        self._square, self._at = slice(None) if square.all() else square, np.arange(loop.cell.n)
-        self._pose = isinstance(loop.cell.space, PoseSpace)
-        self._sides: bytes | None = None
+        space: Any = loop.cell.space
+        self._invalid, self._which = getattr(space, "invalid", None), getattr(space, "sides", None)
+        self._sides: np.ndarray | None = None
         self._v = np.zeros((loop.cell.n, loop.cell.nv))
 
     def check(self, sample: Sample) -> None:
@@ -57,6 +55,7 @@ class Guard:
             NonFiniteError: a part of the state, or a torque, is infinite or not a number.
             OrientationError: an orientation error is so large that its direction is about to be undefined.
             SingularJacobianError: a robot cannot follow its reference because its Jacobian is singular.
+            SimulationError: what a space of another kind calls invalid.
         """
         found = self._look(sample)
         if found is not None:
@@ -68,32 +67,22 @@ class Guard:
         if not isfinite(np.add.reduce(sample.y)) and not np.isfinite(sample.y).all():
             return Finding("state")
         task, tau = sample.signals.task, sample.signals.tau
-        if self._pose and (turned := _turned(task.e[:, 3:])) is not None:
-            return turned
-        if task.J is not None and task.J_inv is not None and self._limit < inf:
-            singular = self._singular(task.J, task.J_inv) or self._crossed(task.J)
-            if singular is not None:
-                return singular
+        invalid = None if self._invalid is None else self._invalid(task)
+        if invalid is not None:
+            return Finding(*invalid)
+        if (crossed := self._crossed(task)) is not None:
+            return crossed
         if not isfinite(np.add.reduce(tau, axis=None)) and (rows := _non_finite_rows(tau)).size:
             return Finding("torque", int(rows[0]))
         return None
 
-    def _singular(self, J: np.ndarray, J_inv: np.ndarray) -> Finding | None:
-        """The first robot with too large a condition number, by the Frobenius norm."""
-        if _total(J) * _total(J_inv) < self._limit**2:  # then it holds for every robot
-            return None
-        condition = np.sqrt((J * J).sum((1, 2)) * (J_inv * J_inv).sum((1, 2)))
-        i = int(np.argmax(~(condition < self._limit)))
-        return None if condition[i] < self._limit else Finding("condition", i, float(condition[i]))
-
-    def _crossed(self, J: np.ndarray) -> Finding | None:
+    def _crossed(self, task: Measurement) -> Finding | None:
         """The first robot on the other side of a singular configuration than at the instant before."""
-        positive = determinant(J[self._square, :, : J.shape[1]]) > 0
-        before, self._sides = self._sides, positive.tobytes()
-        if before in (None, self._sides):
+        sides = None if self._which is None else self._which(task, self._loop.cell.robots)
+        before, self._sides = self._sides, sides
+        if sides is None or before is None or sides.tobytes() == before.tobytes():
             return None
-        changed = positive != np.frombuffer(before, dtype=bool)
-        return Finding("side", int(self._at[self._square][np.argmax(changed)]))
+        return Finding("side", int(np.argmax(sides != before)))
 
 
 def stopped(loop: ClosedLoop, t: float, y: np.ndarray, v: np.ndarray, found: Finding) -> SimulationError:
@@ -111,6 +100,8 @@ def stopped(loop: ClosedLoop, t: float, y: np.ndarray, v: np.ndarray, found: Fin
         return _run_away(loop, t, y, v)
     if found.check == "torque":
         return _not_finite(loop.cell, t, i, "torque")
+    if found.check not in CHECKS:
+        return _invalid(loop.cell, t, found)
     if found.check == "orientation":
         return OrientationError(
             f"the orientation error of {loop.cell.names[i]} is {value:.3g} rad at t = {t:g} s; expected at "
@@ -124,6 +115,16 @@ def stopped(loop: ClosedLoop, t: float, y: np.ndarray, v: np.ndarray, found: Fin
         + (seen if found.check == "side" else f"its condition number is {_large(value)}"),
         time=t,
         robot=i,
+    )
+
+
+def _invalid(cell: Cell, t: float, found: Finding) -> SimulationError:
+    """The error of task coordinates that a space of another kind calls invalid."""
+    return SimulationError(
+        f"the {found.check} of {cell.names[found.robot]} is {found.value:.3g} at t = {t:g} s; "
+        f"{cell.space!r} says that its coordinates mean nothing there",
+        time=t,
+        robot=found.robot,
     )
 
 
@@ -153,19 +154,6 @@ def _not_finite(cell: Cell, t: float, robot: int, what: str) -> NonFiniteError:
 def _large(condition: float) -> str:
     """A condition number in words; above 1e12 it is made of rounding errors."""
     return f"{condition:.3g}" if condition < 1e12 else "infinite"
-
-
-def _turned(e: np.ndarray) -> Finding | None:
-    """The robot whose orientation error, (n, 3), is the largest, if that is too large."""
-    angle = np.nan_to_num(np.linalg.norm(e, axis=1), nan=0.0)
-    i = int(np.argmax(angle))
-    return Finding("orientation", i, float(angle[i])) if angle[i] > MAX_ANGLE else None
-
-
-def _total(A: np.ndarray) -> float:
-    """Sum of the squares of all entries."""
-    entries = A.ravel()
-    return float(entries.dot(entries))
 
 
 def _non_finite_rows(part: np.ndarray) -> np.ndarray:

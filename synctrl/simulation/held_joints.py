@@ -14,7 +14,10 @@ from ..errors import InputError
 from ..robots.limits import joint_limits
 from ..robots.robot import Robot
 from ..tasks.cell import Cell
-from .plant import Plant
+from .plant import Output, Plant
+
+#: outputs of a run with held joints
+HELD = ("held_position", "held_velocity", "held_torque")
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +88,6 @@ class HeldJointsPlant(Plant):
             )
         rows = hidden.reshape(-1, 3, self._count)
         held_tau = self._torque(rows)
-        if self.saturate:
-            held_tau = np.clip(held_tau, -self._held_limits, self._held_limits)
         state = np.zeros((3, self.cell.n, self._real_nv))
         flat = state.reshape(3, -1)
         for part, known, held in zip(
@@ -99,6 +100,15 @@ class HeldJointsPlant(Plant):
         hidden_dot[:, 0], hidden_dot[:, 2] = rows[:, 1], self.at_rest - rows[:, 0]
         hidden_dot[:, 1] = a[self._held_at].reshape(-1, self._count)
         return v_dot, hidden_dot.ravel()
+
+    def outputs(self, hidden: np.ndarray) -> dict[str, Output]:
+        """Positions, velocities and torques of the held joints, each (T, n, held joints)."""
+        rows = hidden.reshape(len(hidden), -1, 3, self._count)
+        parts = {"rad": rows[:, :, 0], "rad/s": rows[:, :, 1], "N·m": self._torque(rows)}
+        return {
+            name: (part.copy(), unit, ("time", "robot", "held joint"))
+            for name, (unit, part) in zip(HELD, parts.items(), strict=True)
+        }
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         """How far the held joints were moved, in rad: `held_joints`, one entry per robot."""
@@ -115,8 +125,10 @@ class HeldJointsPlant(Plant):
         }
 
     def _torque(self, rows: np.ndarray) -> np.ndarray:
-        pid = self.pid
-        return pid.P * (self.at_rest - rows[:, 0]) - pid.D * rows[:, 1] + pid.I * rows[:, 2]
+        """What the PID controllers give, (..., held joints), of states (..., 3, held joints)."""
+        pid, (q, v, integral) = self.pid, np.moveaxis(rows, -2, 0)
+        tau = pid.P * (self.at_rest - q) - pid.D * v + pid.I * integral
+        return np.clip(tau, -self._held_limits, self._held_limits) if self.saturate else tau
 
     def _start(self) -> np.ndarray:
         hidden = np.zeros((self.cell.n, 3, self._count))

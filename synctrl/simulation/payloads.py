@@ -85,6 +85,7 @@ class PayloadSchedule:
 
     Attributes:
         edges: instants at which something is picked up or put down, s.
+        free: the robots as they are without payloads, n of them.
         robots: the robots with their loads before, between and after the edges, edges + 1 rows of n.
 
     Raises:
@@ -96,6 +97,7 @@ class PayloadSchedule:
         for payload in payloads:
             _check(len(robots), payload)
         changes = {t for p in payloads for t in (p.start, p.stop) if t is not None and t > 0}
+        self.free = tuple(robots)
         self.edges = tuple(sorted(float(t) for t in changes))
         self.robots = [
             tuple(_loaded(robot, i, payloads, t) for i, robot in enumerate(robots))

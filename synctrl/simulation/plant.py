@@ -54,8 +54,18 @@ PHYSICS: dict[str, Callable[[Sequence[Robot]], Dynamics]] = {
 class Plant:
     """Accelerations of all robots under torque and friction, with the payloads they carry.
 
-    A kind of plant with a state of its own, for example of joints that the controller does not know,
-    overrides `hidden0` and `move`, and what it wants a result to say, `outputs` and `report`.
+    A plant of one's own is a subclass. It may have a state of its own, an array of numbers that goes through
+    time with the robots: of motors that lag, of joints that the controller does not know. It overrides
+
+    - `hidden0`: that state at t = 0, (k,);
+    - `move`: accelerations and the rate of that state, (k,), both finite and without side effects, for a
+      method asks at states where the run never comes; what the package's plant does is `super().move(...)`;
+    - `outputs`: arrays over time that the result gets beside those of every run, with units and axes;
+    - `report`: what `result.info` says of the state in plain data.
+
+    Nothing else is asked of it. The state is logged as `outputs["plant_state"]`, so that a run can be gone
+    through again; a certificate names the plant beside the power of what it does and the model does not.
+    The compiled engine refuses a subclass by name.
 
     Args:
         cell: the robots, with their true parameters and friction.
@@ -124,15 +134,26 @@ class Plant:
     def move(
         self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, hidden: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """v' under tau and friction, and the rate of the plant's own state; valid until the next call."""
-        return self._dynamics(q, v, tau - self.friction(v) if self.rubs else tau), hidden
+        """v' and the rate of the plant's own state, which is 0 here; valid until the next call.
+
+        Args:
+            q, v: joint positions and velocities, (n, nv), rad and rad/s.
+            tau: torque that reaches the joints, with that from outside, (n, nv), N·m.
+            hidden: the plant's own state, of the size of `hidden0`.
+        """
+        at_rest = np.zeros_like(hidden) if hidden.size else hidden
+        return self._dynamics(q, v, tau - self.friction(v) if self.rubs else tau), at_rest
 
     def friction(self, v: np.ndarray) -> np.ndarray:
         """Torque by which friction opposes the velocities v, (n, nv), N·m."""
         return self.viscous * v + self.coulomb * np.tanh(v / self.smoothing)
 
     def outputs(self, hidden: np.ndarray) -> dict[str, Output]:
-        """Further arrays over time that a result gets, of the plant's own state, (T, size of the state)."""
+        """Further arrays over time that a result gets, of the plant's own state, (T, size of the state).
+
+        Returns:
+            Under each name an array, its unit, and the names of its axes, the first of which is "time".
+        """
         return {}
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:

@@ -61,6 +61,7 @@ class Run(NamedTuple):
         cell = self.loop.cell
         with _before_the_start(self):
             self.loop.plant.prepare()
+            self.loop.check_plant()
             check_motions(cell, np.array([0.0, self.clock.end]))
             check_reachable(cell, self.clock.spread(SAMPLES))
             cell.coupling.check_weights(self.clock.spread(WEIGHT_SAMPLES), cell.m)
@@ -70,14 +71,15 @@ def run_reference(run: Run, progress: Progress | None = None) -> Result:
     """A planned run by the reference engine and the fixed-step integrator."""
     plan = run.loop, run.clock, run.schedule
     if run.every is not None:
-        return _collect(run, sampled_rk4(*plan, run.every, run.step_error), progress)
-    return _collect(run, rk4(*plan, run.step_error), progress)
+        period = float(run.info["control_period"])
+        return collect(run, sampled_rk4(*plan, run.every, period, run.step_error), progress)
+    return collect(run, rk4(*plan, run.step_error), progress)
 
 
 def run_adaptive(run: Run, method: str, rtol: float, atol: float, progress: Progress | None = None) -> Result:
     """A planned run by one of SciPy's methods."""
     run.info.update(integrator=method, rtol=rtol, atol=atol)
-    return _collect(run, adaptive(run.loop, run.clock, run.schedule, method, rtol, atol), progress)
+    return collect(run, adaptive(run.loop, run.clock, run.schedule, method, rtol, atol), progress)
 
 
 def run_compiled(
@@ -103,8 +105,17 @@ def run_compiled(
     )
 
 
-def _collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> Result:
-    """Watch samples one by one, and log those that belong into the log."""
+def collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> Result:
+    """Watch samples one by one, and log those that belong into the log.
+
+    Args:
+        run: the run; its `info` may say more by then.
+        samples: what was computed, in order; whatever an engine raises ends the run.
+        progress: called with the time of what is logged, s.
+
+    Raises:
+        SimulationError: the run had to stop; it carries what was logged.
+    """
     recorder, guard = SampleRecorder(run.loop, run.clock), Guard(run.loop)
 
     def log() -> None:

@@ -18,12 +18,13 @@ from ..tasks.cell import Cell
 from .clock import make_clock
 from .closed_loop import ClosedLoop
 from .disturbances import Disturbance, DisturbanceSchedule
+from .engines import Engine, find_engine
 from .handover import Progress
 from .integrators import ADAPTIVE
 from .payloads import Payload
 from .plant import PHYSICS, Plant
 from .result import Result
-from .run import Run, run_adaptive, run_compiled, run_reference
+from .run import Run, run_adaptive
 from .sampled import steps_per_sample
 from .saturation import warn_of_saturation
 from .step_error import StepError, warn_of_step
@@ -93,7 +94,7 @@ class Experiment:
         dt: float = 1e-3,
         integrator: str = "rk4",
         *,
-        engine: str = "pinocchio",
+        engine: str | Engine = "pinocchio",
         plant: str = "pinocchio",
         control_period: float | None = None,
         log_dt: float | None = None,
@@ -109,7 +110,8 @@ class Experiment:
             integrator: "rk4", or a method of SciPy's solve_ivp: "RK45", "RK23", "DOP853", "Radau", "BDF",
                 "LSODA". The last bits of "Radau" and "BDF", which solve linear systems, depend on the number
                 of threads of the BLAS library.
-            engine: "pinocchio", the reference, or "compiled": the same closed loop as generated C, for "rk4".
+            engine: "pinocchio", the reference, or "compiled": the same closed loop as generated C, for "rk4";
+                or an `Engine` of one's own.
             plant: library that computes the plant: "pinocchio", or "mujoco", which reads the robots' URDF by
                 itself and is an independent judge of the physics.
             control_period: None for continuous control; otherwise torque and adaptation are held for this
@@ -134,7 +136,7 @@ class Experiment:
             StepWarning: the step of "rk4" was too long, and which one does; `info["step_error"]` says more.
         """
         choice("integrator", integrator, ("rk4", *ADAPTIVE))
-        choice("engine", engine, ("pinocchio", "compiled"))
+        by = find_engine(engine)
         if progress is not None and not callable(progress):
             raise InputError(f"progress: expected a function of the time reached, found {progress!r}")
         choice("plant", plant, tuple(PHYSICS))
@@ -142,11 +144,13 @@ class Experiment:
         run = self.plan(duration, dt, control_period, plant, log_dt)
         if integrator != "rk4":
             _needs_rk4(integrator, engine, control_period)
+        elif (reason := by.refuses(run)) is not None:
+            raise InputError(reason)
         run.check()
         if integrator != "rk4":
             result = run_adaptive(run, integrator, *tolerances, progress)
         else:
-            result = run_compiled(run, progress) if engine == "compiled" else run_reference(run, progress)
+            result = by.run(run, progress)
         warn_of_step(result.info["step_error"], result.names, dt)
         warn_of_saturation(result)
         return result
@@ -215,7 +219,7 @@ def simulate(
     adaptation: Adaptation | None = None,
     law: Law | None = None,
     network: Network | None = None,
-    engine: str = "pinocchio",
+    engine: str | Engine = "pinocchio",
     plant: str = "pinocchio",
     control_period: float | None = None,
     log_dt: float | None = None,
@@ -264,9 +268,9 @@ def simulate(
     )
 
 
-def _needs_rk4(integrator: str, engine: str, control_period: float | None) -> None:
-    if engine == "compiled":
-        raise InputError(f"engine='compiled' has the integrator 'rk4' only, found {integrator!r}")
+def _needs_rk4(integrator: str, engine: str | Engine, control_period: float | None) -> None:
+    if engine != "pinocchio":
+        raise InputError(f"engine={engine!r} has the integrator 'rk4' only, found {integrator!r}")
     if control_period is not None:
         raise InputError(f"control_period: sampled control needs the integrator 'rk4', found {integrator!r}")
 

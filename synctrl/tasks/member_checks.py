@@ -42,6 +42,8 @@ def check_labels(cell: Any) -> None:
     label("coupling: unit", cell.coupling.unit)
     for axis in cell.labels:
         label("space: name of a coordinate", axis)
+        if not axis.strip():
+            raise InputError(f"space: expected a word as the name of every coordinate, found {axis!r}")
     if len({*cell.labels}) < len(cell.labels):
         raise InputError(f"space: expected coordinates of different names, found {', '.join(cell.labels)}")
     for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True):

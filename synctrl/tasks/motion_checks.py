@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from itertools import pairwise
+
 import numpy as np
 
 from ..checks import finite_array
-from ..errors import InputError, TrajectoryError
-from . import rotations
+from ..errors import InputError, SimulationError, TrajectoryError
 from .cell import Cell
 from .derivatives import Displacement, Misfit, difference, find_misfit, look_at
-from .pose import PoseSpace
+from .spaces import units_of
 from .trajectories import Motion
 
 PARTS = ("position", "velocity", "acceleration")
@@ -18,9 +20,9 @@ PARTS = ("position", "velocity", "acceleration")
 def check_motions(cell: Cell, times: np.ndarray) -> None:
     """Compare the derivatives of all desired motions with differences, between their breaks.
 
-    In `PoseSpace` the velocity is the angular velocity w of R' = [w] R. A space of another kind may offer
-    `displacement(start, end)`, the way from one position to another, (..., m), if its velocities are no
-    derivatives of its coordinates.
+    In `PoseSpace` the velocity is the angular velocity w of R' = [w] R: a space says by its `displacement`
+    which way leads from one position to another, if its velocities are no derivatives of its coordinates.
+    Coordinates of one unit side by side are taken together.
 
     Args:
         cell: the robots and what is desired of them.
@@ -29,25 +31,18 @@ def check_motions(cell: Cell, times: np.ndarray) -> None:
     Raises:
         TrajectoryError: a derivative that is off by more than 2 % of its largest value. The message names the
             robot, the derivative, the time and both values.
-        SimulationError: a motion fails or is not finite, see `Cell.motion`.
     """
     start, stop = float(times[0]), float(times[-1])
     count = int(np.clip(1000 // cell.n, 4, 24))
     for robot in range(cell.n):
-        _check_motion(cell, robot, start, stop, count)
-
-
-def pose_displacement(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """From one pose to another, (..., 6): a translation and, in world axes, a rotation vector."""
-    turn = rotations.exp(end[..., 3:]) @ np.swapaxes(rotations.exp(start[..., 3:]), -1, -2)
-    return np.concatenate((end[..., :3] - start[..., :3], rotations.log(turn)), axis=-1)
+        with suppress(SimulationError):  # a motion that fails ends the run, which hands over what it has
+            _check_motion(cell, robot, start, stop, count)
 
 
 def _check_motion(cell: Cell, robot: int, start: float, stop: float, count: int) -> None:
     windows = look_at(start, stop, cell.members[robot].trajectory.breaks, count)
-    pose = isinstance(cell.space, PoseSpace)
-    groups = [slice(0, 3), slice(3, 6)] if pose else [slice(0, cell.m)]
-    way = pose_displacement if pose else getattr(cell.space, "displacement", difference)
+    groups = _groups(units_of(cell.space, cell.m))
+    way = getattr(cell.space, "displacement", difference)
     largest = np.abs(_motion(cell, robot, windows.start).x).max()
     ways: tuple[Displacement, Displacement] = (way, difference)
     for order, displacement in enumerate(ways):
@@ -59,6 +54,12 @@ def _check_motion(cell: Cell, robot: int, start: float, stop: float, count: int)
         misfit = find_misfit(sample, windows, groups, order * largest / stop, displacement)
         if misfit is not None:
             raise _error(cell, cell.names[robot], order, misfit)
+
+
+def _groups(units: tuple[str, ...]) -> list[slice]:
+    """Coordinates of one unit that stand side by side."""
+    borders = [0, *(k for k in range(1, len(units)) if units[k] != units[k - 1]), len(units)]
+    return [slice(a, b) for a, b in pairwise(borders)]
 
 
 def _motion(cell: Cell, robot: int, times: np.ndarray) -> Motion:
@@ -73,8 +74,7 @@ def _motion(cell: Cell, robot: int, times: np.ndarray) -> Motion:
 
 def _error(cell: Cell, name: str, order: int, misfit: Misfit) -> TrajectoryError:
     label = cell.labels[misfit.coordinate]
-    units = cell.space.unit.split(", ")
-    unit = units[-1] if misfit.coordinate >= 3 else units[0]
+    unit = units_of(cell.space, cell.m)[misfit.coordinate]
     per = ("/s", "/s^2")[order]
     function, derivative = PARTS[order : order + 2]
     return TrajectoryError(

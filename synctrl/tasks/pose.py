@@ -11,6 +11,7 @@ from . import rotations
 from .redundancy import Damping, Redundancy
 from .spaces import BoundTipSpace, Measurement, TipSpace
 from .tips import Tips
+from .validity import Invalid, too_turned
 
 #: An orientation error beyond this ends a run: at pi its direction is not defined, rad.
 MAX_ANGLE = 3.0
@@ -40,6 +41,7 @@ class PoseSpace(TipSpace):
     """
 
     unit = "m, rad"
+    units = ("m",) * 3 + ("rad",) * 3
 
     def __init__(
         self,
@@ -66,6 +68,16 @@ class PoseSpace(TipSpace):
         e_o = rotations.log(rotations.exp(target[3:]) @ pose.rotation.T)
         e = np.concatenate((target[:3] - pose.translation, e_o))
         return e, np.vstack((J[:3], rotations.left_jacobian_inverse(e_o).T @ J[3:]))
+
+    def invalid(self, task: Measurement) -> Invalid | None:
+        """The robot with the largest orientation error, if that is too large; else as every tip's space."""
+        turned = too_turned(task.e[:, 3:], MAX_ANGLE)
+        return super().invalid(task) if turned is None else turned
+
+    def displacement(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """From one pose to another, (..., 6): a translation and, in world axes, a rotation vector."""
+        turn = rotations.exp(end[..., 3:]) @ np.swapaxes(rotations.exp(start[..., 3:]), -1, -2)
+        return np.concatenate((end[..., :3] - start[..., :3], rotations.log(turn)), axis=-1)
 
     def __repr__(self) -> str:
         return "PoseSpace()"

@@ -17,6 +17,7 @@ from ..errors import InputError
 from ..robots.robot import Robot
 from .redundancy import Damping, InverseMap, Inversion, Redundancy, inverse_map
 from .tips import Tips
+from .validity import Invalid, determinant_sides, too_singular
 
 AXES = "xyz"
 Joints = tuple[np.ndarray, np.ndarray]
@@ -70,7 +71,21 @@ class BoundSpace(Protocol):
 
 
 class Space(Protocol):
-    """A kind of task coordinates."""
+    """A kind of task coordinates: what a space of one's own gives.
+
+    The coordinates have different names, each a word of one line. Beside what is below, a space may offer any
+    of the following, and is asked for it where it does; what it does not offer is not looked at.
+
+    - `units`: unit of each of the m coordinates, where they differ.
+    - `invalid(task) -> Invalid | None`: what makes a `Measurement` mean nothing; the run then ends with an
+      error that names time and robot.
+    - `sides(task, robots) -> (n,)`: on which side of a singular configuration robots are; a run ends where
+      one of them has changed within a step. None where it may.
+    - `miss(robot, target, q) -> error, Jacobian`: by how much a robot at q misses a target, (m,), and J,
+      (m, nv), with e' = -J v. With it a run begins only if joint positions exist for what is desired.
+    - `displacement(start, end)`: the way from one position to another, (..., m), if its velocities are no
+      derivatives of its coordinates.
+    """
 
     def labels(self, robots: Sequence[Robot]) -> tuple[str, ...]:
         """Names of the m coordinates."""
@@ -81,6 +96,11 @@ class Space(Protocol):
 
     def bind(self, robots: Sequence[Robot]) -> BoundSpace:
         """This space for certain robots."""
+
+
+def units_of(space: Space, m: int) -> tuple[str, ...]:
+    """Unit of each of the m coordinates of a space."""
+    return tuple(getattr(space, "units", (space.unit,) * m))
 
 
 class JointSpace:
@@ -151,6 +171,18 @@ class TipSpace:
     def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Error e, (m,), of one robot against a target, (m,), and the J, (m, nv), with e' = -J v."""
         raise NotImplementedError
+
+    def invalid(self, task: Measurement) -> Invalid | None:
+        """The first robot whose Jacobian is singular; none with damping."""
+        if task.J is None or task.J_inv is None or self.max_condition == np.inf:
+            return None
+        return too_singular(task.J, task.J_inv, self.max_condition)
+
+    def sides(self, task: Measurement, robots: Sequence[Robot]) -> np.ndarray | None:
+        """Signs of the determinants of square Jacobians, (n,), and 0 for others; None with damping."""
+        if task.J is None or self.max_condition == np.inf:
+            return None
+        return determinant_sides(task.J, np.array([robot.nv == self.m for robot in robots]))
 
     def inverse_map(self, robots: Sequence[Robot]) -> InverseMap:
         """The way to the joints of these robots.

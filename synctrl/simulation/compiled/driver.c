@@ -21,9 +21,11 @@ typedef struct {
     const double *K_r, *Gamma;           /* (n, K), (n, P) */
     const double *W_inv, *posture, *gain;           /* (n, nv) */
     const double *base;                             /* (n, 12) */
-    const double *pi;                               /* (n, bodies), true parameters */
+    const double *pi;                               /* (loads, n, bodies), true parameters with every load */
     const double *viscous, *coulomb, *smoothing;    /* (n, nv), (n, nv), (n) */
-    int rubs;                                       /* whether any of them is not zero */
+    const double *limits;                           /* (n, nv), at which torque is cut off */
+    int rubs;                                       /* whether there is friction */
+    int saturates;                                  /* whether torque is cut off */
     int K;                                          /* columns of K_r */
     int arity;                                      /* robots in one synchronization error */
     double max_condition, max_angle;
@@ -60,6 +62,7 @@ typedef struct {
     double *tau;      /* (n, nv) */
     double *loaded;   /* (n, nv): torque that moves the plant */
     double *e_star, *s_q;
+    const double *pi; /* (n, bodies): true parameters with what the robots carry in this step */
     double *k[4], *stage;
     double *sign;     /* (n): signs of the determinants at the last logged instant, 0 at first */
     double *held, *held_tau; /* sampled control */
@@ -168,6 +171,9 @@ static void control(const Cell *c, const Reference *r, int stage, int step, cons
                sizeof(double) * m);
 }
 
+/* What reaches a joint of the torque that is asked for, as `Plant.applied`; what is no number stays so. */
+static double applied(double tau, double limit) { return tau > limit ? limit : tau < -limit ? -limit : tau; }
+
 static void plant(const Cell *c, const double *y, const double *tau, const double *disturbance, double *y_dot,
                   int fresh, Work *k) {
     int n = c->n, nv = c->nv;
@@ -176,7 +182,8 @@ static void plant(const Cell *c, const double *y, const double *tau, const doubl
         const Kind *kind = &kinds[c->kind[i]];
         const double *q = y + (size_t)i * nv, *v = y + (size_t)(n + i) * nv;
         double *load = k->loaded + (size_t)i * nv, *trig = k->trig + (size_t)i * 2 * nv;
-        for (int j = 0; j < nv; j++) load[j] = tau[i * nv + j] + disturbance[i * nv + j];
+        for (int j = i * nv; j < (i + 1) * nv; j++)
+            k->loaded[j] = (c->saturates ? applied(tau[j], c->limits[j]) : tau[j]) + disturbance[j];
         if (c->rubs)
             for (int j = 0; j < nv; j++)
                 load[j] -= c->viscous[i * nv + j] * v[j]
@@ -189,7 +196,7 @@ static void plant(const Cell *c, const double *y, const double *tau, const doubl
         *a++ = trig;
         *a++ = trig + nv;
         *a++ = load;
-        *a++ = c->pi + (size_t)i * c->bodies;
+        *a++ = k->pi + (size_t)i * c->bodies;
         *a++ = c->base + 12 * i;
         k->res[0] = y_dot + (size_t)(n + i) * nv;
         kind->plant(k->arg, k->res, k->iw, k->w, 0);
@@ -353,14 +360,19 @@ static void finish(double *y, double h, double *const *s, int size) {
     for (int j = 0; j < size; j++) y[j] += h / 6 * (s[0][j] + 2 * (s[1][j] + s[2][j]) + s[3][j]);
 }
 
-/* Advance y through some steps of a block; continuous control. Rows are counted in the report. */
+/* Let the robots carry what they carry in a step. */
+static void take(const Cell *c, int load, Work *k) { k->pi = c->pi + (size_t)load * c->n * c->bodies; }
+
+/* Advance y through some steps of a block; continuous control. Rows are counted in the report. `window` says which
+ * disturbance acts in a step, and `load` what is carried. */
 void advance(const Cell *c, const Reference *r, const double *t, const char *marks, const int *window,
-             const double *disturbances, double *y, Log *log, Work *k, Report *report) {
+             const int *load, const double *disturbances, double *y, Log *log, Work *k, Report *report) {
     int size = state_size(c);
     for (int step = 0; step < r->count; step++) {
         double h = t[step + 1] - t[step];
         const double *d = disturbances + (size_t)window[step] * c->n * c->nv;
         report->step = step;
+        take(c, load[step], k);
         evaluate(c, r, 0, step, y, d, k->k[0], k);
         look_back(c, t[step], marks[step] & JOINED ? k->step_error->h : 0, y, k->k[3], k->k[0], k->step_error);
         k->step_error->h = h;
@@ -377,13 +389,14 @@ void advance(const Cell *c, const Reference *r, const double *t, const char *mar
 }
 
 /* The same with torque and adaptation held between samples. A logged torque acts from its instant on. */
-void advance_sampled(const Cell *c, const Reference *r, const double *t, const char *marks, const int *window,
+void advance_sampled(const Cell *c, const Reference *r, const double *t, const char *marks, const int *window, const int *load,
                      const double *disturbances, double *y, Log *log, Work *k, Report *report) {
     int size = state_size(c);
     for (int step = 0; step < r->count; step++) {
         double h = t[step + 1] - t[step];
         const double *d = disturbances + (size_t)window[step] * c->n * c->nv;
         report->step = step;
+        take(c, load[step], k);
         if (marks[step] & CHECKED) {
             evaluate(c, r, 0, step, y, d, k->k[0], k);
             if (check(c, y, k, report)) return;
@@ -408,6 +421,7 @@ void advance_sampled(const Cell *c, const Reference *r, const double *t, const c
 /* y' at one instant */
 void state_dot(const Cell *c, const Reference *r, const double *y, const double *disturbance, double *y_dot,
                Work *k) {
+    take(c, 0, k);
     evaluate(c, r, 0, 0, y, disturbance, y_dot, k);
 }
 

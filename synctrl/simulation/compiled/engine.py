@@ -182,8 +182,8 @@ class _Steps:
         part = slice(first, last)
         joined = self._clock.joined(steps.first + first, steps.starts[part])
         marks = _marks(steps.checked[part], steps.logged[part], self._due(steps.number[part]), joined)
-        window = self._schedule.windows(steps.middles[part])
-        self._call(block, first, steps.times[first : last + 1], marks, window, y)
+        windows = self._windows(steps.middles[part])
+        self._call(block, first, steps.times[first : last + 1], marks, windows, y)
 
     def finish(self, y: np.ndarray) -> None:
         """Log the end of the run: one step of no length."""
@@ -192,8 +192,13 @@ class _Steps:
         nothing = Stretch(clock.steps, np.repeat(end, 2), at > 0, at > 0, at)
         block = Block(nothing, *_tables(self._program.loop.cell, np.array([end] * 3)))
         due = np.array([self._every is not None and clock.sampled_at_end(self._every)])
-        window = self._schedule.windows(clock.stretch(clock.steps - 1, clock.steps).middles)
-        self._call(block, 0, nothing.times, _marks(at > 0, at > 0, due, at < 0), window, y)
+        windows = self._windows(clock.stretch(clock.steps - 1, clock.steps).middles)
+        self._call(block, 0, nothing.times, _marks(at > 0, at > 0, due, at < 0), windows, y)
+
+    def _windows(self, middles: np.ndarray) -> list[np.ndarray]:
+        """Which disturbance acts in each step, and which load is carried."""
+        schedules = self._schedule, self._program.loop.plant.schedule
+        return [schedule.windows(middles).astype(np.intc) for schedule in schedules]
 
     def _due(self, number: np.ndarray) -> np.ndarray:
         return number % (self._every or 1) == 0
@@ -204,7 +209,7 @@ class _Steps:
         first: int,
         times: np.ndarray,
         marks: np.ndarray,
-        window: np.ndarray,
+        windows: list[np.ndarray],
         y: np.ndarray,
     ) -> None:
         program, library, recorder = self._program, self._program.library, self._recorder
@@ -216,7 +221,7 @@ class _Steps:
         rows = recorder.rows_ahead()
         log, report = LogStruct(*(row.ctypes.data for row in rows[1:])), ReportStruct()
         log.z = recorder.address_ahead(ADAPTATION_STATE)
-        arrays = [np.ascontiguousarray(times), marks, window.astype(np.intc), self._torques, y]
+        arrays = [np.ascontiguousarray(times), marks, *windows, self._torques, y]
         call = library.advance if self._every is None else library.advance_sampled
         call.restype = None
         try:

@@ -35,6 +35,7 @@ from ...tasks.redundancy import DampedInverse, Inverse, Pseudoinverse, Redundanc
 from ...tasks.spaces import BoundCartesianSpace, BoundJointSpace, CartesianSpace, JointSpace
 from ...tasks.tips import Tips
 from ..closed_loop import ClosedLoop
+from ..payloads import PayloadSchedule
 from ..plant import Plant
 
 WAY_OUT = "use engine='pinocchio'"
@@ -91,6 +92,7 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     task: Any = cell.task
     yield Part("closed loop", loop, (ClosedLoop,))
     yield Part("plant", loop.plant, (Plant,))
+    yield Part("schedule of payloads", loop.plant.schedule, (PayloadSchedule,))
     yield Part("controller", controller, (Controller,))
     if isinstance(controller.law, BoundSunMills):  # others are traced
         yield Part("law", controller.law, (BoundSunMills,))
@@ -187,10 +189,9 @@ def _check_plant(loop: ClosedLoop) -> None:
     plant, robots = loop.plant, loop.controller.cell.robots
     special = {
         f"plant='{plant.physics}'": plant.physics != "pinocchio",
-        "saturation": plant.saturate,
-        "payloads": bool(plant.payloads),
         "a plant with a state of its own": plant.hidden0.size > 0,
-        "a plant with other robots than the cell": list(map(id, plant.robots)) != list(map(id, robots)),
+        "a plant with other robots than the cell": list(map(id, plant.schedule.free))
+        != list(map(id, robots)),
     }
     for name in (name for name, found in special.items() if found):
         raise InputError(f"engine='compiled' does not have {name}; {WAY_OUT}")

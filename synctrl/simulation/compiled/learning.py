@@ -67,6 +67,8 @@ def _traced(controller: Controller) -> list[Learning | None]:
     size = adaptation.start().shape[1]
     z, gradient = _symbols("z", [size] * cell.n, size), _symbols("gradient", counts, cell.theta.shape[1])
     motion = [_symbols(name, joints, cell.nv) for name in MOTION]
+    if adaptation.settle(z) is not z:
+        raise TypeError("a settle that does more than return z is not compiled")
     estimates = adaptation.estimate(z)
     rates = adaptation.rate(
         z, Seen(**dict(zip(MOTION, motion, strict=True)), gradient=gradient, regressor=None)

@@ -18,6 +18,7 @@ from ...robots.mechanism import mechanism
 from ...tasks.cell import Reference
 from ...tasks.pose import MAX_ANGLE
 from ..closed_loop import ClosedLoop
+from ..plant import Plant
 from .build import cached_library, content_key, require_casadi
 from .kind import Classified, Kind, classify
 from .known import check_known, check_untouched
@@ -119,9 +120,6 @@ class CompiledLoop:
         controller, cell, plant = self.loop.controller, self.loop.cell, self.loop.plant
         coupling = cell.coupling
         bodies = 10 * max(robot.body_count for robot in cell.robots)
-        pi = np.zeros((cell.n, bodies))
-        for i, robot in enumerate(cell.robots):
-            pi[i, : 10 * robot.body_count] = robot.inertial_parameters
         base = np.array([np.append(b.rotation.ravel(), b.translation) for b in bases])
         first, incident, incident_sign = coupling.incidence
         W_inv, posture, gain = _posture(controller)
@@ -129,7 +127,8 @@ class CompiledLoop:
             np.array(index, dtype=np.intc), coupling.edges.astype(np.intc), coupling.signs.copy(),
             first.astype(np.intc), incident.astype(np.intc), incident_sign.copy(),
             controller.Lambda, controller.beta, controller.K_eps, controller.K_r, gamma_of(controller),
-            W_inv, posture, gain, base, pi, plant.viscous, plant.coulomb, plant.smoothing[:, 0],
+            W_inv, posture, gain, base, _carried(plant, bodies), plant.viscous, plant.coulomb,
+            plant.smoothing[:, 0], plant.torque_limits,
         )  # fmt: skip
         learned = controller.adaptation.start().shape[1]
         sizes = (cell.n, cell.m, cell.nv, cell.theta.shape[1], learned, coupling.pairs, bodies)
@@ -137,7 +136,8 @@ class CompiledLoop:
         addresses = [self.address(np.ascontiguousarray(array)) for array in arrays]
         columns = controller.K_r.shape[1], coupling.edges.shape[1]
         rubs = int(plant.viscous.any() or plant.coulomb.any())
-        return CellStruct(*sizes, *addresses, rubs, *columns, limit, MAX_ANGLE)
+        flags = rubs, int(plant.saturate)
+        return CellStruct(*sizes, *addresses, *flags, *columns, limit, MAX_ANGLE)
 
     def _work(self, library: ctypes.CDLL) -> WorkStruct:
         cell, size = self.loop.cell, self.loop.size
@@ -149,7 +149,8 @@ class CompiledLoop:
         buffers = [self.address(np.zeros(length + 1)) for length in lengths]
         k = (ctypes.c_void_p * 4)(*(self.address(np.zeros(size)) for _ in range(4)))
         rest = [self.address(np.zeros(length)) for length in (size, n, size, n * nv)]
-        return WorkStruct(*buffers, k, *rest)
+        carried = None  # what is carried in a step is told before it
+        return WorkStruct(*buffers, carried, k, *rest)
 
 
 class Program(CompiledLoop):
@@ -221,6 +222,16 @@ def gamma_of(controller: Controller) -> np.ndarray:
     if isinstance(adaptation, BoundGradient):
         return adaptation.Gamma
     return np.zeros(controller.cell.theta.shape)
+
+
+def _carried(plant: Plant, bodies: int) -> np.ndarray:
+    """True inertial parameters with every load of the schedule, (windows, n, bodies)."""
+    windows = plant.schedule.robots
+    pi = np.zeros((len(windows), len(windows[0]), bodies))
+    for rows, robots in zip(pi, windows, strict=True):
+        for row, robot in zip(rows, robots, strict=True):
+            row[: 10 * robot.body_count] = robot.inertial_parameters
+    return pi
 
 
 def _posture(controller: Controller) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

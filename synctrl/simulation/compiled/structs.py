@@ -15,9 +15,11 @@ class CellStruct(ctypes.Structure):
             for name in (
                 "kind", "edge", "sign", "first", "incident", "incident_sign", "Lambda", "beta", "K_eps",
                 "K_r", "Gamma", "W_inv", "posture", "gain", "base", "pi", "viscous", "coulomb", "smoothing",
+                "limits",
             )
         ),
         ("rubs", ctypes.c_int),
+        ("saturates", ctypes.c_int),
         ("K", ctypes.c_int),
         ("arity", ctypes.c_int),
         ("max_condition", ctypes.c_double),
@@ -60,6 +62,7 @@ class WorkStruct(ctypes.Structure):
         ),
         ("e_star", ctypes.c_void_p),
         ("s_q", ctypes.c_void_p),
+        ("pi", ctypes.c_void_p),
         ("k", ctypes.c_void_p * 4),
         *((name, ctypes.c_void_p) for name in ("stage", "sign", "held", "held_tau", "step_error")),
     ]

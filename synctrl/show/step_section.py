@@ -1,0 +1,45 @@
+"""The section of the page on what the fixed step costs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..simulation.result import Result
+from .report import Section, Table, Text
+
+TITLE = "What the step costs"
+
+
+def step_section(runs: Mapping[str, Result]) -> Section:
+    """The estimated error of the worst step of every run, with those above the limit in a table.
+
+    Args:
+        runs: by name; those of methods that choose their steps, or from before estimates, are left out.
+    """
+    known = {name: run for name, run in runs.items() if (run.info.get("step_error") or {}).get("estimate")}
+    over = [run for run in known.values() if run.info["step_error"]["advised_step"] is not None]
+    words = (
+        "Every run estimates what its worst step errs in velocity, as a share of the largest velocity of the "
+        "run, from derivatives that it computes anyway. The error itself is about a third of that.",
+        f"{len(over)} of {len(known)} runs are above the limit"
+        + (", and would do with the step in the last column." if over else "."),
+    )
+    return Section(TITLE, (Text(words), *([_table(over)] if over else [])))
+
+
+def _table(runs: list[Result]) -> Table:
+    head = ("run", "step, ms", "estimate, %", "limit, %", "at", "t, s", "advised step, ms")
+    return Table(head, tuple(_row(run, run.info["step_error"]) for run in runs))
+
+
+def _row(run: Result, found: Mapping[str, Any]) -> tuple[str, ...]:
+    return (
+        str(run.info["title"]),
+        f"{1e3 * run.info['dt']:g}",
+        f"{100 * found['estimate']:.2g}",
+        f"{100 * found['limit']:.2g}",
+        f"{run.names[found['robot']]}, joint {found['joint'] + 1}",
+        f"{found['time']:g}",
+        f"{1e3 * found['advised_step']:.2g}",
+    )

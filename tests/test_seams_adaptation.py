@@ -1,0 +1,147 @@
+"""Adaptations whose state is not theta_hat, and one of a user's own, through every part of the toolkit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from seams.leaky_adaptation import Leaky
+
+from synctrl import Experiment, Result
+from synctrl.analysis.certify import certify
+from synctrl.analysis.lyapunov import lyapunov
+from synctrl.control.adaptation import Gradient, Natural
+from synctrl.errors import InputError
+from synctrl.experiments import a460_pair, mixed_four, planar_four
+from synctrl.robots.pseudo_inertia import smallest_eigenvalues
+from synctrl.simulation.result import LAYOUT
+
+ADAPTATIONS = {"natural": Natural(0.1), "leaky": Leaky(0.3, 0.1), "gradient": Gradient(0.3)}
+CONTROL = {"continuous": {}, "sampled": {"control_period": 2e-3}}
+
+
+def with_adaptation(experiment: Experiment, adaptation) -> Experiment:
+    return replace(experiment, adaptation=adaptation, gains=experiment.gains.replace(Gamma=None))
+
+
+@pytest.fixture(scope="module")
+def run():
+    """Short runs of the A460 pair without friction, each made once: `run(name)`."""
+    known: dict[str, Result] = {}
+
+    def made(name: str) -> Result:
+        if name not in known:
+            experiment = with_adaptation(a460_pair(friction=False), ADAPTATIONS[name])
+            known[name] = experiment.simulate(0.3, dt=5e-4)
+        return known[name]
+
+    return made
+
+
+def test_an_adaptation_and_its_shorthand_among_the_gains_are_the_same():
+    experiment = a460_pair()
+    one = experiment.simulate(0.02)
+    other = with_adaptation(experiment, Gradient(experiment.gains.Gamma)).simulate(0.02)
+    for name in LAYOUT:
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+
+
+@pytest.mark.parametrize("both", [True, False])
+def test_gamma_and_an_adaptation_exclude_each_other_and_one_is_needed(both):
+    experiment = a460_pair()
+    gains = experiment.gains if both else experiment.gains.replace(Gamma=None)
+    with pytest.raises(InputError, match="both" if both else "neither"):
+        replace(experiment, gains=gains, adaptation=Gradient(0.3) if both else None)
+
+
+@pytest.mark.parametrize("wrong", [Gradient, 0.3, "natural"])
+def test_what_is_no_adaptation_is_refused(wrong):
+    with pytest.raises(InputError, match="adaptation"):
+        with_adaptation(a460_pair(), wrong)
+
+
+@pytest.mark.parametrize("name", ADAPTATIONS)
+def test_v_changes_by_what_its_powers_supply(name, run):
+    record = lyapunov(run(name))
+    assert record.closes
+    assert (np.abs(record.power["other"]) <= record.rounding).all()
+
+
+def test_natural_adaptation_is_certified_and_stays_physical(run):
+    assert certify(run("natural")).certified
+    assert (smallest_eigenvalues(run("natural").theta_hat) > 0).all()
+
+
+def test_a_power_that_feeds_v_is_named_in_the_certificate(run):
+    certificate = certify(run("leaky"))
+    assert certificate.verdict == "outside the theorem"
+    assert any("leakage" in found for found in certificate.outside)
+
+
+@pytest.mark.parametrize("name", ["natural", "leaky"])
+def test_its_runs_are_saved_read_and_certified_again(name, run, tmp_path):
+    read = Result.load(run(name).save(tmp_path / "run.npz"))
+    assert read == run(name)
+    assert read.info["adaptation"] == ADAPTATIONS[name].as_dict()
+    again = certify(read, run(name).experiment)
+    assert again.verdict == certify(run(name)).verdict
+
+
+def test_a_state_that_is_not_theta_hat_is_in_the_log(run):
+    states = run("natural").outputs["adaptation_state"]
+    assert states.shape == run("natural").theta_hat.shape
+    assert not np.array_equal(states, run("natural").theta_hat)
+    assert "adaptation_state" not in run("gradient").outputs
+
+
+@pytest.mark.parametrize("control", CONTROL)
+@pytest.mark.parametrize("name", ["natural", "leaky"])
+def test_both_engines_learn_alike(name, control):
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    experiment = with_adaptation(a460_pair(), ADAPTATIONS[name])
+    one, other = (
+        experiment.simulate(0.05, engine=engine, **CONTROL[control]) for engine in ("pinocchio", "compiled")
+    )
+    for array in LAYOUT:
+        scale = np.abs(getattr(one, array)).max() + 1e-12
+        assert np.abs(getattr(one, array) - getattr(other, array)).max() <= 1e-9 * scale, array
+    for array, values in one.outputs.items():
+        np.testing.assert_allclose(other.outputs[array], values, rtol=1e-9, atol=1e-9, err_msg=array)
+
+
+def test_robots_of_different_kinds_learn_alike_in_both_engines():
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    experiment = with_adaptation(mixed_four(), Leaky(0.05, 0.1))
+    one, other = (experiment.simulate(0.01, engine=engine) for engine in ("pinocchio", "compiled"))
+    assert np.abs(one.theta_hat - other.theta_hat).max() <= 1e-9 * np.abs(one.theta_hat).max()
+
+
+class Mixing(Leaky):
+    """Robots that learn from what others see."""
+
+    def bind(self, cell):
+        bound = super().bind(cell)
+        bound.rate = lambda z, seen: seen.gradient[::-1] + 0 * z
+        return bound
+
+
+class Searching(Leaky):
+    """Something that is no plain array arithmetic."""
+
+    def bind(self, cell):
+        bound = super().bind(cell)
+        bound.rate = lambda z, seen: np.linalg.inv(z.T @ z + np.eye(z.shape[1])) @ seen.gradient.T
+        return bound
+
+
+@pytest.mark.parametrize("kind", [Mixing, Searching])
+def test_what_cannot_be_traced_is_refused_by_name(kind):
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    with pytest.raises(InputError, match=r"cannot trace the adaptation .*BoundLeaky"):
+        with_adaptation(a460_pair(), kind(0.3, 0.1)).simulate(0.01, engine="compiled")
+
+
+def test_maps_without_bodies_are_refused_by_name():
+    with pytest.raises(InputError, match=r"Natural needs all inertial parameters .* LinearParameters"):
+        with_adaptation(planar_four(), Natural(0.1))
