@@ -207,7 +207,7 @@ FAULTS = {
     "the weights of W": ("*a++ = c->W_inv + (size_t)i * nv;\n        for",
                          "*a++ = c->gain + (size_t)i * nv;\n        for"),
     "another robot's damping": ("c->K_r + (size_t)i * c->K", "c->K_r"),
-    "another robot's true parameters": ("c->pi + (size_t)i * c->bodies", "c->pi"),
+    "another robot's true parameters": ("k->pi + (size_t)i * c->bodies", "k->pi"),
     "Coulomb friction": ("* tanh(v[j] / c->smoothing[i])", "* (v[j] / c->smoothing[i])"),
     "the disturbance": ("+ disturbance[i * nv + j]", ""),
     "what adapts": ("c->Gamma + (size_t)i * c->P", "c->Gamma"),

@@ -48,6 +48,8 @@ def both(experiment: Experiment, **options) -> tuple[Result, Result]:
     for name, array in expected.items():
         scale = np.abs(array).max() + 1e-12
         assert np.abs(found[name] - array).max() <= AGREEMENT * scale, name
+    estimates = [run.info["step_error"]["estimate"] for run in runs]
+    assert estimates[1] == pytest.approx(estimates[0], rel=1e-3, abs=1e-9)
     return runs
 
 

@@ -12,7 +12,7 @@ from seams.lagging_motors import LaggingMotors, T
 from synctrl import Experiment, Result
 from synctrl.analysis.certify import certify
 from synctrl.analysis.lyapunov import lyapunov
-from synctrl.errors import InputError
+from synctrl.errors import InputError, SimulationError
 from synctrl.experiments import planar_four
 from synctrl.simulation.plant import Plant
 from synctrl.sweep import Grid, Sweep, gain, load
@@ -147,6 +147,20 @@ class Wrong(LaggingMotors):
 def test_a_rate_of_another_size_than_the_state_is_refused_before_the_run():
     with pytest.raises(InputError, match=r"Wrong: expected \(8,\) .* found \(7,\)"):
         lagging(Wrong).simulate(0.01)
+
+
+class Failing(LaggingMotors):
+    """Motors that break."""
+
+    def move(self, q, v, tau, hidden):
+        raise ZeroDivisionError("broken")
+
+
+@pytest.mark.parametrize("options", WAYS.values(), ids=WAYS)
+def test_a_plant_that_fails_ends_the_run_which_hands_over_what_it_has(options):
+    with pytest.raises(SimulationError, match=r"Failing\.move.*broken") as stop:
+        lagging(Failing).simulate(0.01, **options)
+    assert stop.value.result.status.startswith("stopped")
 
 
 def test_a_plant_without_a_state_of_its_own_adds_nothing_to_the_log():

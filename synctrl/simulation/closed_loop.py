@@ -36,13 +36,16 @@ class ClosedLoop:
         return np.concatenate([part.ravel() for part in parts])
 
     def check_plant(self) -> None:
-        """Refuse a plant whose rates do not fit what they are the rates of.
+        """Refuse a plant whose rates do not fit its state; one that fails ends the run later.
 
         Raises:
             InputError: of another shape.
         """
         q, hidden = self.cell.q0, self.plant.hidden0
-        rates = self.plant.move(q, self.cell.v0, np.zeros(q.shape), hidden)
+        try:
+            rates = self.plant.move(q, self.cell.v0, np.zeros(q.shape), hidden)
+        except Exception:  # the run will say so, and hand over what it has
+            return
         shapes = {"acceleration": q.shape, "rate of its own state": hidden.shape}
         for (what, expected), rate in zip(shapes.items(), rates, strict=True):
             if np.shape(rate) != expected:

@@ -176,7 +176,9 @@ def _gain(stop: Stop, gain: str, robot: int, joint: int) -> str:
     controller = stop.loop.controller
     if gain in ("friction", "law"):
         return f"its {gain}"
-    values = getattr(controller, gain)
+    values = getattr(controller.adaptation if gain == "Gamma" else controller, gain, None)
+    if values is None:  # an adaptation of another kind
+        return "its adaptation"
     if gain == "K_r" and controller.k_r_space == "joint":
         return f"K_r = {values[robot, joint]:g}{UNITS[gain]}"
     return f"{gain} = {(values[robot] if values.ndim == 2 else values).max():g}{UNITS[gain]}"

@@ -182,8 +182,10 @@ static void plant(const Cell *c, const double *y, const double *tau, const doubl
         const Kind *kind = &kinds[c->kind[i]];
         const double *q = y + (size_t)i * nv, *v = y + (size_t)(n + i) * nv;
         double *load = k->loaded + (size_t)i * nv, *trig = k->trig + (size_t)i * 2 * nv;
-        for (int j = i * nv; j < (i + 1) * nv; j++)
-            k->loaded[j] = (c->saturates ? applied(tau[j], c->limits[j]) : tau[j]) + disturbance[j];
+        for (int j = 0; j < nv; j++) {
+            double asked = tau[i * nv + j];
+            load[j] = (c->saturates ? applied(asked, c->limits[i * nv + j]) : asked) + disturbance[i * nv + j];
+        }
         if (c->rubs)
             for (int j = 0; j < nv; j++)
                 load[j] -= c->viscous[i * nv + j] * v[j]
