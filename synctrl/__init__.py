@@ -24,6 +24,7 @@ from .tasks.smooth import SmoothOrientation, SmoothTrajectory
 from .tasks.spaces import CartesianSpace, JointSpace
 from .tasks.synchronization import SynchronizationFunction
 from .tasks.trajectories import Circle, Cubic, ExponentialApproach, FunctionTrajectory, Hold
+from .tasks.weights import SmoothWeights
 
 __all__ = [
     "Attached",
@@ -58,6 +59,7 @@ __all__ = [
     "Robot",
     "SmoothOrientation",
     "SmoothTrajectory",
+    "SmoothWeights",
     "SynchronizationFunction",
     "SynctrlError",
     "inverse_kinematics",

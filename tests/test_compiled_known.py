@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache as cache_of_results
+from functools import partial, wraps
 
 import numpy as np
 import pytest
@@ -27,7 +29,7 @@ from synctrl import (
     Robot,
     load_robot,
 )
-from synctrl.control import commands, law
+from synctrl.control import commands, law, structure
 from synctrl.control.controller import Controller
 from synctrl.errors import InputError
 from synctrl.robots.base_parameters import BaseParameters
@@ -37,6 +39,7 @@ from synctrl.simulation.compiled import program
 from synctrl.simulation.plant import Plant
 from synctrl.simulation.prepared import Prepared
 from synctrl.sweep import Sweep, Uniform, gain
+from synctrl.tasks import spaces
 from synctrl.tasks.redundancy import Pseudoinverse
 from synctrl.tune import tune
 
@@ -323,10 +326,29 @@ def test_nothing_is_compiled_for_what_is_refused(name, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+def dressed(function):
+    """A function of a user's that calls itself what it wraps."""
+
+    @wraps(function)
+    def wrapped(*arguments):
+        return function(*arguments)
+
+    return wrapped
+
+
 CLASSES = {
     "a method": (Controller, "evaluate", lambda *_: None),
     "a computed attribute": (Robot, "gravity_vector", property(lambda self: np.zeros(3))),
     "a line of the law": (law, "synchronizing_force", lambda c, sigma, K_eps: 0 * sigma),
+    "a command": (commands, "couple", lambda coupling, w, integral: (w, w)),
+    "what a command imports": (commands, "structured", lambda c, rows: c),
+    "a structure": (structure, "structured", lambda c, rows: c),
+    "a dressed method": (Controller, "evaluate", dressed(Controller.evaluate)),
+    "a dressed line of the law": (law, "torque", dressed(law.torque)),
+    "a dressed command": (commands, "couple", dressed(commands.couple)),
+    "a dressed command with a memory": (commands, "couple", cache_of_results(dressed(commands.couple))),
+    "a function of a space": (spaces, "inverse_map", dressed(spaces.inverse_map)),
+    "a partial command": (commands, "couple", partial(commands.couple)),
 }
 
 

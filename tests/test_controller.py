@@ -135,7 +135,7 @@ def arguments(controller: Controller) -> dict:
     return {
         "reference": cell.references(np.zeros(1))[0],
         "motion": np.stack((cell.q0, cell.v0)),
-        "theta_hat": cell.theta_hat0,
+        "z": cell.theta_hat0,
         "integral": np.zeros((cell.coupling.pairs, cell.m)),
     }
 
@@ -146,13 +146,13 @@ CONTROLLER = Controller(small_cell(3), SMALL_GAINS)
 def test_evaluate_is_what_a_simulation_computes() -> None:
     given = arguments(CONTROLLER)
     checked, unchecked = CONTROLLER.evaluate(**given), CONTROLLER.signals(**given)
-    for name in ("tau", "theta_hat_dot", "v_ref", "epsilon", "u"):
+    for name in ("tau", "z_dot", "v_ref", "epsilon", "u"):
         np.testing.assert_array_equal(getattr(checked, name), getattr(unchecked, name))
     lists = {k: v.tolist() for k, v in given.items() if k != "reference"}
     np.testing.assert_array_equal(CONTROLLER.evaluate(given["reference"], **lists).tau, checked.tau)
 
 
-@pytest.mark.parametrize("name", ["motion", "theta_hat", "integral"])
+@pytest.mark.parametrize("name", ["motion", "z", "integral"])
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_evaluate_refuses_what_is_not_finite(name: str, bad: float) -> None:
     given = arguments(CONTROLLER)
@@ -162,7 +162,7 @@ def test_evaluate_refuses_what_is_not_finite(name: str, bad: float) -> None:
         CONTROLLER.evaluate(**given)
 
 
-@pytest.mark.parametrize("name", ["motion", "theta_hat", "integral"])
+@pytest.mark.parametrize("name", ["motion", "z", "integral"])
 @pytest.mark.parametrize("wrong", [lambda a: a[..., :-1], lambda a: a[:1], lambda a: a[None], lambda a: "x"])
 def test_evaluate_refuses_other_sizes(name: str, wrong) -> None:
     given = arguments(CONTROLLER)

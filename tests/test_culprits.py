@@ -19,13 +19,23 @@ from synctrl import (
     Disturbance,
     Experiment,
     Friction,
+    FullParameters,
     Gains,
     Hold,
     Member,
     load_robot,
 )
-from synctrl.errors import NonFiniteError, OrientationError, SimulationError, SingularJacobianError
+from synctrl.control.laws import Asked, SunMills
+from synctrl.errors import (
+    CouplingError,
+    NonFiniteError,
+    OrientationError,
+    SimulationError,
+    SingularJacobianError,
+)
 from synctrl.experiments import a460_pair, planar_four, ur5_payload
+from synctrl.tasks.trajectories import Motion
+from synctrl.tasks.weights import Weights
 
 ARM = load_robot("planar2r")
 ENGINES = ("pinocchio", "compiled")
@@ -189,3 +199,117 @@ def test_what_was_computed_until_then_says_why_too() -> None:
     error = stop(TABLE["a light joint of robot 2"], "pinocchio")
     assert error.result.status == f"stopped: {error}"
     assert np.isfinite(error.result.q).all()
+
+
+# -- what users wrote ---------------------------------------------------------------------------------------
+
+#: from this instant on functions of a user's give no numbers, s
+FAULT = 0.0305
+WAYS: dict[str, dict[str, str]] = {
+    "pinocchio": {}, "compiled": {"engine": "compiled"}, "RK45": {"integrator": "RK45"},
+}  # fmt: skip
+
+
+class UndefinedMotion:
+    """A desired motion that is no number from some instant on."""
+
+    breaks = ()
+
+    def __init__(self, path: Any):
+        self.path, self.dimension = path, path.dimension
+
+    def __call__(self, t: Any) -> Motion:
+        motion, late = self.path(t), np.asarray(t)[..., None] > FAULT
+        return motion._replace(x_ddot=np.where(late, np.nan, motion.x_ddot))
+
+
+class UndefinedWeights:
+    """Weights of 1 and -1 whose rate is no number from some instant on."""
+
+    robots = 2
+
+    def at(self, times: np.ndarray, m: int) -> Weights:
+        c = np.array([1.0, -1.0])[:, None, None] * np.eye(m) * np.ones((len(times), 1, 1, 1))
+        late = np.where(np.asarray(times)[:, None, None, None] > FAULT, np.nan, 0.0)
+        return Weights(c, late * c, 0 * c, c)
+
+    def scaled(self, factor: float) -> UndefinedWeights:
+        return self
+
+    def size(self, t: float) -> float:
+        return 1.0
+
+
+class UndefinedLaw(SunMills):
+    """The paper's law, which asks for no number from some instant on."""
+
+    def bind(self, cell: Cell, gains: Gains) -> Any:
+        bound = super().bind(cell, gains)
+
+        class Bound:
+            def command(self, errors: Any) -> Asked:
+                asked = bound.command(errors)
+                return asked._replace(xref_ddot=asked.xref_ddot * (np.nan if errors.t > FAULT else 1.0))
+
+        return Bound()
+
+
+class UndefinedParameters(FullParameters):
+    """A regressor that is no number while the robot moves slowly."""
+
+    def regressor(self, q: Any, v: Any, *rest: Any) -> Any:
+        return super().regressor(q, v, *rest) * (np.nan if 0.005 < np.abs(v).max() < 0.05 else 1.0)
+
+
+def with_members(**changes: Callable[[Member], Any]) -> Experiment:
+    """The pair of arms with friction, with changes of its second robot."""
+    pair = a460_pair()
+    first, second = pair.cell.members
+    second = replace(second, **{name: make(second) for name, make in changes.items()})
+    return replace(pair, cell=Cell([first, second], pair.cell.coupling, pair.cell.space))
+
+
+def coupled(c: Any) -> Experiment:
+    """The pair of arms with friction under other weights."""
+    pair = a460_pair()
+    return replace(pair, cell=Cell(pair.cell.members, Coupling.pair(c=c), pair.cell.space))
+
+
+UNDEFINED: dict[str, tuple[Callable[[], Experiment], str, int | None, str]] = {
+    "a motion": (
+        lambda: with_members(trajectory=lambda m: UndefinedMotion(m.trajectory)), "motion", 1,
+        "desired motion of .* is not finite",
+    ),
+    "weights": (lambda: coupled(UndefinedWeights()), "weights", 0, "c' of the robot at index 0"),
+    "a law": (lambda: a460_pair(law=UndefinedLaw()), "part", 0, "Bound gives"),
+    "parameters": (
+        lambda: with_members(parameters=lambda m: UndefinedParameters(m.robot)), "part", 1,
+        "UndefinedParameters gives",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("name", UNDEFINED)
+def test_what_a_user_wrote_is_named_where_it_gives_no_number_and_no_friction_or_gain(
+    name: str, way: str
+) -> None:
+    make, cause, robot, says = UNDEFINED[name]
+    if way == "compiled" and cause == "part":
+        pytest.skip("generated code has no such part")
+    with pytest.raises(NonFiniteError, match=says) as stop:
+        make().simulate(0.1, **WAYS[way])
+    assert (stop.value.cause, stop.value.robot, stop.value.joint) == (cause, robot, None)
+    assert not re.search("ran away|friction|gain", str(stop.value))
+    assert 1 <= len(stop.value.result.t) <= 100
+    assert np.isfinite(stop.value.result.q).all()
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_weights_that_are_seen_to_be_no_numbers_are_refused_before_the_run(way: str) -> None:
+    def c(t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        one = np.array([1.0, -1.0])
+        return one * (np.nan if t > FAULT else 1.0), 0 * one, 0 * one
+
+    with pytest.raises(CouplingError, match=r"weights at t = .*finite"):
+        coupled(c).simulate(0.1, **WAYS[way])

@@ -106,6 +106,8 @@ GAINS = {"Lambda": 4.0, "beta": 4.0, "K_r": 1.0, "K_eps": 2.0, "Gamma": 0.2}
 @pytest.mark.parametrize("name", GAINS)
 @pytest.mark.parametrize("value", [*NO_NUMBERS, *NOT_FINITE, -1.0, [1.0, -1e-12]], ids=repr)
 def test_a_gain_that_is_no_gain_is_named(name, value):
+    if name == "Gamma" and value is None:
+        return  # which says that an adaptation is given instead
     refused(lambda: Gains(**{**GAINS, name: value}), f"^{name}: expected", InputError)
     refused(lambda: Gains(**GAINS).replace(**{name: value}), f"^{name}: expected", InputError)
 

@@ -13,9 +13,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from synctrl import Cell, Controller, Coupling, Cubic, Disturbance, Experiment, Gains, Member, load_robot
+from synctrl import (
+    CartesianSpace,
+    Cell,
+    Controller,
+    Coupling,
+    Cubic,
+    Disturbance,
+    Experiment,
+    Gains,
+    Hold,
+    Member,
+    load_robot,
+)
 from synctrl.errors import CouplingError, NonFiniteError, RunInterrupted, SimulationError, TrajectoryError
 from synctrl.simulation import integrators
+from synctrl.simulation import run as runs
 from synctrl.simulation.closed_loop import ClosedLoop
 from synctrl.simulation.compiled import engine as compiled
 from synctrl.simulation.handover import up_to_a_failure
@@ -157,6 +170,60 @@ def test_weights_that_fail_on_the_way_keep_all_steps_before(engine, act, kind, s
     assert_begins(stop.value.result, good, 20)
 
 
+WAYS = {"pinocchio": {}, "compiled": {"engine": "compiled"}, "RK45": {"integrator": "RK45"}}
+
+
+class Ceasing:
+    """A desired position that fails from some instant on, and stays so."""
+
+    dimension, breaks = 2, ()
+
+    def __init__(self, place, error):
+        self.hold, self.error = Hold(place), error
+
+    def __call__(self, t):
+        if (np.asarray(t) > FAULT).any():
+            raise self.error
+        return self.hold(t)
+
+
+def ceasing_motion(error):
+    """Two arms in Cartesian space; the desired motion of the second one fails for good."""
+    q = [0.3, 1.0]
+    place = ARM.tip_position(q)[:2]
+    members = [Member(ARM, Hold(place), q), Member(ARM, Ceasing(place, error), q)]
+    return Experiment(Cell(members, Coupling.pair(), CartesianSpace("xy")), GAINS, 0.1)
+
+
+def ceasing_weights(error):
+    """Two arms whose weights fail for good."""
+
+    def at(t):
+        if t > FAULT:
+            raise error
+        return np.ones(2), np.zeros(2), np.zeros(2)
+
+    return experiment(coupling=Coupling.pair(c=at))
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [(ceasing_motion, "the desired motion of robot 2"), (ceasing_weights, "the weights of the coupling")],
+)
+def test_a_function_that_fails_for_good_loses_nothing_that_came_before(make, says, way):
+    cause = ZeroDivisionError("no more")
+    with pytest.raises(SimulationError, match=f"{says} failed at t = .*ZeroDivisionError: no more") as stop:
+        make(cause).simulate(**WAYS[way])
+    assert stop.value.__cause__ is cause
+    kept = stop.value.result
+    assert kept.status == f"stopped: {stop.value}"
+    if way == "RK45":  # its steps are its own: what it had logged before the one that met the fault
+        assert len(kept.t) >= 1 and (kept.t < FAULT + 1e-9).all()
+    else:
+        assert len(kept.t) == 20 and stop.value.time == pytest.approx(0.021)
+
+
 class Law(Controller):
     """A law that fails in its so-many-th evaluation."""
 
@@ -291,6 +358,50 @@ def test_an_interrupt_before_the_start_hands_over_nothing_but_an_empty_result(mo
     with pytest.raises(RunInterrupted) as stop:
         experiment().simulate()
     assert len(stop.value.result.t) == 0
+
+
+def failing_once(monkeypatch, name, error):
+    """Let a function of the module that makes runs fail the first time."""
+    made, failures = getattr(runs, name), [error]
+
+    def fail(*arguments):
+        if failures:
+            raise failures.pop()
+        return made(*arguments)
+
+    monkeypatch.setattr(runs, name, fail)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(
+    ("error", "expected"), [(KeyboardInterrupt(), RunInterrupted), (MemoryError(), SimulationError)]
+)
+def test_what_comes_while_the_result_is_made_does_not_lose_it(engine, error, expected, whole, monkeypatch):
+    good = whole(engine)
+    failing_once(monkeypatch, "step_report", error)
+    with pytest.raises(expected) as stop:
+        experiment().simulate(engine=engine)
+    assert stop.value.result.status == f"stopped: {stop.value}"
+    assert_begins(stop.value.result, good, len(good.t))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("name", ["diagnosed", "step_report"])
+def test_an_interrupt_while_a_failure_is_looked_into_does_not_lose_its_rows(engine, name, whole, monkeypatch):
+    failing_once(monkeypatch, name, KeyboardInterrupt())
+    with pytest.raises(RunInterrupted) as stop:
+        experiment(undefined).simulate(engine=engine)
+    assert_begins(stop.value.result, whole(engine), 20)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("error", [np.linalg.LinAlgError("singular"), Strike("no plant")])
+def test_an_error_whose_cause_cannot_be_found_is_told_as_it_is(engine, error, whole, monkeypatch):
+    failing_once(monkeypatch, "diagnosed", error)
+    with pytest.raises(NonFiniteError, match=r"motion of robot 2 is not finite") as stop:
+        experiment(undefined).simulate(engine=engine)
+    assert stop.value.result.status == f"stopped: {stop.value}"
+    assert_begins(stop.value.result, whole(engine), 20)
 
 
 def test_an_interrupted_run_can_be_sent_to_another_process():

@@ -308,7 +308,9 @@ def test_the_law_never_asks_what_its_numbers_are():
             r,
             law.reference_acceleration_exact(c_inv, c_dot, u_dot, xref_dot, x_dot),
             law.reference_acceleration_paper(c_inv, c_dot, u_dot, xref_dot, x_dot),
-            law.torque(c, law.adaptation(c, e, beta), r, law.synchronizing_force(c, sigma, Lambda)),
+            law.torque(
+                c, law.adaptation(law.gradient(c, e), beta), r, law.synchronizing_force(c, sigma, Lambda)
+            ),
         )
 
     numbers = (c, c_dot, c_inv, e, xd_dot, sigma, u_dot, E, x_dot, Lambda, beta)

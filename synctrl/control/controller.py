@@ -156,11 +156,13 @@ class Controller:
         """What a simulation calls: `signals`, or the `evaluate` of a subclass that has one of its own."""
         return self.signals if type(self).evaluate is Controller.evaluate else self.evaluate
 
-    def signals(self, reference: Reference, motion: np.ndarray, z: np.ndarray, memory: np.ndarray) -> Signals:
+    def signals(
+        self, reference: Reference, motion: np.ndarray, z: np.ndarray, integral: np.ndarray
+    ) -> Signals:
         """`evaluate` without its checks, for many evaluations: numbers that are not finite go through."""
         space = self.cell.task
         task = space.measure(motion, reference.desired)
-        command = self._command(task, reference, memory)
+        command = self._command(task, reference, integral)
         v_ref, a_ref = space.to_joints(task, *command.xref)
         q, v = motion
         s_q = v_ref - v

@@ -146,6 +146,7 @@ class ClosedLoop:
                     f"{names} gives {self.cell.names[i]} {rows[i].tolist()} as its {what}, from a state that "
                     "is finite; expected finite numbers",
                     robot=i,
+                    cause="part",
                 )
 
 

@@ -28,6 +28,9 @@ USUAL, SHORT = 1e-3, 5e-4
 #: condition number from which on a Jacobian is nearly singular
 NEARLY = 100.0
 
+#: causes that no closed loop has a hand in
+DESIRED = ("motion", "weights")
+
 UNITS = {"Lambda": " 1/s", "beta": " 1/s", "K_r": " N·m·s/rad", "K_eps": "", "Gamma": ""}
 AWAY = "move the path away from the border of the workspace, or start in another configuration"
 #: what configurations do, by the kind of the error
@@ -65,7 +68,8 @@ def diagnosed(
     """The error of a run that had to stop, with its cause, and the robot and the joint that began.
 
     A closed loop that ran away is a `NonFiniteError`, whatever configuration it met on its way to infinity.
-    What is neither the guard's nor the integrator's stays as it is.
+    What is neither the guard's nor the integrator's stays as it is: an error that knows its cause keeps it,
+    save for a part of a user's that lost its numbers after the loop had run away.
 
     Args:
         error: what stopped it.
@@ -75,10 +79,12 @@ def diagnosed(
         state: flat state at the stop.
         info: how it was run: "dt", "integrator", "control_period".
     """
-    if type(error) not in (NonFiniteError, *BY_KIND):
+    if type(error) not in (NonFiniteError, *BY_KIND) or error.cause in DESIRED:
         return error
     h = info["dt"] if info["integrator"] == "rk4" else None
     stop = Stop(loop, schedule, error, rows, state, h, info["control_period"])
+    if error.cause is not None and stop.calm:
+        return error
     cause = find_cause(stop)
     about: dict[str, Any] = {
         "time": error.time, "robot": cause.robot, "joint": cause.joint, "cause": cause.word,

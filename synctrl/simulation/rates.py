@@ -186,7 +186,7 @@ def _learned(loop: ClosedLoop, i: int, Y: np.ndarray) -> np.ndarray:
         return adaptation.rate(z, Seen(still, still, still, still, still, rows, None))
 
     rest = rate(np.zeros(Y.shape[1]))
-    changes = [rate(row) - rest for row in Y]
+    changes = [np.clip(np.nan_to_num(rate(row) - rest), -HUGE, HUGE) for row in Y]
     steps = [1e-6 / (1.0 + np.abs(change).max()) for change in changes]
     columns = [
         (adaptation.estimate(z + h * change) - adaptation.estimate(z - h * change))[i] / (2 * h)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -55,7 +55,6 @@ class Run(NamedTuple):
             UnreachableError: a robot cannot reach its desired positions.
             CouplingError: a weight loses its inverse on the way, or its derivatives do not fit.
             MissingDependencyError, InputError: a library cannot compute the plant, or refuses a robot.
-            SimulationError: a function of the user's fails.
             RunInterrupted: by Ctrl-C.
         """
         cell = self.loop.cell
@@ -64,7 +63,8 @@ class Run(NamedTuple):
             self.loop.check_plant()
             check_motions(cell, np.array([0.0, self.clock.end]))
             check_reachable(cell, self.clock.spread(SAMPLES))
-            cell.coupling.check_weights(self.clock.spread(WEIGHT_SAMPLES), cell.m)
+            with suppress(SimulationError):  # weights that fail end the run, which hands over what it has
+                cell.coupling.check_weights(self.clock.spread(WEIGHT_SAMPLES), cell.m)
 
 
 def run_reference(run: Run, progress: Progress | None = None) -> Result:
@@ -131,7 +131,7 @@ def collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> R
 
 
 def _finish(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:
-    """Let a run log itself; whatever ends it takes along what was logged."""
+    """Let a run log itself; whatever ends it, while it is looked into too, takes along what was logged."""
 
     def logged(status: str) -> Result:
         run.info["step_error"] = step_report(run.step_error, run.loop, recorder.logged(), run.info)
@@ -139,28 +139,37 @@ def _finish(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:
 
     with np.errstate(all="ignore"):  # overflow is found and named by the guard
         try:
-            log()
+            return _made(run, recorder, log, logged)
         except KeyboardInterrupt:
             raise _interrupted(recorder.reached, logged) from None
-        except SynctrlError as error:
-            date(error, recorder.reached)
-            told = _diagnosed(run, recorder, error)
-            told.result = logged(f"stopped: {told}")
-            if told is error:
-                raise
-            raise told from None
-        except Exception as error:
-            failure = user_failure(error, recorder.reached)
-            failure.result = logged(f"stopped: {failure}")
-            raise failure from error
+
+
+def _made(run: Run, recorder: Recorder, log: Callable[[], None], logged: Callable[[str], Result]) -> Result:
+    """The result of a run that nobody interrupts; its error has the result of one that had to stop."""
+    try:
+        log()
         return logged("completed")
+    except SynctrlError as error:
+        date(error, recorder.reached)
+        told = _diagnosed(run, recorder, error)
+        told.result = logged(f"stopped: {told}")
+        if told is error:
+            raise
+        raise told from None
+    except Exception as error:
+        failure = user_failure(error, recorder.reached)
+        failure.result = logged(f"stopped: {failure}")
+        raise failure from error
 
 
 def _diagnosed(run: Run, recorder: Recorder, error: SynctrlError) -> SynctrlError:
-    """An error of the guard's with its cause; others as they are."""
+    """An error of the guard's with its cause; others as they are, and those whose cause cannot be found."""
     if not isinstance(error, SimulationError):
         return error
-    return diagnosed(error, run.loop, run.schedule, recorder.logged(), recorder.state, run.info)
+    try:
+        return diagnosed(error, run.loop, run.schedule, recorder.logged(), recorder.state, run.info)
+    except Exception:  # numbers near the end, or a plant of a user's, that cannot be calculated with
+        return error
 
 
 @contextmanager

@@ -45,27 +45,40 @@ def desired_motion(name: str, robot: int, trajectory: Trajectory, times: np.ndar
                 f"{np.asarray(value)[k].tolist()}; expected finite numbers at all times of the run",
                 time=float(times[k]),
                 robot=robot,
+                cause="motion",
             )
     return motion
 
 
 def desired_weights(coupling: Coupling, times: np.ndarray, m: int) -> Weights:
-    """Weights of a coupling at some times, (T,), for a task of dimension m.
+    """Weights of a coupling at some times, (T,), for a task of dimension m; see `finite_weights`."""
+    if coupling.is_constant:
+        return coupling.weights(times, m)
+    return finite_weights(lambda at: coupling.weights(at, m), times)
+
+
+def finite_weights(call: Callable[[np.ndarray], Weights], times: np.ndarray) -> Weights:
+    """Weights at some times, (T,), known to be numbers.
+
+    Args:
+        call: times -> weights.
+        times: (T,), s.
 
     Raises:
         SynctrlError: what the weights raise of this kind.
         SimulationError: they raise anything else; with the time.
         NonFiniteError: they are infinite or not numbers; with robot and time.
     """
-    weights = _asked(lambda at: coupling.weights(at, m), times, "the weights of the coupling", None)
+    weights = _asked(call, times, "the weights of the coupling", None)
     for name, value in zip(("c", "c'", "c''"), weights, strict=False):
-        if not coupling.is_constant and not np.isfinite(value).all():
+        if not np.isfinite(value).all():
             k, i = (int(index) for index in np.argwhere(~np.isfinite(value))[0][:2])
             raise NonFiniteError(
                 f"{name} of the robot at index {i} is not finite at t = {times[k]:g} s: "
                 f"{value[k, i].tolist()}; expected finite numbers at all times of the run",
                 time=float(times[k]),
                 robot=i,
+                cause="weights",
             )
     return weights
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Protocol
 
 import numpy as np
 
 from ..checks import finite_array, instance
-from ..errors import InputError, UnreachableError
+from ..errors import InputError, SimulationError, UnreachableError
 from ..robots.robot import Robot
 from .cell import Cell
 from .spaces import CartesianSpace, units_of
@@ -41,13 +42,20 @@ def check_reachable(cell: Cell, times: np.ndarray) -> None:
     if not hasattr(cell.space, "miss"):
         return
     times = np.unique(times[np.linspace(0, len(times) - 1, SAMPLES).astype(int)])
-    for i, (name, robot, q) in enumerate(zip(cell.names, cell.robots, cell.q0, strict=True)):
-        q = q[: robot.nv]
-        for t, target in zip(times, cell.motion(i, times).x, strict=True):
-            found = inverse_kinematics(robot, target, q, cell.space)  # type: ignore[arg-type]
-            if found is None:
-                raise _unreachable(name, robot, t, target, cell)
-            q = found
+    for i in range(cell.n):
+        with suppress(SimulationError):  # a motion that fails ends the run, which hands over what it has
+            _follow(cell, i, times)
+
+
+def _follow(cell: Cell, i: int, times: np.ndarray) -> None:
+    """Follow the path of one robot."""
+    name, robot = cell.names[i], cell.robots[i]
+    q = cell.q0[i, : robot.nv]
+    for t, target in zip(times, cell.motion(i, times).x, strict=True):
+        found = inverse_kinematics(robot, target, q, cell.space)  # type: ignore[arg-type]
+        if found is None:
+            raise _unreachable(name, robot, t, target, cell)
+        q = found
 
 
 def inverse_kinematics(

@@ -12,6 +12,7 @@ from ..checks import finite_array, positive_number
 from ..errors import CouplingError, InputError
 from .chebyshev import ACCURACY, NotSmoothError, SmoothFunction, certify
 from .derivatives import difference, find_misfit, look_at
+from .desired import finite_weights
 
 #: A condition number above this counts as "no inverse".
 SINGULAR = 1e12
@@ -101,7 +102,10 @@ class FunctionWeights:
     def _call(self, t: float) -> Sequence[np.ndarray]:
         value = self.function(float(t))
         if not isinstance(value, (tuple, list)) or len(value) != 3:
-            raise CouplingError(f"c: expected a function of t returning c, c' and c'', found {value!r}")
+            raise CouplingError(
+                f"c: expected a function of t returning c, c' and c'', found {value!r}; "
+                "SmoothWeights.from_function takes one that returns c alone"
+            )
         try:
             parts = [finite_array(name, part) for name, part in zip(("c", "c'", "c''"), value, strict=True)]
             if any(part.ndim == 0 or len(part) != self.robots for part in parts):
@@ -249,13 +253,18 @@ def check_weights(source: WeightSource, times: np.ndarray, m: int) -> None:
     Raises:
         CouplingError: a weight without an inverse, at an instant or between two, or derivatives that do not
             belong to the weights.
+        SimulationError: the weights fail; with the time.
     """
     times = np.unique(times[np.linspace(0, len(times) - 1, _instants(source.robots)).astype(int)])
-    c, c_dot, _, c_inv = source.at(times, m)
+
+    def look(at: np.ndarray) -> Weights:
+        return finite_weights(lambda instants: source.at(instants, m), at)
+
+    c, c_dot, _, c_inv = look(times)
     if isinstance(source, ConstantWeights) or len(times) < 2:
         return
     if isinstance(source, FunctionWeights):
-        _check_derivatives(source, float(times[0]), float(times[-1]), m)
+        _check_derivatives(look, source.robots, float(times[0]), float(times[-1]), m)
     gaps = np.gradient(times)[:, None]
     change = np.abs(np.linalg.eigvals(c_inv @ c_dot).real).max(axis=-1) * gaps
     if change.max() >= 1:
@@ -271,16 +280,18 @@ def _instants(robots: int) -> int:
     return int(np.clip(200_000 // robots, 200, 2000))
 
 
-def _check_derivatives(source: WeightSource, start: float, stop: float, m: int) -> None:
+def _check_derivatives(
+    look: Callable[[np.ndarray], Weights], n: int, start: float, stop: float, m: int
+) -> None:
     """Compare c' and c'' with differences of c and c'."""
-    n, entries = source.robots, m * m
+    entries = m * m
     groups = [slice(i * entries, (i + 1) * entries) for i in range(n)]
     windows = look_at(start, stop, (), int(np.clip(1000 // n, 4, 24)))
-    largest = np.abs(source.at(windows.start, m).c).max()
+    largest = np.abs(look(windows.start).c).max()
     for order, name in enumerate(("c'", "c''")):
 
         def sample(t: np.ndarray, order: int = order) -> tuple[np.ndarray, np.ndarray]:
-            parts = source.at(t, m)
+            parts = look(t)
             return parts[order].reshape(len(t), -1), parts[order + 1].reshape(len(t), -1)
 
         found = find_misfit(sample, windows, groups, order * largest / stop, difference)

@@ -8,6 +8,7 @@ base. Desired motions, weights and disturbances may be anything: they are called
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from functools import cache
 from types import FunctionType, MethodType
@@ -15,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...control import law
+from ...control import commands, law, structure
 from ...control.adaptation.gradient import BoundGradient
 from ...control.commands import REFERENCE_ACCELERATIONS, Composed, ConstantWeights
 from ...control.controller import Controller
@@ -45,6 +46,10 @@ BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace)
 RIGID = (FullParameters, LinearParameters, BaseParameters)
 INVERSES = (Inverse, Pseudoinverse, DampedInverse)
 WAYS = (FoldedWeights, ConstantWeights, Composed)
+
+
+#: modules whose functions a controller calls, beside those of its parts
+LINES = (law, commands, structure)
 
 
 class Part(NamedTuple):
@@ -79,8 +84,8 @@ def check_untouched(loop: ClosedLoop) -> None:
     """
     for kind in {type(part.value) for part in _parts(loop)}:
         _check_class(kind)
-    for role, function, module in _functions(loop.controller):
-        if getattr(function, "__module__", None) != module:
+    for role, name, function, module in _functions(loop):
+        if not _belongs(name, function, module):
             raise _replaced(role, function)
 
 
@@ -117,13 +122,36 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
             yield Part(f"parameters of {name} without friction", parameters.base, RIGID)
 
 
-def _functions(controller: Controller) -> Iterator[tuple[str, Any, str]]:
-    """Functions that generated code was traced from, and the modules that they come from."""
-    for name, function in vars(law).items():
-        if callable(function) and name[0].islower():
-            yield f"line '{name}' of the law", function, law.__name__
-    acceleration = REFERENCE_ACCELERATIONS[controller.reference_acceleration]
-    yield "reference acceleration", acceleration, law.__name__
+def _functions(loop: ClosedLoop) -> Iterator[tuple[str, str, Any, str]]:
+    """Functions that generated code was traced from: role, name, function, and the module it was found in."""
+    bases = {base for part in _parts(loop) for base in type(part.value).__mro__}
+    ours = {base.__module__ for base in bases if _is_ours(base.__module__)}
+    for module in sorted(ours | {each.__name__ for each in LINES}):
+        for name, function in vars(sys.modules[module]).items():
+            if callable(function) and name[0].islower() and not isinstance(function, type):
+                yield f"function '{name}' of {module}", name, function, module
+    acceleration = REFERENCE_ACCELERATIONS[loop.controller.reference_acceleration]
+    yield "reference acceleration", "", acceleration, law.__name__
+
+
+def _belongs(name: str, function: Any, module: str) -> bool:
+    """Whether a function is of this module, or was imported into it from another of ours or of Python's."""
+    home = _home(function)
+    if home == module:
+        return True
+    imported = _is_ours(home) and getattr(sys.modules.get(home), function.__name__, None) is function
+    return imported or home.partition(".")[0] in sys.stdlib_module_names
+
+
+def _home(function: Any) -> str:
+    """The module in which a function was written: unlike its `__module__`, wrappers do not copy it."""
+    if hasattr(function, "cache_info"):  # kept results: the function is inside
+        return _home(function.__wrapped__)
+    return str(getattr(function, "__globals__", {}).get("__name__", ""))
+
+
+def _is_ours(module: str) -> bool:
+    return module.partition(".")[0] == __name__.partition(".")[0]
 
 
 def _check_type(part: Part) -> None:
@@ -149,8 +177,11 @@ def _check_class(kind: type) -> None:
     for base in kind.__mro__[:-1]:
         for name, value in vars(base).items():
             function = _unwrapped(value)
-            ours = getattr(function, "__module__", None) == base.__module__
-            if callable(function) and not ours and (name == "__call__" or not name.startswith("__")):
+            if (
+                callable(function)
+                and _home(function) != base.__module__
+                and (name == "__call__" or not name.startswith("__"))
+            ):
                 raise _replaced(f"{base.__name__}.{name}", function)
 
 
