@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, finite_number, instance
 from ..errors import CouplingError, InputError
 from . import graphs
-from .weights import ConstantWeights, WeightFunction, Weights, WeightSource, as_source, check_weights
+from .weight_checks import check_weights
+from .weights import ConstantWeights, WeightFunction, Weights, WeightSource, as_source
 
 #: entries of S up to which a product with S written out is the quickest way
 SMALL = 256
