@@ -7,21 +7,34 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text("utf-8")
+CELL, LOOP = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+
+
+def run(code: str, folder: Path) -> str:
+    """What a script prints that warns of nothing."""
+    script = folder / "script.py"
+    script.write_text(code, encoding="utf-8")
+    (folder / "robots").symlink_to(ROOT / "robots")  # the script's paths start where README lies
+    command = [sys.executable, "-W", "error::UserWarning", str(script)]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return done.stdout
 
 
 def test_the_cell_of_ones_own_runs_and_synchronizes(tmp_path):
-    (code,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
-    assert code.count("\n") < 30
-    script = tmp_path / "own_cell.py"
-    script.write_text(code, encoding="utf-8")
-    (tmp_path / "robots").symlink_to(ROOT / "robots")  # the script's paths start where README lies
-    run = [sys.executable, str(script)]
-    done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr[-2000:]
-    together, alone = map(float, re.findall(r"([\d.e-]+) rad", done.stdout))
+    assert CELL.count("\n") < 30
+    together, alone = map(float, re.findall(r"([\d.e-]+) rad", run(CELL, tmp_path)))
     assert together < alone
+
+
+def test_the_loop_of_ones_own_runs_in_mujoco_and_synchronizes(tmp_path):
+    pytest.importorskip("mujoco", reason="MuJoCo is an extra: pip install 'synctrl[mujoco]'")
+    assert LOOP.count("\n") < 30
+    assert float(run(LOOP, tmp_path).split()[-1]) < 1e-3
 
 
 def test_every_file_that_the_documents_link_to_exists():
