@@ -159,6 +159,7 @@ class Cell:
 
     def reference_table(self, times: np.ndarray) -> Reference:
         """What is desired at all of the times, (T,), with time as the first axis."""
+        times = np.asarray(times, dtype=float)
         motions = np.stack([self.motion(i, times) for i in range(self.n)])  # (n, 3, T, m)
         return Reference(motions.transpose(2, 1, 0, 3), self.weights(times), times)
 
