@@ -31,11 +31,18 @@ from naive_loop import BareCalls, NaiveLoop
 
 from synctrl import Experiment, load_robot
 from synctrl.errors import SimulationError
+from synctrl.compiled.run import Compiled
 from synctrl.experiments import (
-    a460_pair, mixed_four, mobile_robot, panda_four, planar_four, rigid_object, ur5_payload,
+    a460_pair,
+    mixed_four,
+    mobile_robot,
+    panda_four,
+    planar_four,
+    rigid_object,
+    ur5_payload,
 )  # fmt: skip
 from synctrl.files import write_whole
-from synctrl.simulation.run import run_compiled, run_reference
+from synctrl.simulation.run import run_reference
 
 DT = 1e-3
 MOST_STEPS = 10_000
@@ -107,9 +114,9 @@ def per_step(runs: dict[Any, Run], effort: Effort) -> dict[Any, float]:
 def engines(experiment: Experiment) -> dict[str, Run]:
     """Both engines, or only the reference where the other cannot be had."""
     runs: dict[str, Run] = {"reference": lambda steps: run_reference(experiment.plan(steps * DT, DT))}
-    libraries: dict[str, Any] = {}
+    compiled = Compiled({})
     if is_installed("casadi"):
-        runs["compiled"] = lambda steps: run_compiled(experiment.plan(steps * DT, DT), None, libraries)
+        runs["compiled"] = lambda steps: compiled.run(experiment.plan(steps * DT, DT))
     return runs
 
 
@@ -192,14 +199,14 @@ def accuracy(effort: Effort) -> Table:
 
 def last_positions(experiment: Experiment, span: float, dt: float) -> dict[str, Callable[[], np.ndarray]]:
     """Ways to get the joint positions after so many seconds, (n, nv)."""
-    naive, libraries = NaiveLoop(experiment), dict[str, Any]()
+    naive, compiled = NaiveLoop(experiment), Compiled({})
     runs: dict[str, Callable[[], np.ndarray]] = {
         "reference": lambda: run_reference(experiment.plan(span, dt)).q[-1],
         "naive loop": lambda: naive.run(round(span / dt), dt)[-1],
     }
     if is_installed("casadi"):
-        run_compiled(experiment.plan(dt, dt), None, libraries)
-        runs["compiled"] = lambda: run_compiled(experiment.plan(span, dt), None, libraries).q[-1]
+        compiled.load(experiment.plan(dt, dt))
+        runs["compiled"] = lambda: compiled.run(experiment.plan(span, dt)).q[-1]
     return runs
 
 
@@ -240,7 +247,7 @@ def compilation(effort: Effort) -> Table:
 def _first_run(experiment: Experiment) -> tuple[float, float]:
     """Wall time and CPU time of a short run with nothing loaded, s."""
     start, before = time.perf_counter(), os.times()
-    run_compiled(experiment.plan(2 * DT, DT))
+    Compiled().run(experiment.plan(2 * DT, DT))
     spent, after = time.perf_counter() - start, os.times()
     return spent, sum(after[:4]) - sum(before[:4])
 

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from synctrl import Cubic, Robot
-from synctrl.robots.urdf_writer import dynamics_xml
+from synctrl.robots.urdf.writer import dynamics_xml
 
 K_P, K_D = 100.0, 20.0
 

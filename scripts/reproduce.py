@@ -13,29 +13,29 @@ from pathlib import Path
 
 import numpy as np
 
-from synctrl.analysis.claims import Claim
-from synctrl.analysis.claims_a460 import a460_claims
-from synctrl.analysis.claims_planar import own_findings, planar_four_claims
 from synctrl.analysis.identification import Identification, identify
 from synctrl.analysis.metrics import as_data, metrics, settling_bands, write_metrics
 from synctrl.errors import SynctrlError
-from synctrl.experiments.batch import Job, run_all
-from synctrl.experiments.reproduction import JOBS, judge_jobs, judged
-from synctrl.experiments.theory import examine
-from synctrl.show.animation import payload_pair_scene, planar_scene
-from synctrl.show.judge_section import judge_section
-from synctrl.show.paper_sections import (
+from synctrl.paper.batch import Job, run_all
+from synctrl.paper.claims import Claim
+from synctrl.paper.claims_a460 import a460_claims
+from synctrl.paper.claims_planar import own_findings, planar_four_claims
+from synctrl.paper.judge_section import judge_section
+from synctrl.paper.paper_sections import (
     a460_section,
     honesty_section,
     introduction,
     planar_section,
     trial_section,
 )
-from synctrl.show.plant_sections import friction_section, full_a460_section, identification_section
-from synctrl.show.report import Links, Section, write_page
-from synctrl.show.step_section import step_section
+from synctrl.paper.plant_sections import friction_section, full_a460_section, identification_section
+from synctrl.paper.report import Links, Section, write_page
+from synctrl.paper.reproduction import JOBS, judge_jobs, judged
+from synctrl.paper.step_section import step_section
+from synctrl.paper.theory import examine
+from synctrl.paper.theory_sections import baseline_section, certificate_section
+from synctrl.show.animation import payload_pair_scene, planar_scene
 from synctrl.show.style import display
-from synctrl.show.theory_sections import baseline_section, certificate_section
 from synctrl.simulation.result import Result
 
 ANIMATED = (

@@ -3,7 +3,13 @@
 from .control.controller import Controller
 from .control.discrete import DiscreteController
 from .control.gains import Gains
+from .coupling.cell import Cell, Member
+from .coupling.coupling import Coupling
+from .coupling.reachability import inverse_kinematics
+from .coupling.synchronization import SynchronizationFunction
+from .coupling.weights import SmoothWeights
 from .errors import SynctrlError
+from .moved import serve_old_names
 from .robots.base_parameters import BaseParameters
 from .robots.friction import Friction
 from .robots.friction_parameters import FrictionParameters
@@ -14,17 +20,12 @@ from .simulation.mujoco_model import mujoco_model
 from .simulation.payloads import Payload
 from .simulation.result import Result
 from .simulation.simulate import Experiment, simulate
-from .tasks.cell import Cell, Member
-from .tasks.coupling import Coupling
 from .tasks.pose import PoseSpace
 from .tasks.poses import Attached, AxisRotation, FunctionOrientation, PoseTrajectory
-from .tasks.reachability import inverse_kinematics
 from .tasks.redundancy import Damping, Redundancy
 from .tasks.smooth import SmoothOrientation, SmoothTrajectory
 from .tasks.spaces import CartesianSpace, JointSpace
-from .tasks.synchronization import SynchronizationFunction
 from .tasks.trajectories import Circle, Cubic, ExponentialApproach, FunctionTrajectory, Hold
-from .tasks.weights import SmoothWeights
 
 __all__ = [
     "Attached",
@@ -67,3 +68,5 @@ __all__ = [
     "mujoco_model",
     "simulate",
 ]
+
+serve_old_names()

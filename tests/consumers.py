@@ -10,17 +10,17 @@ from synctrl.analysis.certify import certify
 from synctrl.analysis.convergence import convergence
 from synctrl.analysis.gain_condition import gain_condition
 from synctrl.analysis.identification import identify
-from synctrl.analysis.judge import compare_runs
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.analysis.metrics import as_data, metrics, row_names, settling_bands
 from synctrl.errors import SynctrlError
+from synctrl.paper.judge import compare_runs
+from synctrl.paper.judge_plots import differences
+from synctrl.paper.step_section import step_section
 from synctrl.show.animation import payload_pair_scene, planar_scene
-from synctrl.show.judge_plots import differences
 from synctrl.show.layout import cell_layout
 from synctrl.show.lyapunov_plots import lyapunov_figure
 from synctrl.show.plots import common_limits, joint_trajectories, sync_errors, tracking_errors
 from synctrl.show.real_cells import error_colors, formation_scene, payload_scene
-from synctrl.show.step_section import step_section
 from synctrl.show.vehicle import vehicle_animation
 
 FIGURES: dict[str, Callable[[Any, Any], Any]] = {

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from theory_cells import GAINS, coupling, experiment
 
-from synctrl.analysis.baselines import Comparison, ablation, compare
-from synctrl.analysis.matching import match_peak_torque
-from synctrl.analysis.trials import Bench, measure
 from synctrl.errors import InputError, SimulationError
 from synctrl.experiments import a460_pair, planar_four
+from synctrl.paper.baselines import Comparison, ablation, compare
+from synctrl.paper.matching import match_peak_torque
+from synctrl.paper.trials import Bench, measure
 
 SHORT = {"duration": 0.05, "dt": 1e-3}
 

@@ -9,8 +9,8 @@ import pytest
 
 from synctrl.errors import ResultError, SimulationError
 from synctrl.experiments import a460_pair, planar_four
-from synctrl.experiments.batch import Job, run_all
 from synctrl.experiments.planar_four import GAINS
+from synctrl.paper.batch import Job, run_all
 from synctrl.simulation.result import LAYOUT, Result
 
 

@@ -18,8 +18,8 @@ from time import monotonic
 import pytest
 import test_imports
 
+from synctrl.compiled import build, cache, compiler, elf
 from synctrl.errors import CompilationError, InputError, MissingDependencyError
-from synctrl.simulation.compiled import build, cache, compiler, elf
 
 SOURCE = "int answer(void) { return 42; }"
 OTHER = 12345
@@ -457,10 +457,7 @@ def test_folders_of_builds_that_were_killed_are_removed_by_the_next_build(folder
     started = tmp_path / "started"
     os.mkfifo(started)
     text = f'#!/bin/sh\necho $$ > "{started}"; exec sleep 1000\n'
-    code = (
-        "from synctrl.simulation.compiled import build\n"
-        "build.cached_library('key', lambda: iter(['int a;']), print)"
-    )
+    code = "from synctrl.compiled import build\nbuild.cached_library('key', lambda: iter(['int a;']), print)"
     environment = {**os.environ, "CC": str(script(tmp_path / "compiler", text))}
     process = subprocess.Popen([sys.executable, "-c", code], env=environment)
     orphan = int(started.read_text())
@@ -682,7 +679,7 @@ def modules_behind(start: str) -> set[str]:
 
 
 def test_the_key_covers_every_module_behind_generated_code():
-    behind = modules_behind("synctrl.simulation.compiled.program")
+    behind = modules_behind("synctrl.compiled.program")
     assert {"synctrl.control.commands", "synctrl.robots.mechanism", "synctrl.tasks.rotations"} <= behind
     rooms = {test_imports.room(module) for module in behind} - {"", "errors", "checks", "files"}
     assert rooms == set(build.ROOMS)
@@ -692,7 +689,7 @@ def test_the_key_covers_every_module_behind_generated_code():
     "name",
     [
         *("control/commands.py", "control/law.py", "robots/mechanism.py", "tasks/rotations.py"),
-        *("simulation/plant.py", "simulation/compiled/structs.py", "simulation/compiled/driver.c"),
+        *("simulation/plant.py", "compiled/structs.py", "compiled/driver.c"),
     ],
 )
 def test_another_source_gives_another_key(tmp_path, name):

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from synctrl.analysis import claims, claims_a460, claims_planar
 from synctrl.errors import InputError
+from synctrl.paper import claims, claims_a460, claims_planar
 
 
 @pytest.fixture(scope="module")

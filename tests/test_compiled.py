@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from synctrl import CartesianSpace, Cell, Circle, Coupling, Disturbance, Gains, Member, load_robot
+from synctrl.compiled import build, engine
+from synctrl.compiled.program import Program
 from synctrl.errors import (
     CompilationError,
     InputError,
@@ -17,8 +19,6 @@ from synctrl.errors import (
     SingularJacobianError,
 )
 from synctrl.experiments import a460_pair, planar_four
-from synctrl.simulation.compiled import build, engine
-from synctrl.simulation.compiled.program import Program
 from synctrl.simulation.result import LAYOUT
 from synctrl.simulation.simulate import Experiment
 

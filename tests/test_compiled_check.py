@@ -21,13 +21,13 @@ from synctrl import (
     Redundancy,
     load_robot,
 )
+from synctrl.compiled import build, compiler, program
+from synctrl.compiled.kind import classify
+from synctrl.compiled.program import Program
+from synctrl.compiled.specimen import Specimen
+from synctrl.coupling.synchronization import SynchronizationFunction
 from synctrl.errors import CompilationError, SingularJacobianError
 from synctrl.robots.parameters import planar_two_link_parameters
-from synctrl.simulation.compiled import build, compiler, program
-from synctrl.simulation.compiled.kind import classify
-from synctrl.simulation.compiled.program import Program
-from synctrl.simulation.compiled.specimen import Specimen
-from synctrl.tasks.synchronization import SynchronizationFunction
 
 pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
 

@@ -29,16 +29,16 @@ from synctrl import (
     Robot,
     load_robot,
 )
+from synctrl.compiled import program
 from synctrl.control import commands, law, structure
 from synctrl.control.controller import Controller
 from synctrl.errors import InputError
 from synctrl.robots.base_parameters import BaseParameters
 from synctrl.robots.parameters import LinearParameters, planar_two_link_parameters
 from synctrl.simulation.closed_loop import ClosedLoop
-from synctrl.simulation.compiled import program
 from synctrl.simulation.plant import Plant
-from synctrl.simulation.prepared import Prepared
 from synctrl.sweep import Sweep, Uniform, gain
+from synctrl.sweep.prepared import Prepared
 from synctrl.tasks import spaces
 from synctrl.tasks.redundancy import Pseudoinverse
 from synctrl.tune import tune

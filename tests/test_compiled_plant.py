@@ -9,10 +9,10 @@ import pytest
 from test_saturation import pair as saturating
 
 from synctrl import Experiment, Payload, Result
+from synctrl.compiled.known import check_known
+from synctrl.compiled.program import Program
 from synctrl.errors import InputError, SaturationWarning
 from synctrl.experiments import a460_pair, planar_four, ur5_payload
-from synctrl.simulation.compiled.known import check_known
-from synctrl.simulation.compiled.program import Program
 from synctrl.simulation.payloads import PayloadSchedule
 from synctrl.simulation.result import LAYOUT
 

@@ -23,15 +23,15 @@ from synctrl import (
     Result,
     load_robot,
 )
-from synctrl.analysis.baselines import compare
 from synctrl.analysis.gain_condition import gain_condition
 from synctrl.analysis.identification import identify
 from synctrl.analysis.lyapunov import lyapunov
+from synctrl.coupling.weights import Weights
 from synctrl.errors import InputError, SimulationError
+from synctrl.paper.baselines import compare
 from synctrl.simulation.closed_loop import ClosedLoop
 from synctrl.simulation.plant import Plant
 from synctrl.sweep.variations import with_gain, with_scaled_gain
-from synctrl.tasks.weights import Weights
 
 GAINS = {"Lambda": 4.0, "beta": 4.0, "K_eps": 2.0}
 ROWS = ([20.0, 15.0], [30.0, 40.0, 20.0])

@@ -26,6 +26,7 @@ from synctrl import (
     load_robot,
 )
 from synctrl.control.laws import Asked, SunMills
+from synctrl.coupling.weights import Weights
 from synctrl.errors import (
     CouplingError,
     NonFiniteError,
@@ -35,7 +36,6 @@ from synctrl.errors import (
 )
 from synctrl.experiments import a460_pair, planar_four, ur5_payload
 from synctrl.tasks.trajectories import Motion
-from synctrl.tasks.weights import Weights
 
 ARM = load_robot("planar2r")
 ENGINES = ("pinocchio", "compiled")

@@ -15,6 +15,7 @@ from synctrl.analysis import certify
 from synctrl.analysis.gain_condition import margins, rate_matrix
 from synctrl.analysis.lyapunov import first_growth, lyapunov
 from synctrl.control.controller import Controller
+from synctrl.coupling.synchronization import SynchronizationFunction
 from synctrl.errors import SimulationError, SynchronizationError, UnreachableError
 from synctrl.experiments import a460_pair, planar_four
 from synctrl.experiments.a460_pair import FINAL, INITIAL
@@ -22,7 +23,6 @@ from synctrl.experiments.planar_four import Q0, TURN, D, R
 from synctrl.experiments.quadratic import quadratic_analysis
 from synctrl.simulation.closed_loop import ClosedLoop
 from synctrl.simulation.plant import Plant
-from synctrl.tasks.synchronization import SynchronizationFunction
 
 pytestmark = pytest.mark.filterwarnings("ignore::synctrl.errors.CouplingWarning")  # odd rings, rings of two
 rng = np.random.default_rng(7)

@@ -14,9 +14,9 @@ from writers import at_once, read_often, save_often, versions, write_often
 from synctrl import Result, simulate
 from synctrl.errors import InputError, ResultError
 from synctrl.files import whole_file, write_whole
+from synctrl.paper.report import write_page
 from synctrl.robots.documents import planar_arm, write_urdf
 from synctrl.show.plots import save, tracking_errors
-from synctrl.show.report import write_page
 from synctrl.show.scene import Scene
 
 PACKAGE = Path(__file__).resolve().parent.parent / "synctrl"

@@ -25,6 +25,7 @@ from synctrl import (
     load_robot,
     simulate,
 )
+from synctrl.coupling.reachability import inverse_kinematics
 from synctrl.errors import (
     InputError,
     NonFiniteError,
@@ -35,7 +36,6 @@ from synctrl.errors import (
 )
 from synctrl.experiments import a460_pair, planar_four, ur5_payload
 from synctrl.simulation.integrators import ADAPTIVE
-from synctrl.tasks.reachability import inverse_kinematics
 
 ARM = load_robot("planar2r")
 #: torque that stretches the second robot's elbow

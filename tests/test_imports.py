@@ -23,15 +23,19 @@ ROOMS = (
     "errors",
     "checks",
     "files",
+    "moved",
     "robots",
     "tasks",
+    "coupling",
     "control",
     "simulation",
+    "compiled",
     "analysis",
-    "show",
-    "experiments",
     "sweep",
     "tune",
+    "show",
+    "experiments",
+    "paper",
 )
 
 # Imported inside the functions that use them: most users of a robot need neither figures nor a second engine.
@@ -41,14 +45,16 @@ ONLY_INSIDE_FUNCTIONS = {
 }
 
 # Libraries that belong to some rooms alone.
-OWNERS = {"matplotlib": {"show"}, "meshcat": {"show"}}
+OWNERS = {"matplotlib": {"show", "paper"}, "meshcat": {"show"}}
 
 # What rooms other than robots/ may use of Pinocchio: types and the rotation group, never its dynamics.
 GEOMETRY = {"SE3", "Quaternion", "exp3", "exp6", "log3", "log6", "Jlog3", "Jlog6"}
 TYPES = {"Model", "Data", "GeometryModel", "GeometryData", "GeometryObject", "GeometryType"}
 PINOCCHIO = {
     "tasks": GEOMETRY,
+    "coupling": GEOMETRY,
     "simulation": GEOMETRY | TYPES,
+    "compiled": GEOMETRY,
     "show": GEOMETRY | TYPES | {"visualize"},
 }
 

@@ -26,11 +26,11 @@ from synctrl import (
     Member,
     load_robot,
 )
+from synctrl.compiled import engine as compiled
 from synctrl.errors import CouplingError, NonFiniteError, RunInterrupted, SimulationError, TrajectoryError
 from synctrl.simulation import integrators
 from synctrl.simulation import run as runs
 from synctrl.simulation.closed_loop import ClosedLoop
-from synctrl.simulation.compiled import engine as compiled
 from synctrl.simulation.handover import up_to_a_failure
 from synctrl.simulation.plant import Plant
 from synctrl.simulation.result import LAYOUT

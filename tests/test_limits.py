@@ -11,7 +11,7 @@ from synctrl import Cell, Coupling, Cubic, Experiment, Gains, Member, Result, Ro
 from synctrl.robots.documents import planar_arm
 from synctrl.robots.limits import joint_limits
 from synctrl.robots.urdf import describe
-from synctrl.robots.urdf_document import Limit
+from synctrl.robots.urdf.document import Limit
 from synctrl.simulation.limits import applied_torque, limit_report
 
 TORQUE, SPEED, RANGE = 2.0, 1.5, (-0.2, 0.9)

@@ -29,7 +29,7 @@ from synctrl.errors import InputError
 from synctrl.robots import documents
 from synctrl.robots.parameters import LinearParameters
 from synctrl.robots.urdf import describe
-from synctrl.robots.urdf_document import Limit
+from synctrl.robots.urdf.document import Limit
 
 pytestmark = pytest.mark.filterwarnings("ignore::synctrl.errors.CouplingWarning")  # odd rings are meant
 

@@ -24,37 +24,32 @@ from synctrl import (
     SynchronizationFunction,
     load_robot,
 )
-from synctrl.analysis.baselines import compare
 from synctrl.analysis.certify import certify
-from synctrl.analysis.claims import errors_converge, sync_error_is_much_smaller
 from synctrl.analysis.convergence import convergence
 from synctrl.analysis.gain_condition import gain_condition, gain_condition_in_box
 from synctrl.analysis.identification import identify
-from synctrl.analysis.judge import compare_runs
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.analysis.metrics import as_data, metrics, row_names, settling_bands
 from synctrl.analysis.replay import replay
 from synctrl.errors import NonFiniteError
+from synctrl.paper.baselines import compare
+from synctrl.paper.claims import errors_converge, sync_error_is_much_smaller
+from synctrl.paper.judge import compare_runs
+from synctrl.paper.paper_sections import metrics_tables
+from synctrl.paper.plant_sections import identification_section
+from synctrl.paper.report import Section, Text, Verdicts, write_page
+from synctrl.paper.theory_sections import baseline_section, certificate_section, draw_certificate
 from synctrl.show.animation import planar_scene
 from synctrl.show.layout import cell_layout
 from synctrl.show.lyapunov_plots import lyapunov_figure
-from synctrl.show.paper_sections import metrics_tables
-from synctrl.show.plant_sections import identification_section
-from synctrl.show.plots import (
-    common_limits,
-    joint_trajectories,
-    sync_errors,
-    tracking_errors,
-)
+from synctrl.show.plots import common_limits, joint_trajectories, sync_errors, tracking_errors
 from synctrl.show.real_cells import formation_scene
-from synctrl.show.report import Section, Text, Verdicts, write_page
-from synctrl.show.theory_sections import baseline_section, certificate_section, draw_certificate
 from synctrl.simulation.guard import Finding
 from synctrl.simulation.guard import stopped as stopped_by
-from synctrl.simulation.prepared import Prepared
 from synctrl.sweep.factors import Setup
 from synctrl.sweep.identity import describe_base
 from synctrl.sweep.measures import MEASURES, definitions, measures
+from synctrl.sweep.prepared import Prepared
 from synctrl.sweep.variations import with_scaled_weights
 
 DURATION, DT = 0.01, 1e-3  # s

@@ -26,7 +26,7 @@ from synctrl.errors import InputError, MissingDependencyError
 from synctrl.experiments import a460_pair, planar_four
 from synctrl.robots.documents import planar_arm
 from synctrl.robots.urdf import describe
-from synctrl.robots.urdf_document import Document, Inertial, Pose
+from synctrl.robots.urdf.document import Document, Inertial, Pose
 from synctrl.simulation.mujoco_plant import MujocoArm, _for_mujoco
 from synctrl.simulation.plant import PHYSICS
 

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from synctrl.analysis.identification import identify
-from synctrl.analysis.judge import AGREEMENT, compare_runs
 from synctrl.errors import InputError
 from synctrl.experiments import a460_full_pair, a460_pair
-from synctrl.experiments.judged import joint_pair
-from synctrl.experiments.reproduction import JOBS, judge_jobs, judged
-from synctrl.show.judge_plots import differences
-from synctrl.show.judge_section import judge_section
-from synctrl.show.plant_sections import friction_section, full_a460_section, identification_section
+from synctrl.paper.judge import AGREEMENT, compare_runs
+from synctrl.paper.judge_plots import differences
+from synctrl.paper.judge_section import judge_section
+from synctrl.paper.judged import joint_pair
+from synctrl.paper.plant_sections import friction_section, full_a460_section, identification_section
+from synctrl.paper.report import Row, write_page
+from synctrl.paper.reproduction import JOBS, judge_jobs, judged
 from synctrl.show.plots import joint_trajectories, save
-from synctrl.show.report import Row, write_page
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +95,7 @@ def test_the_judges_section_has_a_line_and_a_row_per_cell(runs, tmp_path) -> Non
 
 
 def test_without_mujoco_the_page_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
-    monkeypatch.setattr("synctrl.experiments.reproduction.find_spec", lambda name: None)
+    monkeypatch.setattr("synctrl.paper.reproduction.find_spec", lambda name: None)
     assert judge_jobs() == {}
     page = write_page(tmp_path / "index.html", "page", [judge_section(judged({}), tmp_path)])
     assert "MuJoCo is not installed" in page.read_text("utf-8")

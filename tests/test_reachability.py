@@ -22,8 +22,8 @@ from synctrl import (
     inverse_kinematics,
     load_robot,
 )
+from synctrl.coupling.reachability import check_reachable, reach
 from synctrl.errors import UnreachableError
-from synctrl.tasks.reachability import check_reachable, reach
 from synctrl.tasks.rotations import log
 
 UR5, PANDA, PLANAR = load_robot("ur5"), load_robot("panda"), load_robot("planar2r")

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from browser import open_page, require_browser
 
-from synctrl.analysis.claims import Claim, Quantity
 from synctrl.errors import InputError, ResultError
-from synctrl.show.report import (
+from synctrl.paper.claims import Claim, Quantity
+from synctrl.paper.report import (
     Formulas,
     Links,
     Picture,

@@ -31,7 +31,7 @@ from synctrl.experiments import (
     rigid_object,
     ur5_payload,
 )
-from synctrl.simulation.prepared import Prepared
+from synctrl.sweep.prepared import Prepared
 
 compiled = pytest.mark.skipif(
     find_spec("casadi") is None, reason="CasADi is an extra: pip install 'synctrl[compiled]'"

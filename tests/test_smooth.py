@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from machines import seeds
 
 from synctrl import Coupling, Cubic, FunctionOrientation, SmoothOrientation, SmoothTrajectory
+from synctrl.coupling.weights import SmoothWeights
 from synctrl.errors import CouplingError, InputError, TrajectoryError
 from synctrl.tasks.rotations import exp, skew
-from synctrl.tasks.weights import SmoothWeights
 
 TIMES = np.linspace(0, 2, 301)
 

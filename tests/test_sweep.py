@@ -25,7 +25,6 @@ from sweeps import DT, base, begun, die, die_once, quiet, slow_sweep, small_swee
 from synctrl import Experiment
 from synctrl.errors import InputError, ResultError, SweepError
 from synctrl.experiments import a460_pair, mobile_robot, panda_four, planar_four
-from synctrl.simulation.prepared import Prepared
 from synctrl.simulation.result import LAYOUT
 from synctrl.sweep import (
     Choice,
@@ -51,6 +50,7 @@ from synctrl.sweep import (
     weights,
 )
 from synctrl.sweep.description import difference
+from synctrl.sweep.prepared import Prepared
 
 pytest.importorskip("pandas", reason="tables are read with pandas: pip install 'synctrl[sweep]'")
 TESTS = Path(__file__).parent

@@ -11,13 +11,13 @@ from theory_cells import coupling, experiment
 
 from synctrl import Disturbance
 from synctrl.analysis import Certificate, certify
-from synctrl.analysis.baselines import Comparison, compare
 from synctrl.errors import ResultError
-from synctrl.experiments.reproduction import JOBS
-from synctrl.experiments.theory import CERTIFIED, examine
+from synctrl.paper.baselines import Comparison, compare
+from synctrl.paper.report import Table, Text, write_page
+from synctrl.paper.reproduction import JOBS
+from synctrl.paper.theory import CERTIFIED, examine
+from synctrl.paper.theory_sections import baseline_section, certificate_section, draw_certificate
 from synctrl.show.lyapunov_plots import growth_mark, lyapunov_figure
-from synctrl.show.report import Table, Text, write_page
-from synctrl.show.theory_sections import baseline_section, certificate_section, draw_certificate
 
 PUSH = Disturbance(robot=0, torque=-60.0, start=0.01, stop=0.03)
 

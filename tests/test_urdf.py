@@ -18,11 +18,11 @@ from urdf_corpus import CORPUS, GOOD, TRIANGLE, write
 
 from synctrl.errors import FrameNotFound, InputError, RobotError, RobotWarning
 from synctrl.robots.urdf import describe, existing_file, lock_joints, model_from_xml, read_urdf, urdf_folder
-from synctrl.robots.urdf_checks import check_model
-from synctrl.robots.urdf_document import Pose
-from synctrl.robots.urdf_meshes import data_folder
-from synctrl.robots.urdf_reader import read_document
-from synctrl.robots.urdf_writer import to_xml
+from synctrl.robots.urdf.checks import check_model
+from synctrl.robots.urdf.document import Pose
+from synctrl.robots.urdf.meshes import data_folder
+from synctrl.robots.urdf.reader import read_document
+from synctrl.robots.urdf.writer import to_xml
 
 OWN = sorted(urdf_folder().glob("*/*.urdf"))
 

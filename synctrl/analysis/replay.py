@@ -10,6 +10,7 @@ import numpy as np
 
 from ..checks import instance
 from ..control.controller import Signals
+from ..coupling.cell import Reference
 from ..errors import InputError
 from ..robots.blocks import Rows
 from ..robots.forest import Forest, forests
@@ -19,7 +20,6 @@ from ..simulation.disturbances import DisturbanceSchedule
 from ..simulation.recorder import ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE, own_states
 from ..simulation.result import LAYOUT, Result
 from ..simulation.simulate import Experiment
-from ..tasks.cell import Reference
 from .jumps import Stretch, jumps_in, stretches, tolerance
 
 #: instants whose references are evaluated together

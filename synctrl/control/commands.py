@@ -12,9 +12,9 @@ from typing import Any, NamedTuple, Protocol, cast
 
 import numpy as np
 
+from ..coupling.cell import Cell, Reference
+from ..coupling.coupling import Coupling
 from ..errors import InputError, SynctrlError
-from ..tasks.cell import Cell, Reference
-from ..tasks.coupling import Coupling
 from ..tasks.spaces import Measurement
 from . import law
 from .laws import Asked, BoundLaw, Errors

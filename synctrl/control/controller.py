@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance
+from ..coupling.cell import Cell, Reference
 from ..robots.regressors import RegressorBlocks, regressors
-from ..tasks.cell import Cell, Reference
 from ..tasks.spaces import Measurement
 from . import law, laws
 from .adaptation import Adaptation, Seen, chosen

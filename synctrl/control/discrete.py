@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import boolean, choice, finite_array, finite_number, instance, positive_number
+from ..coupling.cell import Reference
 from ..errors import InputError, ResultError
-from ..tasks.cell import Reference
 from .controller import Controller, Signals
 from .measured import check_limits, check_signals, measurement, not_finite
 from .state_file import read_state, write_state

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..tasks.cell import Cell, Reference
+from ..coupling.cell import Cell, Reference
 from ..tasks.spaces import Measurement
 from .commands import ConstantWeights, Lines
 

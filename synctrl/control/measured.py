@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..coupling.cell import Cell
 from ..errors import InputError, NonFiniteError, SingularJacobianError
-from ..tasks.cell import Cell
 from .controller import Signals
 
 

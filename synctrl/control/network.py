@@ -10,9 +10,9 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ..coupling.cell import Cell
+from ..coupling.coupling import Coupling
 from ..errors import InputError
-from ..tasks.cell import Cell
-from ..tasks.coupling import Coupling
 
 
 class Received(NamedTuple):

@@ -15,12 +15,12 @@ import numpy as np
 
 from ..checks import boolean
 from ..control.gains import Gains
+from ..coupling.cell import Cell, Member
+from ..coupling.coupling import Coupling
 from ..robots.friction import Friction
 from ..robots.friction_parameters import FrictionParameters
 from ..robots.robot import Robot, load_robot
 from ..simulation.simulate import Experiment
-from ..tasks.cell import Cell, Member
-from ..tasks.coupling import Coupling
 from ..tasks.spaces import JointSpace
 from ..tasks.trajectories import Cubic
 from .parts import Parts, chosen_gains

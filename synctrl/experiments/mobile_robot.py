@@ -23,13 +23,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..control.gains import Gains
+from ..coupling.cell import Cell, Member
+from ..coupling.synchronization import SynchronizationFunction
 from ..robots.parameters import LinearParameters
 from ..robots.robot import Robot, load_robot
 from ..simulation.disturbances import Disturbance
 from ..simulation.simulate import Experiment
-from ..tasks.cell import Cell, Member
 from ..tasks.spaces import JointSpace
-from ..tasks.synchronization import SynchronizationFunction
 from ..tasks.trajectories import Motion
 from .parts import Parts, chosen_gains
 

@@ -13,13 +13,13 @@ import numpy as np
 
 from ..checks import boolean, choice, finite_number
 from ..control.gains import Gains
+from ..coupling.cell import Cell, Member
+from ..coupling.coupling import Coupling
 from ..errors import InputError
 from ..robots.parameters import planar_two_link_parameters, theta_50
 from ..robots.robot import Robot, load_robot
 from ..simulation.disturbances import Disturbance
 from ..simulation.simulate import Experiment
-from ..tasks.cell import Cell, Member
-from ..tasks.coupling import Coupling
 from ..tasks.spaces import CartesianSpace
 from ..tasks.trajectories import ExponentialApproach
 from .parts import Parts, chosen_gains

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..coupling.expansion import Expansion
+from ..coupling.synchronization import SynchronizationFunction
 from ..errors import SynchronizationError
-from ..tasks.expansion import Expansion
-from ..tasks.synchronization import SynchronizationFunction
 from ..tasks.trajectories import Circle
 
 RADII = (0.3, 0.4)  # m

@@ -12,13 +12,13 @@ from typing import Unpack
 import numpy as np
 
 from ..control.gains import Gains
+from ..coupling.cell import Cell, Member
+from ..coupling.coupling import Coupling
+from ..coupling.reachability import reach
 from ..robots.robot import Robot, load_robot
 from ..simulation.simulate import Experiment
-from ..tasks.cell import Cell, Member
-from ..tasks.coupling import Coupling
 from ..tasks.pose import PoseSpace
 from ..tasks.poses import Attached, AxisRotation, PoseTrajectory
-from ..tasks.reachability import reach
 from ..tasks.rotations import exp
 from ..tasks.trajectories import FunctionTrajectory
 from .parts import Parts, chosen_gains

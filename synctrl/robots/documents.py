@@ -19,11 +19,11 @@ from ..checks import finite_array, positive_number
 from ..errors import FrameNotFound, InputError, RobotError
 from ..files import write_whole
 from .catalog import load_description
-from .urdf import Description, lock_joints
-from .urdf_checks import check_bodies, check_tree, inertial_fault
-from .urdf_document import Document, Geometry, Inertial, Joint, Limit, Link, Pose, Shape
-from .urdf_writer import to_xml
-from .urdf_xml import NAME_RULE, is_name
+from .urdf.checks import check_bodies, check_tree, inertial_fault
+from .urdf.description import Description, lock_joints
+from .urdf.document import Document, Geometry, Inertial, Joint, Limit, Link, Pose, Shape
+from .urdf.writer import to_xml
+from .urdf.xml import NAME_RULE, is_name
 
 Source = Document | Description | str | Path
 """A document, a description, a name of the catalogue, or the path of a URDF file."""

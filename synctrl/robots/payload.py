@@ -13,7 +13,7 @@ from ..checks import finite_array, instance, positive_number
 from ..errors import FrameNotFound, InputError
 from .documents import weld
 from .robot import Robot
-from .urdf_document import Document
+from .urdf.document import Document
 
 
 @dataclass(frozen=True, eq=False)

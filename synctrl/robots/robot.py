@@ -15,7 +15,7 @@ from ..errors import FrameNotFound, InputError
 from .catalog import load_description
 from .model_checks import check_inertia, check_joints, check_numbering
 from .per_thread import PerThread
-from .urdf_document import Document, Pose
+from .urdf.document import Document, Pose
 
 _WORLD_AXES = pin.LOCAL_WORLD_ALIGNED
 _regressor = pin.computeJointTorqueRegressor

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..control.controller import Controller, Signals
+from ..coupling.cell import Reference
 from ..errors import InputError, NonFiniteError
-from ..tasks.cell import Reference
 from .plant import Plant
 from .state import Layout, State
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..checks import finite_array, finite_number, instance
+from ..coupling.cell import Cell
 from ..errors import InputError
-from ..tasks.cell import Cell
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,13 +6,14 @@ instants in `run.clock` and pushes in `run.schedule`; `collect` of run.py watche
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Protocol
 
 from ..checks import choice
 from ..errors import InputError
 from .handover import Progress
 from .result import Result
-from .run import Run, run_compiled, run_reference
+from .run import Run, run_reference
 
 
 class Engine(Protocol):
@@ -43,24 +44,11 @@ class Reference:
         return run_reference(run, progress)
 
 
-class Compiled:
-    """The same closed loop as generated C."""
-
-    def refuses(self, run: Run) -> str | None:
-        from .compiled.known import check_known
-
-        try:
-            check_known(run.loop)
-        except InputError as error:
-            return str(error)
-        return None
-
-    def run(self, run: Run, progress: Progress | None) -> Result:
-        return run_compiled(run, progress)
-
-
-#: the engines that have a name
-ENGINES: dict[str, Engine] = {"pinocchio": Reference(), "compiled": Compiled()}
+#: the engines that have a name: their module and class, which is imported when it is asked for
+ENGINES = {
+    "pinocchio": ("synctrl.simulation.engines", "Reference"),
+    "compiled": ("synctrl.compiled.run", "Compiled"),
+}
 
 
 def find_engine(engine: str | Engine) -> Engine:
@@ -70,7 +58,8 @@ def find_engine(engine: str | Engine) -> Engine:
         InputError: an unknown name, or something that is no engine.
     """
     if isinstance(engine, str):
-        return ENGINES[choice("engine", engine, tuple(ENGINES))]
+        module, kind = ENGINES[choice("engine", engine, tuple(ENGINES))]
+        return getattr(import_module(module), kind)()
     if isinstance(engine, type) or not all(callable(getattr(engine, m, None)) for m in ("refuses", "run")):
         known = ", ".join(map(repr, ENGINES))
         raise InputError(f"engine: expected one of {known}, or an engine of your own, found {engine!r}")

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..coupling.cell import Cell
 from ..errors import NonFiniteError, OrientationError, SimulationError, SingularJacobianError
-from ..tasks.cell import Cell
 from ..tasks.pose import MAX_ANGLE
 from ..tasks.spaces import Measurement
 from .closed_loop import ClosedLoop

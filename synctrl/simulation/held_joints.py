@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array
+from ..coupling.cell import Cell
 from ..errors import InputError
 from ..robots.limits import joint_limits
 from ..robots.robot import Robot
-from ..tasks.cell import Cell
 from .plant import Output, Plant
 
 #: outputs of a run with held joints

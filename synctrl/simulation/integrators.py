@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..control.controller import Signals
+from ..coupling.cell import Reference
 from ..errors import InputError, NonFiniteError, SynctrlError
-from ..tasks.cell import Reference
 from .clock import Clock, Stretch, before
 from .closed_loop import ClosedLoop
 from .disturbances import DisturbanceSchedule

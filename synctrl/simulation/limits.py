@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..coupling.cell import Cell
 from ..robots.limits import joint_limits
-from ..tasks.cell import Cell
 from .damping import spans
 
 if TYPE_CHECKING:

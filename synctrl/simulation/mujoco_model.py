@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance, positive_number
+from ..coupling.cell import Cell
 from ..errors import InputError
 from ..robots.robot import Robot
-from ..tasks.cell import Cell
 from .mujoco_plant import MujocoArm, describe_arm, require_mujoco
 
 #: thickness of what is drawn, m, and as a share of its length; shorter ones are left out, m

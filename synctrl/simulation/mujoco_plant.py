@@ -17,8 +17,8 @@ import numpy as np
 from ..errors import InputError, MissingDependencyError
 from ..robots.per_thread import PerThread
 from ..robots.robot import Robot
-from ..robots.urdf_document import Document
-from ..robots.urdf_writer import dynamics_xml
+from ..robots.urdf.document import Document
+from ..robots.urdf.writer import dynamics_xml
 
 #: nothing is balanced, bounded or left out when MuJoCo compiles the description
 COMPILER = '<mujoco><compiler balanceinertia="false" boundmass="0" boundinertia="0"/></mujoco>'

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from ..checks import choice, instance
+from ..coupling.cell import Cell
 from ..robots.forest import forests
 from ..robots.robot import Robot
-from ..tasks.cell import Cell
 from .limits import torque_limits
 from .payloads import Payload, PayloadSchedule
 

@@ -26,8 +26,8 @@ import numpy as np
 from ..control.adaptation import Seen
 from ..control.commands import no_errors
 from ..control.laws.sun_mills import BoundSunMills
+from ..coupling.cell import Reference
 from ..robots.regressors import regressors
-from ..tasks.cell import Reference
 from .closed_loop import ClosedLoop
 
 #: largest product of rate and step that was ever seen to do with the classical Runge-Kutta method, whose own

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..coupling.motion_checks import check_motions
+from ..coupling.reachability import SAMPLES, check_reachable
 from ..errors import RunInterrupted, SimulationError, SynctrlError
-from ..tasks.motion_checks import check_motions
-from ..tasks.reachability import SAMPLES, check_reachable
 from .clock import Clock
 from .closed_loop import ClosedLoop
 from .diagnosis import diagnosed
@@ -22,11 +22,6 @@ from .recorder import Recorder, SampleRecorder
 from .result import Result
 from .sampled import sampled_rk4
 from .step_error import StepError, step_report
-
-if TYPE_CHECKING:
-    from ctypes import CDLL
-
-    from .compiled.engine import Tables
 
 #: instants at which weights are looked at before a run, at most
 WEIGHT_SAMPLES = 2000
@@ -58,7 +53,7 @@ class Run(NamedTuple):
             RunInterrupted: by Ctrl-C.
         """
         cell = self.loop.cell
-        with _before_the_start(self):
+        with before_the_start(self):
             self.loop.plant.prepare()
             self.loop.check_plant()
             check_motions(cell, np.array([0.0, self.clock.end]))
@@ -80,29 +75,6 @@ def run_adaptive(run: Run, method: str, rtol: float, atol: float, progress: Prog
     """A planned run by one of SciPy's methods."""
     run.info.update(integrator=method, rtol=rtol, atol=atol)
     return collect(run, adaptive(run.loop, run.clock, run.schedule, method, rtol, atol), progress)
-
-
-def run_compiled(
-    run: Run,
-    progress: Progress | None = None,
-    libraries: dict[str, CDLL] | None = None,
-    tables: Tables | None = None,
-) -> Result:
-    """A planned run by generated code; `libraries` and `tables` are what earlier runs have left."""
-    from .compiled.engine import advance
-    from .compiled.program import Program
-
-    run.info["engine"] = "compiled"
-    recorder = Recorder(run.loop, run.clock)
-    with _before_the_start(run):
-        program = Program(run.loop, libraries)
-    return _finish(
-        run,
-        recorder,
-        lambda: advance(
-            program, run.clock, run.schedule, recorder, run.step_error, run.every, progress, tables
-        ),
-    )
 
 
 def collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> Result:
@@ -127,10 +99,10 @@ def collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> R
                 recorder.add(sample)
                 tell(progress, sample.t)
 
-    return _finish(run, recorder, log)
+    return finish(run, recorder, log)
 
 
-def _finish(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:
+def finish(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:
     """Let a run log itself; whatever ends it, while it is looked into too, takes along what was logged."""
 
     def logged(status: str) -> Result:
@@ -173,7 +145,7 @@ def _diagnosed(run: Run, recorder: Recorder, error: SynctrlError) -> SynctrlErro
 
 
 @contextmanager
-def _before_the_start(run: Run) -> Iterator[None]:
+def before_the_start(run: Run) -> Iterator[None]:
     """Hand over an empty result if Ctrl-C comes while a run is being prepared."""
     try:
         yield

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..control.controller import Signals
 from ..control.discrete import DiscreteController
-from ..tasks.cell import Reference
+from ..coupling.cell import Reference
 from .clock import Clock, multiple
 from .closed_loop import ClosedLoop
 from .disturbances import DisturbanceSchedule

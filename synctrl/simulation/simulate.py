@@ -13,8 +13,8 @@ from ..control.discrete import DiscreteController
 from ..control.gains import Gains
 from ..control.laws import Law
 from ..control.network import Network
+from ..coupling.cell import Cell
 from ..errors import InputError
-from ..tasks.cell import Cell
 from .clock import make_clock
 from .closed_loop import ClosedLoop
 from .disturbances import Disturbance, DisturbanceSchedule

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..tasks.cell import Cell
+from ..coupling.cell import Cell
 
 
 class State:

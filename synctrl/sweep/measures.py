@@ -10,8 +10,8 @@ import numpy as np
 
 from ..analysis.metrics import DEFINITIONS, ERRORS, SETTLING_FRACTION, ErrorMetrics, Metrics, metrics
 from ..analysis.metrics import squared as squared_unit
+from ..coupling.cell import Cell
 from ..simulation.result import Result
-from ..tasks.cell import Cell
 
 
 class Measure(NamedTuple):

@@ -9,13 +9,13 @@ from typing import Any
 from ..analysis.metrics import settling_bands
 from ..checks import choice, count, instance, positive_number
 from ..errors import InputError, SimulationError
-from ..simulation.prepared import Prepared
 from ..simulation.recorder import versions
 from ..simulation.simulate import Experiment
 from .description import checked_bands
 from .factors import Factor, Setup
 from .identity import describe_base
 from .measures import MEASURES, definitions
+from .prepared import Prepared
 from .rows import columns
 from .worker import Job
 

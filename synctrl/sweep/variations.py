@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..coupling.cell import Cell, Member
+from ..coupling.coupling import Coupling
 from ..errors import InputError
 from ..robots.base_parameters import BaseParameters
 from ..robots.friction_parameters import FrictionParameters
@@ -15,8 +17,6 @@ from ..robots.parameters import FullParameters, LinearParameters, Parameters
 from ..robots.robot import Robot
 from ..simulation.disturbances import Disturbance
 from ..simulation.simulate import Experiment
-from ..tasks.cell import Cell, Member
-from ..tasks.coupling import Coupling
 
 
 def with_gain(experiment: Experiment, value: float, gain: str) -> Experiment:

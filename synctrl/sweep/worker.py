@@ -9,12 +9,12 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 from ..errors import SimulationError, SweepError, SynctrlError
-from ..simulation.prepared import Prepared
 from ..simulation.result import Result
 from .distributions import Value
 from .doubts import Doubt, doubt_of
 from .factors import Factor, Setup
 from .measures import MEASURES, measures
+from .prepared import Prepared
 from .rows import COMPLETED, REFUSED, STOPPED, Row, columns
 
 

@@ -1,1 +1,1 @@
-"""What is asked: spaces, desired motion, couplings, cells."""
+"""What is asked: task spaces and desired motion."""

@@ -24,11 +24,11 @@ from synctrl import (
     PoseSpace,
     load_robot,
 )
+from synctrl.compiled import build, cache, elf, program
+from synctrl.compiled.program import Program
 from synctrl.errors import CompilationError
 from synctrl.robots.catalog import catalog_names
 from synctrl.robots.parameters import planar_two_link_parameters
-from synctrl.simulation.compiled import build, cache, elf, program
-from synctrl.simulation.compiled.program import Program
 
 pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
 
@@ -121,7 +121,7 @@ def test_builds_that_are_killed_leave_nothing_that_stays_or_is_run(folder, recor
     """Processes build the same four libraries at once; two of three are killed, sooner or later."""
     rng = np.random.default_rng(0)
     code = (
-        "from synctrl.simulation.compiled import build\nprint('ready', flush=True)\n"
+        "from synctrl.compiled import build\nprint('ready', flush=True)\n"
         "for k in range(4):\n"
         "    source = f'int answer(void) {{ return {k}; }}'\n"
         "    library = build.cached_library(f'key{k}', lambda: iter([source]), lambda library: None)\n"

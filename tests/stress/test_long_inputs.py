@@ -9,9 +9,9 @@ from machines import random_robot
 from motions import random_sines
 
 from synctrl import Cell, Coupling, Friction, FullParameters, Hold, Member, Robot, load_robot
+from synctrl.coupling.motion_checks import check_motions
 from synctrl.errors import InputError
 from synctrl.robots.catalog import CATALOG
-from synctrl.tasks.motion_checks import check_motions
 
 CASES = 20_000
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...coupling.cell import Cell
 from ...errors import InputError
-from ...tasks.cell import Cell
 from .. import law
 from ..gains import read_gain, spread_rows
 from ..rows import Rows

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from ...checks import non_negative_number, positive_number
+from ...coupling.cell import Cell
 from ...errors import InputError
 from ...robots.friction_parameters import FrictionParameters
 from ...robots.parameters import FullParameters
 from ...robots.pseudo_inertia import dual, inertial_parameters, pseudo_inertia
-from ...tasks.cell import Cell
 from .protocol import Seen
 
 #: entries of a lower triangular 4 x 4 matrix below its diagonal

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...tasks.cell import Cell
+from ...coupling.cell import Cell
 
 
 @dataclass(slots=True)

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...checks import finite_array
+from ...coupling.cell import Cell
+from ...coupling.coupling import Coupling
 from ...errors import InputError
-from ...tasks.cell import Cell
-from ...tasks.coupling import Coupling
 from .. import law
 from ..gains import Gains, spread
 from .protocol import Along, Asked, Errors, Proof

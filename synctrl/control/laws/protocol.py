@@ -22,7 +22,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ...tasks.cell import Cell
+from ...coupling.cell import Cell
 from ..gains import Gains
 
 

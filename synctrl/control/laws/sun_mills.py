@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...checks import choice
-from ...tasks.cell import Cell
+from ...coupling.cell import Cell
 from .. import law
 from ..gains import Gains, spread
 from .protocol import Along, Asked, Errors, Proof

@@ -1,0 +1,148 @@
+"""From generated C to a loaded library, kept in a cache.
+
+The cache is addressed by content: the key is a digest of everything the code depends on, so a second run
+compiles nothing, and an entry is never wrong, only missing. An entry that is damaged is built again. Entries
+appear under their name only once complete, so two processes may build the same one at the same time.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+
+from ..errors import CompilationError, MissingDependencyError
+from .cache import building_folder, load, open_cache, read_file, remove_leftovers
+from .compiler import FLAGS, compile_library, compiler, compiler_version
+
+#: rooms of the package that generated code is made from, or compared with
+ROOMS = ("robots", "tasks", "coupling", "control", "simulation", "compiled")
+#: a digest in a file is shorter than this, bytes
+DIGEST = 200
+
+Check = Callable[[ctypes.CDLL], None]
+
+#: libraries that this process has loaded and checked, by key and digest: to do it once is enough
+_CHECKED: dict[tuple[str, str], ctypes.CDLL] = {}
+
+
+def require_casadi() -> str:
+    """Version of CasADi.
+
+    Raises:
+        MissingDependencyError: it is not installed.
+    """
+    try:
+        from casadi import CasadiMeta
+    except ImportError as error:
+        raise MissingDependencyError(
+            "engine='compiled' needs CasADi: pip install 'synctrl[compiled]'; or use engine='pinocchio'"
+        ) from error
+    return str(CasadiMeta.version())
+
+
+def content_key(*parts: object) -> str:
+    """Digest of plain data, of all code that generates code or that it is compared with, and of the compiler.
+
+    Raises:
+        MissingDependencyError, CompilationError: there is no compiler, or it cannot be run.
+    """
+    command = compiler()
+    version, machine = compiler_version(command), [platform.system(), platform.machine()]
+    content = json.dumps([*parts, command, version, machine, FLAGS, digest_of_sources()], sort_keys=True)
+    return hashlib.sha256(content.encode()).hexdigest()
+
+
+@cache
+def digest_of_sources(package: Path = Path(__file__).parents[1]) -> str:
+    """Digest of every source file in the rooms that generated code depends on."""
+    files = sorted(path for room in ROOMS for path in (package / room).rglob("*"))
+    found = hashlib.sha256()
+    for path in files:
+        if path.suffix in (".py", ".c"):
+            content = path.read_bytes()
+            found.update(f"{path.relative_to(package)} {len(content)}\n".encode() + content)
+    return found.hexdigest()
+
+
+def cached_library(key: str, generate: Callable[[], Iterable[str]], check: Check) -> ctypes.CDLL:
+    """The library of a key, from the cache or built now.
+
+    Args:
+        key: see `content_key`.
+        generate: writes the C sources, called only if they are needed; they are compiled as they come.
+        check: raises a CompilationError if a library computes something else than it should; it is called
+            once in a process, for a new library and for one from the cache.
+
+    Raises:
+        CompilationError: the compiler refused the code, the cache cannot be written, somebody else can write
+            to it, or the library fails the check.
+    """
+    folder = open_cache()
+    try:
+        return _stored(folder, key, check) or _built(folder, key, generate, check)
+    except OSError as error:
+        raise CompilationError(f"cannot write to the cache '{folder}': {error}") from error
+
+
+# -- internals --------------------------------------------------------------------------------------------
+
+
+def _stored(folder: Path, key: str, check: Check) -> ctypes.CDLL | None:
+    """The library if its file is what was once published, and computes what it should; else None."""
+    try:
+        digest, content = read_file(folder / f"{key}.sha256", DIGEST), read_file(folder / f"{key}.so")
+    except OSError:
+        return None
+    if digest is None or content is None or digest.strip() != _digest(key, content).encode():
+        return None
+    with suppress(OSError, CompilationError):
+        return _checked(folder, key, content, check)
+    return None
+
+
+def _built(folder: Path, key: str, generate: Callable[[], Iterable[str]], check: Check) -> ctypes.CDLL:
+    remove_leftovers(folder)
+    with building_folder(folder) as place:
+        content = compile_library(generate(), place).read_bytes()
+        try:
+            library = _checked(folder, key, content, check)
+        except OSError as error:
+            raise CompilationError(
+                f"the C compiler '{compiler()[0]}' wrote what cannot be loaded as a library: {error}"
+            ) from error
+        _publish(place, folder / key, key, content)
+    return library
+
+
+def _checked(folder: Path, key: str, content: bytes, check: Check) -> ctypes.CDLL:
+    """The library with this content, loaded and checked unless this process has done so before."""
+    name = key, _digest(key, content)
+    if name not in _CHECKED:
+        library = load(content, folder)
+        check(library)
+        _CHECKED[name] = library
+    return _CHECKED[name]
+
+
+def _publish(place: Path, target: Path, key: str, content: bytes) -> None:
+    """Write a library and its digest, then move them to their names.
+
+    In between, a reader finds a digest that does not fit.
+    """
+    for suffix, data in ((".so", content), (".sha256", _digest(key, content).encode())):
+        file = place / f"published{suffix}"
+        with open(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as stream:
+            stream.write(data)
+        file.replace(f"{target}{suffix}")
+
+
+def _digest(key: str, content: bytes) -> str:
+    """Digest of a library under its key, so that it does not fit under another one."""
+    return hashlib.sha256(key.encode() + b" " + content).hexdigest()

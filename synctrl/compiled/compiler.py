@@ -1,0 +1,213 @@
+"""The machine's C compiler: found by name, and run within limits of time and of what it may print."""
+
+from __future__ import annotations
+
+import os
+import selectors
+import shlex
+import shutil
+import signal
+import subprocess
+import threading
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from time import monotonic
+
+from ..errors import CompilationError, MissingDependencyError
+
+#: -O1, because generated code is one long sum of products: -O2 makes it no faster, only longer to compile
+FLAGS = ("-O1", "-fPIC", "-fno-math-errno", "-ffp-contract=off")
+#: how long one call of the compiler may take, s; the largest arms take about a minute on a slow machine
+LONGEST = 900.0
+#: how long it may take to say its version, s
+LONGEST_VERSION = 30.0
+#: what one call may print, bytes
+MOST_PRINTED = 1_000_000
+#: how often a running compiler is looked after, s
+GLANCE = 0.05
+
+
+def compiler() -> tuple[str, ...]:
+    """The machine's C compiler: the environment variable CC, or cc, gcc or clang.
+
+    Raises:
+        MissingDependencyError: there is none, or CC does not name one; the message says why.
+    """
+    named = _named()
+    for command in [named] if named else [("cc",), ("gcc",), ("clang",)]:
+        if shutil.which(command[0]):
+            return command
+    if named:
+        raise _bad_cc(f"'{named[0]}' {_why_not(named[0])}")
+    raise MissingDependencyError(
+        "engine='compiled' needs a C compiler (cc, gcc or clang), and none was found; "
+        "install one, or use engine='pinocchio'"
+    )
+
+
+def compiler_version(command: tuple[str, ...]) -> str:
+    """What a compiler prints when asked for its version; it is asked once in a process.
+
+    Raises:
+        CompilationError: it cannot be run, or does not come to an end.
+    """
+    return _printed_version(command, shutil.which(command[0]))
+
+
+def compile_library(sources: Iterable[str], folder: Path) -> Path:
+    """Compile each source as soon as it is there, as many at a time as there are cores, and link them.
+
+    Whatever goes wrong, no compiler is left running.
+
+    Raises:
+        CompilationError: the compiler refuses, hangs, or does not write what it should.
+    """
+    command, stop = compiler(), threading.Event()
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        try:
+            jobs = [
+                pool.submit(_compile, command, source, folder / f"part{k}.c", stop)
+                for k, source in enumerate(sources)
+            ]
+            objects = [str(job.result()) for job in jobs]
+        except BaseException:
+            stop.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return _make(folder / "library.so", [*command, "-shared", *objects, "-lm"], stop)
+
+
+def run(command: Iterable[str], seconds: float, stop: threading.Event | None = None) -> tuple[int, str]:
+    """Run a program in a process group of its own, and leave none of that group behind.
+
+    Args:
+        command: the program and its arguments.
+        seconds: how long it may take, s.
+        stop: ends it early.
+
+    Returns:
+        Its exit status, and what it printed.
+
+    Raises:
+        CompilationError: it cannot be run, takes longer, prints without end, or was stopped.
+    """
+    command = list(command)
+    try:
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+    except (OSError, ValueError) as error:
+        raise CompilationError(f"the C compiler '{command[0]}' cannot be run: {error}") from error
+    with process:
+        try:
+            printed = _follow(process, command[0], seconds, stop or threading.Event())
+        finally:
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(process.pid, signal.SIGKILL)  # with the children that it has left
+    return process.returncode, printed.decode(errors="replace").strip()
+
+
+# -- internals --------------------------------------------------------------------------------------------
+
+
+def _named() -> tuple[str, ...]:
+    """The command in CC, word by word."""
+    text = os.environ.get("CC", "")
+    try:
+        return tuple(shlex.split(text))
+    except ValueError as error:
+        raise _bad_cc(f"{text!r} cannot be split into words ({error})") from error
+
+
+def _bad_cc(found: str) -> MissingDependencyError:
+    return MissingDependencyError(
+        f"engine='compiled' needs a C compiler, and the one named by CC cannot be used: {found}; expected a "
+        "command such as gcc or clang; correct or unset CC, or use engine='pinocchio'"
+    )
+
+
+def _why_not(program: str) -> str:
+    """What is the matter with a program that cannot be found."""
+    if not program:
+        return "is no name"
+    if os.path.isdir(program):
+        return "is a folder"
+    return "is not executable" if os.path.isfile(program) else "was not found"
+
+
+@cache
+def _printed_version(command: tuple[str, ...], found_at: str | None) -> str:
+    return run([*command, "--version"], LONGEST_VERSION)[1]
+
+
+def _compile(command: tuple[str, ...], source: str, path: Path, stop: threading.Event) -> Path:
+    path.write_text(source, encoding="utf-8")
+    return _make(path.with_suffix(".o"), [*command, *FLAGS, "-c", str(path)], stop)
+
+
+def _make(target: Path, command: list[str], stop: threading.Event) -> Path:
+    """Let the compiler write a file.
+
+    Raises:
+        CompilationError: it does not.
+    """
+    status, printed = run([*command, "-o", str(target)], LONGEST, stop)
+    said = f":\n{printed[:2000]}" if printed else ""
+    if status < 0:
+        raise CompilationError(f"the C compiler '{command[0]}' was ended by signal {-status}{said}")
+    if status != 0:
+        raise CompilationError(f"the C compiler refused generated code{said or f' with status {status}'}")
+    if not (target.is_file() and target.stat().st_size):
+        raise CompilationError(
+            f"the C compiler '{command[0]}' ended without an error, but wrote no '{target.name}'; is it a "
+            f"compiler? It was named by {'CC' if os.environ.get('CC') else 'PATH'}{said}"
+        )
+    return target
+
+
+def _follow(process: subprocess.Popen[bytes], name: str, seconds: float, stop: threading.Event) -> bytes:
+    """What a program prints until it ends.
+
+    A child that it leaves behind may hold the pipe open: the end of the program counts, not that of the pipe.
+    """
+    printed, deadline, ended = bytearray(), monotonic() + seconds, False
+    with selectors.DefaultSelector() as pipe:
+        pipe.register(process.stdout, selectors.EVENT_READ)  # type: ignore[arg-type]
+        while not ended:
+            _check_limits(name, len(printed), seconds, deadline, stop)
+            if not pipe.get_map():
+                ended = _ends_soon(process)
+            elif not pipe.select(GLANCE):
+                ended = process.poll() is not None
+            elif chunk := os.read(process.stdout.fileno(), 65536):  # type: ignore[union-attr]
+                printed += chunk
+            else:
+                pipe.unregister(process.stdout)  # type: ignore[arg-type]
+    return bytes(printed)
+
+
+def _check_limits(name: str, printed: int, seconds: float, deadline: float, stop: threading.Event) -> None:
+    """Raise if a running program must be stopped."""
+    way_out = "name another one by CC, or use engine='pinocchio'"
+    if stop.is_set():
+        raise CompilationError(f"the C compiler '{name}' was stopped, because something else failed")
+    if printed > MOST_PRINTED:
+        raise CompilationError(f"the C compiler '{name}' printed without end and was stopped; {way_out}")
+    if monotonic() > deadline:
+        raise CompilationError(
+            f"the C compiler '{name}' did not end within {seconds:g} s and was stopped, with the processes "
+            f"that it had started; {way_out}"
+        )
+
+
+def _ends_soon(process: subprocess.Popen[bytes]) -> bool:
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(GLANCE)
+    return process.returncode is not None

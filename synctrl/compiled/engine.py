@@ -1,0 +1,264 @@
+"""Runs of the compiled engine: blocks of steps through the library, and the same Result as the reference."""
+
+from __future__ import annotations
+
+import ctypes
+import operator
+from collections.abc import Callable, Iterable, Iterator
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..coupling.cell import Cell
+from ..simulation.clock import Clock, Stretch
+from ..simulation.disturbances import DisturbanceSchedule
+from ..simulation.guard import CHECKS, Finding, stopped
+from ..simulation.handover import tell, up_to_a_failure
+from ..simulation.recorder import ADAPTATION_STATE, Recorder
+from ..simulation.step_error import StepError
+from .program import Program
+from .structs import LogStruct, ReferenceStruct, ReportStruct, StepErrorStruct
+
+#: bytes of references that one block of steps may need
+BLOCK_BYTES = 32_000_000
+#: steps of a block at most
+BLOCK_STEPS = 1024
+#: how long the library may be away, s: Ctrl-C is seen when it comes back
+AWAY = 0.05
+
+
+class Block(NamedTuple):
+    """Consecutive steps with what is desired at their start, middle and end."""
+
+    steps: Stretch
+    desired: np.ndarray
+    weights: np.ndarray
+
+
+def blocks(program: Program, clock: Clock) -> Iterator[Block]:
+    """The steps of a run, in blocks that fit into memory; all before an instant whose references fail."""
+    cell = program.loop.cell
+
+    def make(first: int, last: int) -> Block:
+        stretch = clock.stretch(first, last)
+        return Block(stretch, *_tables(cell, stretch.stages))
+
+    for first, last in clock.stretches(_length(cell)):
+        yield from up_to_a_failure(make, first, last)
+
+
+def _length(cell: Cell) -> int:
+    """Steps of a block."""
+    return min(BLOCK_STEPS, max(1, BLOCK_BYTES // _step_bytes(cell)))
+
+
+def _step_bytes(cell: Cell) -> int:
+    """Bytes of what is desired in one step."""
+    weights = 0 if cell.coupling.is_constant else 4 * cell.m**2
+    return 3 * 8 * cell.n * (3 * cell.m + weights)
+
+
+class Kept(NamedTuple):
+    """The blocks of a run, and what they were made for: motions and weights, the clock, and its log."""
+
+    made_for: tuple[Any, ...]
+    instants: tuple[Clock, int] | None
+    blocks: list[Block]
+
+
+class Tables:
+    """What is desired in a run, kept for the next one with the same motions if it fits into memory.
+
+    What is kept is looked up and replaced as a whole, so threads may share it.
+    """
+
+    def __init__(self) -> None:
+        self._kept = Kept((), None, [])
+
+    def blocks(self, program: Program, clock: Clock) -> Iterable[Block]:
+        """The steps of a run, made anew if the run before had other motions, weights or instants."""
+        cell, kept = program.loop.cell, self._kept
+        if clock.steps * _step_bytes(cell) > BLOCK_BYTES:
+            return blocks(program, clock)
+        wanted = (cell.coupling, *(member.trajectory for member in cell.members))
+        same = len(wanted) == len(kept.made_for) and all(map(operator.is_, wanted, kept.made_for))
+        if same and kept.instants == (clock, clock.every):
+            return kept.blocks
+        return self._keep(blocks(program, clock), wanted, clock)
+
+    def _keep(self, fresh: Iterable[Block], wanted: tuple[Any, ...], clock: Clock) -> Iterator[Block]:
+        """Fresh blocks, which are known from when the last of them has been made."""
+        found = []
+        for block in fresh:
+            found.append(block)
+            yield block
+        self._kept = Kept(wanted, (clock, clock.every), found)
+
+
+class Pace:
+    """How many steps the library makes at a time, so that it is back before `AWAY`; measured on the way."""
+
+    def __init__(self) -> None:
+        self._steps = 1
+
+    def parts(self, count: int) -> Iterator[tuple[int, int]]:
+        """Steps 0 to `count` as ranges [first, last), each as long as was learnt until then."""
+        first = 0
+        while first < count:
+            last = min(first + self._steps, count)
+            yield first, last
+            first = last
+
+    def learn(self, steps: int, took: float) -> None:
+        """Aim at half the time, from how long some steps took, s; grow no faster than eightfold."""
+        fitting = int(0.5 * AWAY * steps / max(took, 1e-6))
+        self._steps = max(1, min(8 * self._steps, fitting))
+
+
+def advance(
+    program: Program,
+    clock: Clock,
+    schedule: DisturbanceSchedule,
+    recorder: Recorder,
+    step_error: StepError,
+    every: int | None = None,
+    progress: Callable[[float], Any] | None = None,
+    tables: Tables | None = None,
+) -> None:
+    """Run a compiled program and log into the recorder.
+
+    Args:
+        program: the closed loop.
+        clock: its instants.
+        schedule: disturbances.
+        recorder: where logged instants go; after a failure it has those before it.
+        step_error: told what the worst step was.
+        every: with sampled control, how many steps of dt one sample lasts.
+        progress: called with the time reached, s, several times a second.
+        tables: those of earlier runs.
+
+    Raises:
+        NonFiniteError, SingularJacobianError, OrientationError: as the reference engine.
+        SynctrlError: a desired motion or weight fails.
+    """
+    y, pace = recorder.state, Pace()
+    steps = _Steps(program, clock, schedule, recorder, step_error, every)
+    for block in blocks(program, clock) if tables is None else tables.blocks(program, clock):
+        for first, last in pace.parts(len(block.steps.starts)):
+            start = perf_counter()
+            steps.advance(block, first, last, y)
+            pace.learn(last - first, perf_counter() - start)
+            recorder.reached = float(block.steps.times[last])
+            tell(progress, recorder.reached)
+    steps.finish(y)
+
+
+class _Steps:
+    """The library's `advance` with everything it needs for one run."""
+
+    def __init__(
+        self,
+        program: Program,
+        clock: Clock,
+        schedule: DisturbanceSchedule,
+        recorder: Recorder,
+        step_error: StepError,
+        every: int | None,
+    ):
+        self._program, self._clock, self._every = program, clock, every
+        self._schedule, self._recorder, self._step_error = schedule, recorder, step_error
+        v0 = program.loop.cell.v0
+        self._before = np.zeros((2, 2, v0.size))
+        buffers = (part.ctypes.data for part in self._before)
+        self._worst = StepErrorStruct(0, np.abs(v0).max(), 0, 0, 0, *buffers)
+        program.work.step_error = ctypes.addressof(self._worst)
+        self._torques = np.ascontiguousarray(schedule.torques)
+        ctypes.memset(program.work.sign, 0, 8 * program.loop.cell.n)
+
+    def advance(self, block: Block, first: int, last: int, y: np.ndarray) -> None:
+        """Move y through some steps of a block, in place."""
+        steps = block.steps
+        part = slice(first, last)
+        joined = self._clock.joined(steps.first + first, steps.starts[part])
+        marks = _marks(steps.checked[part], steps.logged[part], self._due(steps.number[part]), joined)
+        windows = self._windows(steps.middles[part])
+        self._call(block, first, steps.times[first : last + 1], marks, windows, y)
+
+    def finish(self, y: np.ndarray) -> None:
+        """Log the end of the run: one step of no length."""
+        end, clock = np.array([self._clock.end]), self._clock
+        at = np.array([clock.count])
+        nothing = Stretch(clock.steps, np.repeat(end, 2), at > 0, at > 0, at)
+        block = Block(nothing, *_tables(self._program.loop.cell, np.array([end] * 3)))
+        due = np.array([self._every is not None and clock.sampled_at_end(self._every)])
+        windows = self._windows(clock.stretch(clock.steps - 1, clock.steps).middles)
+        self._call(block, 0, nothing.times, _marks(at > 0, at > 0, due, at < 0), windows, y)
+
+    def _windows(self, middles: np.ndarray) -> list[np.ndarray]:
+        """Which disturbance acts in each step, and which load is carried."""
+        schedules = self._schedule, self._program.loop.plant.schedule
+        return [schedule.windows(middles).astype(np.intc) for schedule in schedules]
+
+    def _due(self, number: np.ndarray) -> np.ndarray:
+        return number % (self._every or 1) == 0
+
+    def _call(
+        self,
+        block: Block,
+        first: int,
+        times: np.ndarray,
+        marks: np.ndarray,
+        windows: list[np.ndarray],
+        y: np.ndarray,
+    ) -> None:
+        program, library, recorder = self._program, self._program.library, self._recorder
+        constant = program.loop.cell.coupling.is_constant
+        table = ReferenceStruct(
+            block.desired.ctypes.data, block.weights.ctypes.data, len(block.steps.starts), int(constant),
+            first, len(marks),
+        )  # fmt: skip
+        rows = recorder.rows_ahead()
+        log, report = LogStruct(*(row.ctypes.data for row in rows[1:])), ReportStruct()
+        log.z = recorder.address_ahead(ADAPTATION_STATE)
+        arrays = [np.ascontiguousarray(times), marks, *windows, self._torques, y]
+        call = library.advance if self._every is None else library.advance_sampled
+        call.restype = None
+        try:
+            call(
+                ctypes.byref(program.cell),
+                ctypes.byref(table),
+                *(array.ctypes.data_as(ctypes.c_void_p) for array in arrays),
+                *(ctypes.byref(struct) for struct in (log, program.work, report)),
+            )
+        finally:  # an interrupt that came meanwhile is raised before the call has returned
+            recorder.advance(times[:-1][marks & LOGGED > 0][: report.rows])
+            worst = self._worst
+            self._step_error.note(worst.largest, worst.speed, worst.at, worst.time)
+        if report.status:
+            found = Finding(CHECKS[report.status - 1], report.robot, report.value)
+            raise stopped(program.loop, float(times[report.step]), y, recorder.last("v"), found)
+
+
+#: what happens at the start of a step, as in driver.c
+CHECKED, LOGGED, SAMPLED, JOINED = 1, 2, 4, 8
+
+
+def _marks(checked: np.ndarray, logged: np.ndarray, due: np.ndarray, joined: np.ndarray) -> np.ndarray:
+    """What happens at the start of each step, as one number; samples fall on multiples of dt."""
+    marks = CHECKED * checked + LOGGED * logged + SAMPLED * (checked & due) + JOINED * joined
+    return marks.astype(np.int8)
+
+
+def _tables(cell: Cell, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Desired motion, (3, T, n, 3, m), and weights at the instants of three stages, (3, T).
+
+    Every motion is asked once and goes straight to its place: what a step costs does not grow with n.
+    """
+    flat = instants.ravel()
+    desired = np.empty((flat.size, cell.n, 3, cell.m))
+    for i in range(cell.n):
+        for k, part in enumerate(cell.motion(i, flat)):
+            desired[:, i, k] = part
+    parts = cell.weights(flat[:1] if cell.coupling.is_constant else flat)
+    return desired, np.stack(parts, axis=2)  # as one row of instants after the other

@@ -1,0 +1,168 @@
+"""Kind: what equal robots share in generated code."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from ..control.controller import Controller
+from ..errors import InputError
+from ..robots.friction_parameters import FrictionParameters
+from ..robots.mechanism import Mechanism, mechanism
+from ..tasks.pose import PoseSpace
+from ..tasks.spaces import CartesianSpace
+from .lawful import TracedLaw, trace_law
+from .learning import Learning, trace_learning
+
+
+@dataclass(frozen=True, eq=False)
+class Kind:
+    """What equal robots share; everything else is an input of the generated functions.
+
+    Attributes:
+        fixed: the mechanism.
+        space: "joint", "position" or "pose".
+        rows: which of x, y, z a position has.
+        matrix: map from theta to inertial parameters, (10 bodies, P), or None for all of them.
+        base_rotation: rotation of the first joint's placement if all robots share it, else None.
+        reference_acceleration, k_r_space: options of the controller.
+        smoothing: velocity at which adapted Coulomb friction reaches tanh(1), or None without it.
+        rotors: whether rotors are adapted too.
+        made_of: names of the types that the user has plugged in.
+        learning: how it learns, or None for (14).
+        law: what it does, or None for `SunMills`.
+    """
+
+    fixed: Mechanism
+    space: str
+    rows: tuple[int, ...]
+    matrix: np.ndarray | None
+    base_rotation: np.ndarray | None
+    gravity: tuple[float, float, float]
+    reference_acceleration: str
+    k_r_space: str
+    smoothing: float | None = None
+    rotors: bool = False
+    made_of: tuple[str, ...] = ()
+    learning: Learning | None = None
+    law: TracedLaw | None = None
+
+    @property
+    def nv(self) -> int:
+        """Number of joints."""
+        return len(self.fixed.joints)
+
+    @property
+    def m(self) -> int:
+        """Dimension of the task."""
+        return {"joint": self.nv, "position": len(self.rows), "pose": 6}[self.space]
+
+    @property
+    def parameters(self) -> int:
+        """Number of adapted parameters."""
+        rub = 0 if self.smoothing is None else (2 + self.rotors) * self.nv
+        return self.rigid_parameters + rub
+
+    @property
+    def rigid_parameters(self) -> int:
+        """Number of adapted parameters of the rigid bodies; they come first."""
+        return 10 * self.nv if self.matrix is None else self.matrix.shape[1]
+
+    @property
+    def learned(self) -> int:
+        """Number of entries of the adaptation's state."""
+        return self.parameters if self.learning is None else self.learning.size
+
+    @property
+    def redundant(self) -> bool:
+        """Whether there are more joints than task coordinates."""
+        return self.nv > self.m
+
+    def key(self) -> list[Any]:
+        """Plain data that is equal for robots of one kind."""
+        shared = None if self.base_rotation is None else self.base_rotation.tolist()
+        matrix = None if self.matrix is None else self.matrix.tolist()
+        options: list[Any] = [self.reference_acceleration, self.k_r_space, list(self.gravity)]
+        options += [self.smoothing, self.rotors, list(self.made_of)]
+        options += [None if part is None else part.key() for part in (self.learning, self.law)]
+        return [self.fixed.key(), self.space, list(self.rows), matrix, shared, options]
+
+
+class Classified(NamedTuple):
+    """The robots of a cell, sorted.
+
+    Attributes:
+        kinds: the kinds of robots there are.
+        kind_of: which one each robot is, (n,).
+        bases: placement of the first joint of each robot, (n,).
+    """
+
+    kinds: list[Kind]
+    kind_of: list[int]
+    bases: list[pin.SE3]
+
+
+def classify(controller: Controller) -> Classified:
+    """The kinds of robots in a cell of known parts, see `check_known`.
+
+    Raises:
+        InputError: the cell uses something the compiled engine does not have.
+    """
+    found = [mechanism(robot) for robot in controller.cell.robots]
+    names = [repr(fixed.key()) for fixed, _ in found]
+    rotations: dict[str, set[bytes]] = {}
+    for name, (_, base) in zip(names, found, strict=True):
+        rotations.setdefault(name, set()).add((base.rotation + 0.0).tobytes())  # -0 counts as 0
+    kinds: dict[str, Kind] = {}
+    index, learning, laws = [], trace_learning(controller), trace_law(controller)
+    for i, (name, (fixed, base)) in enumerate(zip(names, found, strict=True)):
+        same = len(rotations[name]) == 1
+        kind = _kind(controller, i, fixed, base.rotation if same else None, learning[i], laws[i])
+        key = repr(kind.key())
+        kinds.setdefault(key, kind)
+        index.append(list(kinds).index(key))
+    return Classified(list(kinds.values()), index, [base for _, base in found])
+
+
+def _kind(
+    controller: Controller,
+    i: int,
+    fixed: Mechanism,
+    rotation: np.ndarray | None,
+    learning: Learning | None,
+    law: TracedLaw | None,
+) -> Kind:
+    cell, parameters = controller.cell, controller.cell.parameters[i]
+    rigid: Any = parameters.base if isinstance(parameters, FrictionParameters) else parameters
+    gravity = cell.robots[i].gravity_vector
+    space, rows = _space(controller)
+    return Kind(
+        fixed,
+        space,
+        rows,
+        getattr(rigid, "matrix", None),
+        rotation,
+        (float(gravity[0]), float(gravity[1]), float(gravity[2])),
+        controller.reference_acceleration,
+        controller.k_r_space,
+        getattr(parameters, "smoothing", None),
+        getattr(parameters, "armature", False),
+        tuple(type(part).__qualname__ for part in (cell.space, parameters, rigid)),
+        learning,
+        law,
+    )
+
+
+def _space(controller: Controller) -> tuple[str, tuple[int, ...]]:
+    space: Any = controller.cell.space
+    if getattr(space, "damping", None) is not None:
+        raise InputError(
+            "engine='compiled' does not damp singular configurations; use singularity='stop', or "
+            "engine='pinocchio'"
+        )
+    if type(space) is CartesianSpace:
+        return "position", tuple(space.rows)
+    return ("pose", ()) if type(space) is PoseSpace else ("joint", ())

@@ -1,0 +1,256 @@
+"""What generated code stands for, told apart from what a user has replaced.
+
+The compiled engine does not call Python objects, it runs equations that were traced before. It may do so only
+for objects of exactly the package's own types, with exactly their methods: what else a user has plugged in is
+refused by name, even a subclass that changes nothing of importance, for else it would silently run as its
+base. Desired motions, weights and disturbances may be anything: they are called, and tabulated.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from functools import cache
+from types import FunctionType, MethodType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..control import commands, law, structure
+from ..control.adaptation.gradient import BoundGradient
+from ..control.commands import REFERENCE_ACCELERATIONS, Composed, ConstantWeights
+from ..control.controller import Controller
+from ..control.folded import FoldedWeights
+from ..control.gains import Gains
+from ..control.laws.sun_mills import BoundSunMills
+from ..control.network import BoundIdeal
+from ..coupling.cell import Cell
+from ..coupling.coupling import Coupling
+from ..errors import InputError
+from ..robots.base_parameters import BaseParameters
+from ..robots.friction_parameters import FrictionParameters
+from ..robots.parameters import FullParameters, LinearParameters
+from ..robots.robot import Robot
+from ..simulation.closed_loop import ClosedLoop
+from ..simulation.payloads import PayloadSchedule
+from ..simulation.plant import Plant
+from ..tasks.pose import BoundPoseSpace, PoseSpace
+from ..tasks.redundancy import DampedInverse, Inverse, Pseudoinverse, Redundancy
+from ..tasks.spaces import BoundCartesianSpace, BoundJointSpace, CartesianSpace, JointSpace
+from ..tasks.tips import Tips
+
+WAY_OUT = "use engine='pinocchio'"
+
+SPACES = (JointSpace, CartesianSpace, PoseSpace)
+BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace)
+RIGID = (FullParameters, LinearParameters, BaseParameters)
+INVERSES = (Inverse, Pseudoinverse, DampedInverse)
+WAYS = (FoldedWeights, ConstantWeights, Composed)
+
+
+#: modules whose functions a controller calls, beside those of its parts
+LINES = (law, commands, structure)
+
+
+class Part(NamedTuple):
+    """A part of a closed loop: what it is, the object, and the types that generated code stands for."""
+
+    role: str
+    value: Any
+    known: tuple[type, ...]
+
+
+def check_known(loop: ClosedLoop) -> None:
+    """Refuse a closed loop with a part that generated code does not stand for.
+
+    Args:
+        loop: controller and plant of a cell.
+
+    Raises:
+        InputError: naming the part, its class, and the way out.
+    """
+    for part in _parts(loop):
+        _check_type(part)
+        _check_own_methods(part)
+    _check_controller(loop.controller)
+    _check_plant(loop)
+
+
+def check_untouched(loop: ClosedLoop) -> None:
+    """Refuse to compile, or to take from the cache, what somebody has exchanged in the package itself.
+
+    Raises:
+        InputError: naming the method or function, what was put in its place, and the way out.
+    """
+    for kind in {type(part.value) for part in _parts(loop)}:
+        _check_class(kind)
+    for role, name, function, module in _functions(loop):
+        if not _belongs(name, function, module):
+            raise _replaced(role, function)
+
+
+# -- internals --------------------------------------------------------------------------------------------
+
+
+def _parts(loop: ClosedLoop) -> Iterator[Part]:
+    controller, cell = loop.controller, loop.controller.cell
+    task: Any = cell.task
+    yield Part("closed loop", loop, (ClosedLoop,))
+    yield Part("plant", loop.plant, (Plant,))
+    yield Part("schedule of payloads", loop.plant.schedule, (PayloadSchedule,))
+    yield Part("controller", controller, (Controller,))
+    if isinstance(controller.law, BoundSunMills):  # others are traced
+        yield Part("law", controller.law, (BoundSunMills,))
+    yield Part("network", controller.network, (BoundIdeal,))
+    yield Part("law of the controller", controller._command, WAYS)
+    if isinstance(controller.adaptation, BoundGradient):  # others are traced
+        yield Part("adaptation", controller.adaptation, (BoundGradient,))
+    yield Part("gains", controller.gains, (Gains,))
+    yield Part("cell", cell, (Cell,))
+    yield Part("coupling", cell.coupling, (Coupling,))
+    yield Part("space", cell.space, SPACES)
+    yield Part("space bound to the robots", task, BOUND)
+    if not isinstance(cell.space, JointSpace):
+        space: Any = cell.space
+        yield Part("redundancy", space.redundancy, (Redundancy,))
+        yield Part("tips of the robots", task._tips, (Tips,))
+        yield Part("way from the task to the joints", task._inverse, INVERSES)
+    for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True):
+        yield Part(f"model of {name}", robot, (Robot,))
+        yield Part(f"parameters of {name}", parameters, (*RIGID, FrictionParameters))
+        if type(parameters) is FrictionParameters:
+            yield Part(f"parameters of {name} without friction", parameters.base, RIGID)
+
+
+def _functions(loop: ClosedLoop) -> Iterator[tuple[str, str, Any, str]]:
+    """Functions that generated code was traced from: role, name, function, and the module it was found in."""
+    bases = {base for part in _parts(loop) for base in type(part.value).__mro__}
+    ours = {base.__module__ for base in bases if _is_ours(base.__module__)}
+    for module in sorted(ours | {each.__name__ for each in LINES}):
+        for name, function in vars(sys.modules[module]).items():
+            if callable(function) and name[0].islower() and not isinstance(function, type):
+                yield f"function '{name}' of {module}", name, function, module
+    acceleration = REFERENCE_ACCELERATIONS[loop.controller.reference_acceleration]
+    yield "reference acceleration", "", acceleration, law.__name__
+
+
+def _belongs(name: str, function: Any, module: str) -> bool:
+    """Whether a function is of this module, or was imported into it from another of ours or of Python's."""
+    home = _home(function)
+    if home == module:
+        return True
+    imported = _is_ours(home) and getattr(sys.modules.get(home), function.__name__, None) is function
+    return imported or home.partition(".")[0] in sys.stdlib_module_names
+
+
+def _home(function: Any) -> str:
+    """The module in which a function was written: unlike its `__module__`, wrappers do not copy it."""
+    if hasattr(function, "cache_info"):  # kept results: the function is inside
+        return _home(function.__wrapped__)
+    return str(getattr(function, "__globals__", {}).get("__name__", ""))
+
+
+def _is_ours(module: str) -> bool:
+    return module.partition(".")[0] == __name__.partition(".")[0]
+
+
+def _check_type(part: Part) -> None:
+    if type(part.value) not in part.known:
+        names = ", ".join(known.__name__ for known in part.known)
+        raise InputError(
+            f"engine='compiled' does not have the {part.role} {_name(type(part.value))}, only {names} and no "
+            f"subclass: its equations were compiled before; {WAY_OUT}"
+        )
+
+
+def _check_own_methods(part: Part) -> None:
+    """Refuse an object that has a method of its own in place of its class's."""
+    kind: Any = type(part.value)
+    own, methods = vars(part.value), _methods(kind)
+    if not methods.isdisjoint(own):
+        name = next(name for name in own if name in methods)
+        raise _replaced(f"{part.role}, {kind.__name__}.{name}", own[name])
+
+
+def _check_class(kind: type) -> None:
+    """Refuse a class of the package into which somebody has put another method."""
+    for base in kind.__mro__[:-1]:
+        for name, value in vars(base).items():
+            function = _unwrapped(value)
+            if (
+                callable(function)
+                and _home(function) != base.__module__
+                and (name == "__call__" or not name.startswith("__"))
+            ):
+                raise _replaced(f"{base.__name__}.{name}", function)
+
+
+def _check_controller(controller: Controller) -> None:
+    """Refuse a controller whose parts no longer say what it does: it made some of them into others."""
+    damping = controller._joint_damping if controller.k_r_space == "joint" else controller._task_damping
+    if controller._damping != damping:
+        raise _replaced("damping of the controller", controller._damping)
+    _check_law(controller)
+    for name in ("Lambda", "beta", "K_eps"):
+        then = getattr(controller.gains, name)
+        own = [part for part in (controller, controller.law) if isinstance(part, (Controller, BoundSunMills))]
+        if any(_changed(getattr(part, name), then, controller.cell.m) for part in own):
+            raise InputError(
+                f"engine='compiled' does not have a controller whose {name} was changed after its law was "
+                f"made of it; make another one of changed gains, or {WAY_OUT}"
+            )
+
+
+def _check_law(controller: Controller) -> None:
+    """Refuse a controller that has got another law than the one that its commands come from."""
+    way: Any = controller._command
+    if type(way) is Composed:
+        same = way.law is controller.law and way.network is controller.network
+    else:
+        same = type(controller.law) is BoundSunMills
+    if not same:
+        raise _replaced("law", controller.law)
+
+
+def _changed(now: Any, then: np.ndarray, m: int) -> bool:
+    return np.shape(now) != (m,) or not bool((now == then).all())
+
+
+def _check_plant(loop: ClosedLoop) -> None:
+    plant, robots = loop.plant, loop.controller.cell.robots
+    special = {
+        f"plant='{plant.physics}'": plant.physics != "pinocchio",
+        "a plant with a state of its own": plant.hidden0.size > 0,
+        "a plant with other robots than the cell": list(map(id, plant.schedule.free))
+        != list(map(id, robots)),
+    }
+    for name in (name for name, found in special.items() if found):
+        raise InputError(f"engine='compiled' does not have {name}; {WAY_OUT}")
+
+
+def _replaced(role: str, function: Any) -> InputError:
+    return InputError(
+        f"engine='compiled' does not have the {role} that was replaced by {_name(function)}: its equations "
+        f"were compiled before; {WAY_OUT}"
+    )
+
+
+def _name(thing: Any) -> str:
+    """What a class or function is called, with its module."""
+    kind = thing if hasattr(thing, "__qualname__") else type(thing)
+    return f"{kind.__module__}.{kind.__qualname__}"
+
+
+@cache
+def _methods(kind: Any) -> frozenset[str]:
+    """Names of the methods and computed attributes of a class, without those that are kept once computed."""
+    return frozenset(
+        name
+        for name in dir(kind)
+        if isinstance(getattr(kind, name, None), (FunctionType, MethodType, property))
+    )
+
+
+def _unwrapped(method: Any) -> Any:
+    """The function of a method."""
+    return getattr(method, "fget", None) or getattr(method, "__func__", method)

@@ -1,0 +1,220 @@
+"""A small closed loop with one robot of each kind: there generated code is compared with Pinocchio.
+
+What is compared belongs to the code, not to the cell: generated functions take gains, weights, desired motion
+and placement as inputs. So the specimen stands near the origin, where world axes cost no digits, has weights,
+gains and motions of its own, and asks nothing of what a user has plugged in. It grows with the number of
+kinds, not of robots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..control.adaptation.gradient import BoundGradient
+from ..control.controller import Controller
+from ..control.gains import Gains
+from ..control.laws import Law, SunMills
+from ..control.laws.sun_mills import BoundSunMills
+from ..coupling.cell import Cell, Member, Reference
+from ..coupling.coupling import Coupling
+from ..coupling.weights import Weights
+from ..robots.friction import Friction
+from ..robots.friction_parameters import FrictionParameters
+from ..robots.parameters import FullParameters, LinearParameters, Parameters
+from ..robots.robot import Robot
+from ..simulation.closed_loop import ClosedLoop
+from ..simulation.plant import Plant
+from ..tasks.pose import PoseSpace
+from ..tasks.redundancy import Redundancy
+from ..tasks.spaces import CartesianSpace, JointSpace, Space
+from ..tasks.trajectories import Hold
+from .chosen import Chosen
+from .kind import Classified
+from .lawful import ChosenLaw
+
+#: robots at least: with three in a ring, each is in two pairs, and each pair leaves one out
+ROBOTS = 3
+#: where the first joint of each robot is, m
+PLACE = (0.3, -0.2, 0.1)
+#: how far from the desired pose the robots are, m and rad: small errors, and some that are not
+DISTANCES = (0.1, 0.8, 1.6)
+#: configurations that are tried for one that is not close to a singular one
+TRIES = 20
+#: condition number above which all of them are
+SINGULAR = 1e6
+
+
+class Case(NamedTuple):
+    """Something at which two ways to compute y' can be compared."""
+
+    reference: Reference
+    y: np.ndarray
+    disturbance: np.ndarray
+
+
+class Specimen:
+    """A small closed loop for the kinds of a larger one.
+
+    Args:
+        loop: the larger one.
+        classified: its kinds.
+
+    Attributes:
+        loop: the small one.
+        index: which kind each of its robots is.
+    """
+
+    def __init__(self, loop: ClosedLoop, classified: Classified):
+        self._rng = np.random.default_rng(0)
+        count = len(classified.kinds)
+        self.index = [k % count for k in range(max(ROBOTS, count))]
+        chosen = [_most_turned(classified, k) for k in range(count)]
+        members = [_member(loop.controller.cell, chosen[k]) for k in self.index]
+        self.loop = self._loop(loop.controller, members, [chosen[k] for k in self.index])
+
+    def cases(self) -> Iterator[Case]:
+        """What to compare at; nothing if a robot is singular everywhere, and cannot run."""
+        cell = self.loop.cell
+        for distance in DISTANCES:
+            q = np.zeros((cell.n, cell.nv))
+            for i, robot in enumerate(cell.robots):
+                q[i, : robot.nv], condition = self._configuration(robot)
+                if condition > SINGULAR:
+                    return
+            y = self._state(q)
+            reference = Reference(self._desired(q, distance), self._weights())
+            yield Case(reference, y, self._random(cell.n, cell.nv) * self._joints())
+
+    # -- the loop -----------------------------------------------------------------------------------------
+
+    def _loop(self, original: Controller, members: Sequence[Member], robots: Sequence[int]) -> ClosedLoop:
+        n, m = len(members), original.cell.m
+        coupling = Coupling.signed_ring(n, lambda t: tuple(self._moving(n, m)))
+        coupling = coupling.weighted(self._positive(n))
+        cell = Cell(members, coupling, self._space(original.cell.space, [x.robot for x in members]))
+        gains = self._gains(cell, original.k_r_space)
+        adaptation: Any = None
+        if not isinstance(original.adaptation, BoundGradient):
+            theta = original.cell.theta
+            adaptation = Chosen(original.adaptation, robots, original.cell.nv, theta.shape[1])
+            gains = gains.replace(Gamma=None)
+        controller = Controller(
+            cell,
+            gains,
+            adaptation=adaptation,
+            law=_law(original, robots),
+        )
+        return ClosedLoop(controller, Plant(cell))
+
+    def _space(self, space: Space, robots: Sequence[Robot]) -> Space:
+        if isinstance(space, JointSpace):
+            return JointSpace()
+        posture = [self._random(robot.nv) for robot in robots]
+        weights = [self._positive(robot.nv) for robot in robots]
+        redundancy = Redundancy(posture, 0.7, weights)
+        if isinstance(space, CartesianSpace):
+            return CartesianSpace(space.axes, redundancy=redundancy)
+        return PoseSpace(redundancy=redundancy)
+
+    def _gains(self, cell: Cell, k_r_space: str) -> Gains:
+        columns = cell.nv if k_r_space == "joint" else cell.m
+        Lambda, beta, K_eps = self._positive(3, cell.m)
+        return Gains(Lambda, beta, self._positive(cell.n, columns), K_eps, self._positive(*cell.theta.shape))
+
+    # -- what it is asked ---------------------------------------------------------------------------------
+
+    def _configuration(self, robot: Robot) -> tuple[np.ndarray, float]:
+        """Joint positions of a robot, and how close to a singular configuration they are."""
+        space: Any = self.loop.cell.space
+        tried = self._rng.uniform(-1.5, 1.5, (TRIES, robot.nv))
+        if isinstance(space, JointSpace):
+            return tried[0], 1.0
+        rows = getattr(space, "rows", slice(None))
+        conditions = np.linalg.cond(np.stack([robot.jacobian(q)[rows] for q in tried]))
+        best = int(np.argmin(conditions))
+        return tried[best], float(conditions[best])
+
+    def _state(self, q: np.ndarray) -> np.ndarray:
+        y = self._random(self.loop.size)
+        state, cell = self.loop.state(y), self.loop.cell
+        state.q[...], known = q, np.zeros(cell.theta.shape)
+        state.v[...] *= self._joints()
+        for row, parameters in zip(known, cell.parameters, strict=True):
+            row[: len(parameters.theta)] = 1
+        if isinstance(self.loop.controller.adaptation, BoundGradient):
+            state.z[...] = known * (cell.theta + 0.1 * state.z)
+        else:
+            state.z[...] = self.loop.controller.adaptation.start() * (1 + 0.1 * state.z)
+        return y
+
+    def _desired(self, q: np.ndarray, distance: float) -> np.ndarray:
+        """A desired motion that begins at a distance from where the robots are."""
+        cell = self.loop.cell
+        desired = self._random(3, cell.n, cell.m)
+        offset = distance * desired[0] / np.linalg.norm(desired[0], axis=1, keepdims=True)
+        zero = np.zeros_like(desired)
+        desired[0] = cell.task.measure(np.stack((q, np.zeros_like(q))), zero).x + offset
+        return desired
+
+    def _weights(self) -> Weights:
+        c, c_dot, c_ddot = self._moving(self.loop.cell.n, self.loop.cell.m)
+        return Weights(c, c_dot, c_ddot, np.linalg.inv(c))
+
+    def _moving(self, n: int, m: int) -> np.ndarray:
+        """Full weights that have an inverse, and rates of any kind, (3, n, m, m)."""
+        weights = 0.3 / m * self._random(3, n, m, m)
+        weights[0] += np.eye(m)
+        return weights
+
+    def _joints(self) -> np.ndarray:
+        """1 for joints that a robot has, else 0, (n, nv)."""
+        cell = self.loop.cell
+        counts = np.array([robot.nv for robot in cell.robots])
+        return (np.arange(cell.nv) < counts[:, None]).astype(float)
+
+    def _random(self, *shape: int) -> np.ndarray:
+        return self._rng.standard_normal(shape)
+
+    def _positive(self, *shape: int) -> np.ndarray:
+        return self._rng.uniform(0.5, 2.0, shape)
+
+
+def _most_turned(classified: Classified, kind: int) -> int:
+    """The robot of a kind whose base is turned furthest: where code could forget to turn it, it shows."""
+    robots = [i for i, found in enumerate(classified.kind_of) if found == kind]
+    return min(robots, key=lambda i: float(np.trace(classified.bases[i].rotation)))
+
+
+def _law(original: Controller, robots: Sequence[int]) -> Law:
+    """The paper's law with the same options, or the law of the larger cell for some of its robots."""
+    if type(original.law) is BoundSunMills:
+        return SunMills(original.reference_acceleration, original.k_r_space)
+    return ChosenLaw(original, robots)
+
+
+def _member(cell: Cell, i: int) -> Member:
+    """Robot i with parameters of the same kind, but with the first joint near the origin."""
+    robot = Robot(cell.robots[i].model, cell.robots[i].tip, name=cell.names[i])
+    first = next(j for j in range(1, robot.model.njoints) if robot.model.parents[j] == 0)
+    robot = robot.placed(PLACE - robot.model.jointPlacements[first].translation)
+    friction = Friction(0.3, 0.2, getattr(cell.parameters[i], "smoothing", 0.01))
+    return Member(
+        robot,
+        Hold(np.zeros(cell.m)),
+        q0=np.zeros(robot.nv),
+        parameters=_parameters(cell.parameters[i], robot, friction),
+        friction=friction,
+    )
+
+
+def _parameters(parameters: Parameters, robot: Robot, friction: Friction) -> Parameters:
+    """Parameters of the same kind for a robot that differs in place."""
+    if isinstance(parameters, FrictionParameters):
+        base = _parameters(parameters.base, robot, friction)
+        return FrictionParameters(robot, friction, base, parameters.armature)
+    if isinstance(parameters, LinearParameters):
+        return LinearParameters(robot, parameters.matrix, parameters.theta, parameters.names)
+    return FullParameters(robot)

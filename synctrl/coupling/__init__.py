@@ -1,0 +1,1 @@
+"""Who is compared with whom: couplings, their weights, and the cells that need both robots and a coupling."""

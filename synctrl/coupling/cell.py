@@ -1,0 +1,232 @@
+"""A cell: robots, each with its desired motion, in one task space and under one coupling."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from math import nan
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..checks import finite_array, instance
+from ..errors import InputError
+from ..robots.friction import Friction
+from ..robots.parameters import Parameters
+from ..robots.robot import Robot
+from ..tasks.spaces import JointSpace, Space
+from ..tasks.trajectories import Motion, Trajectory
+from .coupling import Coupling
+from .desired import desired_motion, desired_weights
+from .member_checks import check_friction, check_labels, check_names, check_space, check_trajectory
+from .member_parameters import member_parameters
+from .weights import Weights
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """One robot of a cell and what it starts from.
+
+    Args:
+        robot: the robot, placed in the world.
+        trajectory: its desired motion in the cell's space.
+        q0: joint positions at t = 0, (nv,), rad. In joint space, by default, on the path.
+        v0: joint velocities at t = 0, (nv,), rad/s; by default at rest.
+        parameters: what is adapted, or its name: "full", all inertial parameters, by default; "base", the
+            fewest that give the same torques. Their true values have to be those of this robot, as it is
+            placed, and of this friction.
+        theta_hat0: estimate at t = 0, (P,); by default zeros, which is to know nothing.
+        friction: friction of the true plant, which the controller does not know, unless what is adapted are
+            `FrictionParameters`; by default none.
+        name: for legends and messages.
+    """
+
+    robot: Robot
+    trajectory: Trajectory
+    q0: ArrayLike | None = None
+    v0: ArrayLike | None = None
+    parameters: Parameters | str | None = None
+    theta_hat0: ArrayLike | None = None
+    friction: Friction = field(default_factory=Friction)
+    name: str | None = None
+
+    @property
+    def theta(self) -> np.ndarray:
+        """True values of what is adapted, (P,), of which `theta_hat0` is an estimate.
+
+        Raises:
+            InputError: parameters that do not describe the robot and its friction.
+        """
+        return member_parameters(self.name or "robot", self.robot, self.friction, self.parameters).theta
+
+
+@dataclass(slots=True)
+class Reference:
+    """What is desired at one instant, or with a leading axis of time at several.
+
+    Attributes:
+        desired: xd, xd' and xd'', (3, n, m).
+        weights: c, c', c'' and c^-1, each (n, m, m).
+        t: the instant, s, or all of them, (T,); NaN where nobody asks.
+    """
+
+    desired: np.ndarray
+    weights: Weights
+    t: Any = nan
+
+    xd = property(lambda self: self.desired[..., 0, :, :])
+    xd_dot = property(lambda self: self.desired[..., 1, :, :])
+    xd_ddot = property(lambda self: self.desired[..., 2, :, :])
+    c = property(lambda self: self.weights.c)
+    c_dot = property(lambda self: self.weights.c_dot)
+    c_ddot = property(lambda self: self.weights.c_ddot)
+    c_inv = property(lambda self: self.weights.c_inv)
+
+
+class Cell:
+    """n robots that perform one task.
+
+    Robots with fewer joints or parameters than the largest have their rows padded with zeros.
+
+    Args:
+        members: the robots, at least two.
+        coupling: which of them are compared.
+        space: where the task is given; joint space by default.
+        name: for titles.
+
+    Raises:
+        InputError: sizes that do not fit together; the message names the member.
+        CouplingError: a coupling for another number of robots.
+    """
+
+    def __init__(
+        self, members: Sequence[Member], coupling: Coupling, space: Space | None = None, name: str = "cell"
+    ):
+        instance("members", members, Iterable, "Member objects")
+        self.members = tuple(members)
+        self.coupling = coupling
+        self.space = JointSpace() if space is None else space
+        self.name = name
+        for member in self.members:
+            instance("members", member, Member, "Member objects")
+            instance("robot", member.robot, Robot, "a Robot, for example from load_robot")
+        instance("coupling", coupling, Coupling, "a Coupling")
+        if coupling.robots != len(self.members):
+            raise InputError(
+                f"coupling: made for {coupling.robots} robots, but the cell has {len(self.members)}"
+            )
+        self.robots = tuple(member.robot for member in self.members)
+        self.names = tuple(m.name or f"robot {i}" for i, m in enumerate(self.members, start=1))
+        check_names(name, self.names)
+        check_space(self.space)
+        self.labels = self.space.labels(self.robots)
+        self.task = self.space.bind(self.robots)
+        self._check_members()
+        self._set_parameters()
+        self._set_initial_state()
+        check_labels(self)
+
+    # -- sizes --------------------------------------------------------------------------------------------
+
+    @property
+    def n(self) -> int:
+        """Number of robots."""
+        return len(self.members)
+
+    @property
+    def m(self) -> int:
+        """Dimension of the task."""
+        return len(self.labels)
+
+    @property
+    def nv(self) -> int:
+        """Largest number of joints."""
+        return max(robot.nv for robot in self.robots)
+
+    @property
+    def weighted_unit(self) -> str:
+        """Unit of c e, and so of the synchronization errors."""
+        unit = self.coupling.unit
+        return {"": self.space.unit, self.space.unit: f"{unit}²"}.get(unit, f"{unit}·{self.space.unit}")
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Instants at which a desired motion is not smooth, s."""
+        return tuple(sorted({b for m in self.members for b in m.trajectory.breaks}))
+
+    # -- desired motion -----------------------------------------------------------------------------------
+
+    def reference_table(self, times: np.ndarray) -> Reference:
+        """What is desired at all of the times, (T,), with time as the first axis."""
+        times = np.asarray(times, dtype=float)
+        motions = np.stack([self.motion(i, times) for i in range(self.n)])  # (n, 3, T, m)
+        return Reference(motions.transpose(2, 1, 0, 3), self.weights(times), times)
+
+    def motion(self, robot: int, times: np.ndarray) -> Motion:
+        """What is desired of one robot at the times, (T,); see `desired_motion`."""
+        return desired_motion(self.names[robot], robot, self.members[robot].trajectory, times)
+
+    def weights(self, times: np.ndarray) -> Weights:
+        """Weights of the coupling at the times, (T,); see `desired_weights`."""
+        return desired_weights(self.coupling, times, self.m)
+
+    def references(self, times: np.ndarray) -> list[Reference]:
+        """What is desired at each of the times, (T,)."""
+        return list(self.instants(self.reference_table(times)))
+
+    def instants(self, table: Reference, part: slice = slice(None)) -> Iterator[Reference]:
+        """The instants in a part of a table, one after another."""
+        desired, times = np.ascontiguousarray(table.desired[part]), table.t[part].tolist()
+        if self.coupling.is_constant:
+            constant = Weights(*(weight[0] for weight in table.weights))
+            return (Reference(row, constant, t) for row, t in zip(desired, times, strict=True))
+        rows = zip(desired, times, *(weight[part] for weight in table.weights), strict=True)
+        return (Reference(row, Weights(*weights), t) for row, t, *weights in rows)
+
+    # -- internals ----------------------------------------------------------------------------------------
+
+    def _set_parameters(self) -> None:
+        self.parameters = tuple(
+            member_parameters(name, member.robot, member.friction, member.parameters)
+            for name, member in zip(self.names, self.members, strict=True)
+        )
+        self.theta = _pad([p.theta for p in self.parameters])
+
+    def _set_initial_state(self) -> None:
+        q0, v0, theta_hat0 = [], [], []
+        for name, member, parameters in zip(self.names, self.members, self.parameters, strict=True):
+            nv = member.robot.nv
+            q0.append(finite_array(f"{name}, q0", self._start(name, member), (nv,)))
+            v0.append(finite_array(f"{name}, v0", np.zeros(nv) if member.v0 is None else member.v0, (nv,)))
+            size = len(parameters.theta)
+            guess = np.zeros(size) if member.theta_hat0 is None else member.theta_hat0
+            theta_hat0.append(finite_array(f"{name}, theta_hat0", guess, (size,)))
+        self.q0, self.v0, self.theta_hat0 = _pad(q0), _pad(v0), _pad(theta_hat0)
+
+    def _start(self, name: str, member: Member) -> ArrayLike:
+        if member.q0 is not None:
+            return member.q0
+        if isinstance(self.space, JointSpace):
+            return member.trajectory(0.0).x
+        raise InputError(f"{name}, q0: expected joint positions to start from, found none")
+
+    def _check_members(self) -> None:
+        for name, member in zip(self.names, self.members, strict=True):
+            check_trajectory(name, member.trajectory, self.labels)
+            check_friction(name, member.friction, member.robot)
+
+    def __reduce__(self) -> tuple:
+        """Copies and other processes bind the space anew: arrays that share memory would come apart."""
+        return type(self), (self.members, self.coupling, self.space, self.name)
+
+    def __repr__(self) -> str:
+        return f"Cell('{self.name}', {self.n} robots, {self.space!r}, {self.coupling!r})"
+
+
+def _pad(rows: Sequence[np.ndarray]) -> np.ndarray:
+    """Rows of different lengths as one array, filled up with zeros."""
+    padded = np.zeros((len(rows), max(len(row) for row in rows)))
+    for target, row in zip(padded, rows, strict=True):
+        target[: len(row)] = row
+    return padded

@@ -1,0 +1,85 @@
+"""Do velocity and acceleration of a desired motion belong to its position? Checked before anything runs."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from itertools import pairwise
+
+import numpy as np
+
+from ..checks import finite_array
+from ..errors import InputError, SimulationError, TrajectoryError
+from ..tasks.derivatives import Displacement, Misfit, difference, find_misfit, look_at
+from ..tasks.spaces import units_of
+from ..tasks.trajectories import Motion
+from .cell import Cell
+
+PARTS = ("position", "velocity", "acceleration")
+
+
+def check_motions(cell: Cell, times: np.ndarray) -> None:
+    """Compare the derivatives of all desired motions with differences, between their breaks.
+
+    In `PoseSpace` the velocity is the angular velocity w of R' = [w] R: a space says by its `displacement`
+    which way leads from one position to another, if its velocities are no derivatives of its coordinates.
+    Coordinates of one unit side by side are taken together.
+
+    Args:
+        cell: the robots and what is desired of them.
+        times: instants of the run, (T,), s.
+
+    Raises:
+        TrajectoryError: a derivative that is off by more than 2 % of its largest value. The message names the
+            robot, the derivative, the time and both values.
+    """
+    start, stop = float(times[0]), float(times[-1])
+    count = int(np.clip(1000 // cell.n, 4, 24))
+    for robot in range(cell.n):
+        with suppress(SimulationError):  # a motion that fails ends the run, which hands over what it has
+            _check_motion(cell, robot, start, stop, count)
+
+
+def _check_motion(cell: Cell, robot: int, start: float, stop: float, count: int) -> None:
+    windows = look_at(start, stop, cell.members[robot].trajectory.breaks, count)
+    groups = _groups(units_of(cell.space, cell.m))
+    way = getattr(cell.space, "displacement", difference)
+    largest = np.abs(_motion(cell, robot, windows.start).x).max()
+    ways: tuple[Displacement, Displacement] = (way, difference)
+    for order, displacement in enumerate(ways):
+
+        def sample(t: np.ndarray, order: int = order) -> tuple[np.ndarray, np.ndarray]:
+            motion = _motion(cell, robot, t)
+            return motion[order], motion[order + 1]
+
+        misfit = find_misfit(sample, windows, groups, order * largest / stop, displacement)
+        if misfit is not None:
+            raise _error(cell, cell.names[robot], order, misfit)
+
+
+def _groups(units: tuple[str, ...]) -> list[slice]:
+    """Coordinates of one unit that stand side by side."""
+    borders = [0, *(k for k in range(1, len(units)) if units[k] != units[k - 1]), len(units)]
+    return [slice(a, b) for a, b in pairwise(borders)]
+
+
+def _motion(cell: Cell, robot: int, times: np.ndarray) -> Motion:
+    """The motion at some times, known to be numbers."""
+    try:
+        parts = zip(PARTS, cell.motion(robot, times), strict=True)
+        return Motion(*(finite_array(part, value, (len(times), cell.m)) for part, value in parts))
+    except InputError as error:
+        name, end = cell.names[robot], times.max()
+        raise TrajectoryError(f"{name}, trajectory, {error}, between t = 0 s and {end:g} s") from None
+
+
+def _error(cell: Cell, name: str, order: int, misfit: Misfit) -> TrajectoryError:
+    label = cell.labels[misfit.coordinate]
+    unit = units_of(cell.space, cell.m)[misfit.coordinate]
+    per = ("/s", "/s^2")[order]
+    function, derivative = PARTS[order : order + 2]
+    return TrajectoryError(
+        f"{name}, trajectory: its {derivative} along {label} does not fit its {function}: near "
+        f"t = {misfit.time:.6g} s found {misfit.found:.6g} {unit}{per}, but the {function} changes by "
+        f"{misfit.expected:.6g} {unit}{per}; expected its derivative, which SmoothTrajectory finds by "
+        "itself, or `breaks` where it jumps"
+    )

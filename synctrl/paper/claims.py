@@ -1,0 +1,168 @@
+"""What the paper claims of its experiments, checked against computed runs.
+
+Every claim is a small function of runs. Its verdict follows from a criterion that the explanation states and
+from figures that are computed here; nothing is decided beforehand. Words such as "much smaller" are the
+paper's; `MUCH` and the other constants below say what we ask for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..analysis.metrics import metrics, row_names
+from ..errors import InputError
+from ..simulation.result import Result
+
+#: "much smaller": by at least this factor
+MUCH = 2.0
+#: "reaches its target": the last error is at most this share of the way travelled
+REACHED = 0.05
+#: "converges": over the last tenth of the run the error is at most this share of its peak
+CONVERGED = 0.02
+#: "contributes little": changes the largest synchronization error by at most this share
+LITTLE = 0.10
+#: "the same direction": cosine of the angle between two responses over the run
+ALONG = 0.9
+
+
+class Quantity(NamedTuple):
+    """A computed figure behind a verdict."""
+
+    name: str
+    value: float
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper and what became of it.
+
+    Attributes:
+        text: the claim, in our words.
+        source: where the paper makes it.
+        holds: the verdict.
+        figures: the computed figures behind the verdict.
+        explanation: the criterion, and what the figures say.
+    """
+
+    text: str
+    source: str
+    holds: bool
+    figures: tuple[Quantity, ...]
+    explanation: str
+
+    def as_data(self) -> dict[str, Any]:
+        """Plain data for a JSON file."""
+        figures = [quantity._asdict() for quantity in self.figures]
+        return {
+            "text": self.text,
+            "source": self.source,
+            "holds": self.holds,
+            "figures": figures,
+            "explanation": self.explanation,
+        }
+
+
+def sync_error_is_much_smaller(synchronized: Result, independent: Result, source: str) -> Claim:
+    """Peak and RMS of every synchronization error fall by at least `MUCH` through synchronization."""
+    ours, theirs = metrics(synchronized).sync_error, metrics(independent).sync_error
+    peak, rms = theirs.peak / ours.peak, theirs.rms / ours.rms
+    figures = [
+        Quantity(f"{name} of {error_name(synchronized, *at)}, independent / synchronized", value)
+        for name, ratios in (("peak", peak), ("RMS", rms))
+        for at, value in extremes(ratios)
+    ]
+    return Claim(
+        "The synchronization errors are much smaller with synchronization than without, all of them.",
+        source,
+        bool(min(peak.min(), rms.min()) >= MUCH),
+        tuple(figures),
+        f"Asked: peak and RMS of each synchronization error smaller by a factor of at least {MUCH:g}. Shown "
+        "are the smallest and the largest factor.",
+    )
+
+
+def errors_converge(run: Result, source: str) -> Claim:
+    """Tracking and synchronization errors fall to `CONVERGED` of their peaks."""
+    tracking, sync = left(run.tracking_error), left(run.sync_error)
+    return Claim(
+        f"Tracking and synchronization errors converge to zero ({run.info['title']}).",
+        source,
+        bool(max(tracking, sync) <= CONVERGED),
+        (
+            Quantity("late tracking error / peak", tracking),
+            Quantity("late synchronization error / peak", sync),
+            Quantity("length of the run", run.t[-1], "s"),
+        ),
+        f"Asked: over the last tenth of the run at most {CONVERGED:.0%} of each peak left. A run of finite "
+        "length can show decay, not the limit; the limit is the theorem's.",
+    )
+
+
+# -- measures of runs --------------------------------------------------------------------------------------
+
+
+def need(runs: Mapping[str, Result], *names: str) -> list[Result]:
+    """Runs by name.
+
+    Raises:
+        InputError: one is missing.
+    """
+    missing = [name for name in names if name not in runs]
+    if missing:
+        raise InputError(f"claims: expected runs {', '.join(names)}; missing: {', '.join(missing)}")
+    return [runs[name] for name in names]
+
+
+def kind(run: Result) -> str:
+    """`synchronized` or `independent`, by the gains."""
+    return "synchronized" if np.any(run.info["gains"]["beta"]) else "independent"
+
+
+def late(e: np.ndarray) -> np.ndarray:
+    """Largest |e| over the last tenth of the instants, per row and axis."""
+    return np.abs(e[-max(1, len(e) // 10) :]).max(axis=0)
+
+
+def left(e: np.ndarray) -> float:
+    """Largest late error as a share of the largest error."""
+    return float(late(e).max() / np.abs(e).max())
+
+
+def common(a: Result, b: Result) -> tuple[np.ndarray, np.ndarray]:
+    """Instants that both runs have, and the first run's synchronization errors there."""
+    t = a.t if len(a.t) < len(b.t) else b.t
+    if not np.array_equal(a.t[: len(t)], b.t[: len(t)]):
+        raise InputError("claims: expected two runs logged at the same instants")
+    return t, a.sync_error[: len(t)]
+
+
+def changed(a: Result, b: Result, name: str, rows: Iterable[int]) -> int:
+    """Number of logged values of these rows that are not the same bits."""
+    one, other = (np.ascontiguousarray(getattr(run, name)[:, list(rows)]) for run in (a, b))
+    return int(np.count_nonzero(one.view(np.int64) != other.view(np.int64)))
+
+
+def worst(values: np.ndarray) -> tuple[int, int]:
+    """Row and column of the largest entry."""
+    row, column = np.unravel_index(np.argmax(values), values.shape)
+    return int(row), int(column)
+
+
+def extremes(ratios: np.ndarray) -> list[tuple[tuple[int, int], float]]:
+    """Place and value of the smallest and the largest entry."""
+    return [(worst(-ratios), float(ratios.min())), (worst(ratios), float(ratios.max()))]
+
+
+def error_name(run: Result, pair: int, axis: int) -> str:
+    """A synchronization error in words."""
+    return f"ε_{row_names(run, 'sync_error')[pair].split(':')[0]}, {run.info['axes'][axis]}"
+
+
+def scalar(gain: Any) -> str:
+    """A gain as one number."""
+    return f"{np.mean(gain):g}"

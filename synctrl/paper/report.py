@@ -1,0 +1,231 @@
+"""A page: sections of text, formulas, figures, tables and verdicts in one HTML file that opens offline.
+
+Everything that comes from data is escaped; the only markup is written here. In text, a letter with an
+underscore, as in `e_1`, is shown with its index below the line.
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Protocol
+
+from ..errors import InputError, ResultError
+from ..files import write_whole
+from ..show.style import display
+from .claims import Claim, Quantity
+from .formulas import formula_svg
+
+STYLESHEET = Path(__file__).with_name("report.css")
+
+
+class Block(Protocol):
+    """A part of a section."""
+
+    def html(self) -> str:
+        """Its markup."""
+
+
+@dataclass(frozen=True)
+class Text:
+    """Paragraphs of plain text; `kind` is "plain", "note" or "formula"."""
+
+    paragraphs: tuple[str, ...]
+    kind: str = "plain"
+
+    def html(self) -> str:
+        """A paragraph each; formulas keep their spaces."""
+        tag = "pre" if self.kind == "formula" else "p"
+        written = escape if self.kind == "formula" else words
+        return "".join(f'<{tag} class="{escape(self.kind)}">{written(p)}</{tag}>' for p in self.paragraphs)
+
+
+@dataclass(frozen=True)
+class Formulas:
+    """Formulas one below the other; each in TeX as matplotlib reads it, what it is, and its number."""
+
+    rows: tuple[tuple[str, str, str], ...]
+
+    def html(self) -> str:
+        """A table of pictures, the TeX as their text.
+
+        Raises:
+            InputError: a formula that matplotlib cannot read.
+        """
+        return f'<table class="formulas">{"".join(_formula_row(*row) for row in self.rows)}</table>'
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An SVG figure, inlined, with a caption."""
+
+    svg: Path
+    caption: str
+
+    def html(self) -> str:
+        """A figure whose picture is part of the page."""
+        try:
+            data = base64.b64encode(self.svg.read_bytes()).decode("ascii")
+        except OSError as error:
+            raise ResultError(f"cannot read the figure '{self.svg}': {error.strerror or error}") from error
+        picture = f'<img alt="{escape(self.caption)}" src="data:image/svg+xml;base64,{data}">'
+        return f"<figure>{picture}<figcaption>{words(self.caption)}</figcaption></figure>"
+
+
+@dataclass(frozen=True)
+class Row:
+    """Blocks side by side."""
+
+    blocks: tuple[Block, ...]
+
+    def html(self) -> str:
+        """A grid with a column per block."""
+        return f'<div class="row">{"".join(block.html() for block in self.blocks)}</div>'
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of words and numbers, already written as text.
+
+    `groups` stand above the head: each a title and the number of columns below it, the first column left out.
+    """
+
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    caption: str = ""
+    groups: tuple[tuple[str, int], ...] = ()
+
+    def html(self) -> str:
+        """A table; its first column is a heading of the row.
+
+        Raises:
+            InputError: a row of another length than the head, or groups that do not cover the columns.
+        """
+        for row in self.rows:
+            if len(row) != len(self.head):
+                raise InputError(f"table: expected rows of {len(self.head)} cells, found {list(row)}")
+        head = "".join(f"<th scope='col'>{words(cell)}</th>" for cell in self.head)
+        body = "".join(_table_row(row) for row in self.rows)
+        caption = f'<p class="caption">{words(self.caption)}</p>' if self.caption else ""
+        table = f"<table><thead>{self._group_row()}<tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+        return f'{caption}<div class="wide">{table}</div>'
+
+    def _group_row(self) -> str:
+        if not self.groups:
+            return ""
+        covered = sum(width for _, width in self.groups)
+        if covered != len(self.head) - 1:
+            raise InputError(f"table: expected groups over {len(self.head) - 1} columns, found {covered}")
+        titles = (f"<th colspan='{width}'>{words(title)}</th>" for title, width in self.groups)
+        return f'<tr class="groups"><th></th>{"".join(titles)}</tr>'
+
+
+@dataclass(frozen=True)
+class Verdicts:
+    """Claims with their verdicts and the figures behind them."""
+
+    claims: tuple[Claim, ...]
+
+    def html(self) -> str:
+        """A list; a claim that does not hold says so."""
+        return f'<ul class="claims">{"".join(_claim(claim) for claim in self.claims)}</ul>'
+
+
+@dataclass(frozen=True)
+class Links:
+    """Links to files that lie beside the page; each a file and what it is."""
+
+    links: tuple[tuple[str, str], ...]
+
+    def html(self) -> str:
+        """A list of links."""
+        items = (
+            f'<li><a href="{escape(file, quote=True)}">{words(what)}</a></li>' for file, what in self.links
+        )
+        return f'<ul class="links">{"".join(items)}</ul>'
+
+
+@dataclass(frozen=True)
+class Section:
+    """A title and blocks under it."""
+
+    title: str
+    blocks: tuple[Block, ...]
+
+
+def write_page(path: str | Path, title: str, sections: Sequence[Section]) -> Path:
+    """Write a page with a table of contents.
+
+    Raises:
+        ResultError: the file cannot be written, or a figure cannot be read.
+    """
+    path = Path(path)
+    style = STYLESHEET.read_text(encoding="utf-8")
+    contents = "".join(f'<li><a href="#s{k}">{words(s.title)}</a></li>' for k, s in enumerate(sections))
+    page = (
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<style>{style}</style></head><body><header><h1>{escape(title)}</h1><nav><ol>{contents}</ol></nav></header>"
+        f"<main>{''.join(_section(k, s) for k, s in enumerate(sections))}</main></body></html>\n"
+    )
+    try:
+        write_whole(path, page.encode("utf-8", "replace"))
+    except OSError as error:
+        raise ResultError(f"cannot write the page '{path}': {error.strerror or error}") from error
+    return path
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number for a table: a few significant digits, powers of ten written as 10ⁿ."""
+    text = f"{value:.{digits}g}"
+    if "e" not in text:
+        return text
+    mantissa, exponent = text.split("e")
+    return f"{mantissa}·10{str(int(exponent)).translate(_SUPERSCRIPT)}"
+
+
+def words(text: str) -> str:
+    """Text as markup: escaped, and with indices below the line."""
+    return _INDEXED.sub(r"\1<sub>\2</sub>", escape(text))
+
+
+_SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+#: one letter, perhaps starred or hatted, and an index of up to three characters
+_INDEXED = re.compile(r"(?<![\w&#])([^\W\d_][*\u0302\u0303]?)_(\w{1,3})(?!\w)")
+
+
+def _section(k: int, section: Section) -> str:
+    blocks = "".join(block.html() for block in section.blocks)
+    return f'<section id="s{k}"><h2>{words(section.title)}</h2>{blocks}</section>'
+
+
+def _formula_row(tex: str, what: str, number: str) -> str:
+    data = base64.b64encode(formula_svg(tex)).decode("ascii")
+    picture = f'<img alt="{escape(tex)}" src="data:image/svg+xml;base64,{data}">'
+    return f"<tr><td>{picture}</td><td>{words(what)}</td><td>{words(number)}</td></tr>"
+
+
+def _table_row(row: Iterable[str]) -> str:
+    first, *rest = row
+    cells = "".join(f"<td>{words(cell)}</td>" for cell in rest)
+    return f"<tr><th scope='row'>{words(first)}</th>{cells}</tr>"
+
+
+def _claim(claim: Claim) -> str:
+    verdict = "holds" if claim.holds else "does not hold"
+    figures = "".join(f"<li>{words(q.name)} <b>{words(_shown(q))}</b></li>" for q in claim.figures)
+    return (
+        f'<li class="{"holds" if claim.holds else "fails"}"><strong>{verdict}</strong> '
+        f'<span class="what">{words(claim.text)}</span> <span class="source">{words(claim.source)}</span>'
+        f'<ul class="figures">{figures}</ul><div class="why">{words(claim.explanation)}</div></li>'
+    )
+
+
+def _shown(quantity: Quantity) -> str:
+    """A figure in the unit that people read."""
+    unit, factor = display(quantity.unit)
+    return f"{number(factor * quantity.value)} {unit}".strip()

@@ -1,0 +1,286 @@
+"""Reading a URDF so that nothing wrong gets through, whoever wrote it.
+
+The file is read strictly into a `Document`, the document is checked, and Pinocchio is handed what was
+checked, written anew: it never sees the file. Then its model is compared with the document.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from ...checks import finite_number, instance
+from ...errors import FrameNotFound, InputError, RobotError, RobotWarning, near, warn
+from .checks import check_bodies, check_model, check_tree
+from .document import Document, Geometry, Joint, Link
+from .meshes import data_folder, find_mesh
+from .reader import read_document
+from .writer import dynamics_xml
+
+DEFAULT_COLOR = (0.9, 0.9, 0.9, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Description:
+    """A robot that has been read and checked.
+
+    Attributes:
+        name: what it is called.
+        model: Pinocchio's model; limits of torque, speed and range are in it.
+        visual: shapes for display. Of a mesh it has the path, scale and colour, not the triangles.
+        tip: name of the frame that is its tip unless another is asked for.
+        document: what was read; joints that were locked are fixed in it.
+        locked: names of the joints that were locked.
+    """
+
+    name: str
+    model: pin.Model
+    visual: pin.GeometryModel
+    tip: str
+    document: Document
+    locked: tuple[str, ...] = ()
+
+    @property
+    def path(self) -> Path | None:
+        """The file it was read from, or None."""
+        return self.document.file
+
+    @property
+    def root(self) -> str:
+        """Name of the link that is fixed to the world."""
+        return self.document.root
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """Names of all links."""
+        return tuple(link.name for link in self.document.links)
+
+
+def read_urdf(
+    path: str | Path,
+    package_dirs: Iterable[str | Path] = (),
+    *,
+    locked: Mapping[str, float] | None = None,
+    tip: str | None = None,
+) -> Description:
+    """A robot from a URDF file.
+
+    Args:
+        path: the file.
+        package_dirs: folders in which packages are looked for when a mesh is `package://name/...`, before
+            those of example-robot-data.
+        locked: positions, in rad or m, of joints that are to be held: they become fixed joints.
+        tip: name of the tip frame; by default the last link that carries no other.
+
+    Raises:
+        RobotError: a missing file, or the first defect, with file, line, link or joint, what was found and
+            what is expected.
+        FrameNotFound: there is no such tip.
+
+    Warns:
+        RobotWarning: an axis not of unit length, a missing mesh, an element that nobody here reads.
+    """
+    document = read_document(existing_file(path))
+    check_tree(document)
+    return describe(lock_joints(document, locked or {}), package_dirs, tip=tip, locked=tuple(locked or ()))
+
+
+def describe(
+    document: Document,
+    package_dirs: Iterable[str | Path] = (),
+    *,
+    tip: str | None = None,
+    locked: tuple[str, ...] = (),
+) -> Description:
+    """Check a document and build its model. Arguments and errors as in `read_urdf`."""
+    check_tree(document)
+    check_bodies(document)
+    model = build_model(document)
+    check_model(document, model)
+    tip = tip or document.last_link
+    if not model.existFrame(tip):
+        raise FrameNotFound(document.name, tip, [frame.name for frame in model.frames])
+    visual = _build_visual(document, model, _package_dirs(package_dirs))
+    return Description(document.name, model, visual, tip, document, locked)
+
+
+def lock_joints(document: Document, positions: Mapping[str, float]) -> Document:
+    """The document with joints held at positions, in rad or m: they become fixed joints.
+
+    Raises:
+        RobotError: no such moving joint, or a position outside its limits.
+        InputError: a position that is no finite number.
+    """
+    instance("locked", positions, Mapping, "positions by the names of joints")
+    moving = {joint.name: joint for joint in document.moving_joints}
+    for name, position in positions.items():
+        if name not in moving:
+            raise RobotError(
+                f"{document.source}: expected moving joints to lock, found '{name}'{near(name, moving)}; "
+                f"they are: {', '.join(moving)}"
+            )
+        _check_position(document, moving[name], finite_number(f"position of joint '{name}'", position))
+    joints = (j.fixed(float(positions[j.name])) if j.name in positions else j for j in document.joints)
+    return replace(document, joints=tuple(joints))
+
+
+def _check_position(document: Document, joint: Joint, position: float) -> None:
+    limit = joint.limit
+    if limit is None or limit.lower is None or limit.upper is None:
+        return
+    if not limit.lower <= position <= limit.upper:
+        raise RobotError(
+            f"{document.where(joint)}: expected a position from {limit.lower:g} to {limit.upper:g}, "
+            f"found {position:g}"
+        )
+
+
+# -- files -------------------------------------------------------------------------------------------------
+
+
+def urdf_folder() -> Path:
+    """The folder of this package's own URDF files: inside the installed package, or beside its sources."""
+    package = Path(__file__).resolve().parents[2]
+    installed = package / "_urdf"
+    return installed if installed.is_dir() else package.parent / "robots"
+
+
+def existing_file(path: str | Path) -> Path:
+    """`path` as a `Path`, if a file is there.
+
+    Raises:
+        RobotError: no file, with the URDF files that are near.
+    """
+    if not isinstance(path, (str, Path)):
+        raise InputError(f"path: expected a path, found {type(path).__name__}")
+    file = Path(path)
+    if not str(file).isprintable():
+        raise RobotError(f"{str(file)!a}: expected the path of a URDF file, found one that cannot be printed")
+    try:
+        if file.is_file():
+            return file
+        kind = "a folder" if file.is_dir() else "no such file"
+        beside = sorted(f.name for f in file.parent.glob("*.urdf"))
+    except (OSError, ValueError) as error:
+        raise RobotError(f"{str(file)!a}: expected the path of a URDF file, found: {error}") from error
+    hint = near(file.name, beside) or (
+        f"; in its folder there are: {', '.join(beside[:5])}" if beside else ""
+    )
+    raise RobotError(f"{file}: expected a URDF file, found {kind}{hint}")
+
+
+def _package_dirs(package_dirs: Iterable[str | Path]) -> tuple[Path, ...]:
+    folders = (package_dirs,) if isinstance(package_dirs, (str, Path)) else package_dirs
+    instance("package_dirs", folders, Iterable, "folders")
+    folders = tuple(folders)
+    for folder in folders:
+        instance("package_dirs", folder, (str, Path), "folders")
+    stock = data_folder()
+    return (*map(Path, folders), *([stock] if stock else []))
+
+
+# -- Pinocchio ---------------------------------------------------------------------------------------------
+
+
+def build_model(document: Document) -> pin.Model:
+    """Pinocchio's model of a checked document.
+
+    Raises:
+        RobotError: Pinocchio refuses it all the same, with the parser's reason.
+    """
+    return model_from_xml(document.source, dynamics_xml(document))
+
+
+def model_from_xml(source: str, xml: str) -> pin.Model:
+    """Pinocchio's model of a URDF text; `source` is what messages call it."""
+    with _standard_error() as written:
+        try:
+            model, failure = pin.buildModelFromXML(xml), None
+        except Exception as error:
+            model, failure = None, error
+    if failure is not None:
+        reason = " ".join(written[0].split()) or str(failure)
+        raise RobotError(f"{source}: expected a URDF that Pinocchio accepts, found: {reason}") from failure
+    return model
+
+
+@contextmanager
+def _standard_error() -> Iterator[list[str]]:
+    """What is written to the standard error meanwhile, also by C++: one string, there when the block is left.
+
+    The reason why a parser refuses a document is said nowhere else.
+    """
+    written: list[str] = [""]
+    sys.stderr.flush()
+    try:
+        saved = os.dup(2)
+    except OSError:  # there is no standard error
+        yield written
+        return
+    with tempfile.TemporaryFile() as file:
+        os.dup2(file.fileno(), 2)
+        try:
+            yield written
+        finally:
+            os.dup2(saved, 2)
+            os.close(saved)
+            file.seek(0)
+            written[0] = file.read().decode(errors="replace")
+
+
+# -- shapes ------------------------------------------------------------------------------------------------
+
+
+def _build_visual(document: Document, model: pin.Model, package_dirs: tuple[Path, ...]) -> pin.GeometryModel:
+    visual = pin.GeometryModel()
+    for link in document.links:
+        frame_id = model.getFrameId(link.name, pin.BODY)
+        for k, geometry in enumerate(link.visuals):
+            shape = _shape(document, link, geometry, package_dirs)
+            if shape is not None:
+                visual.addGeometryObject(_placed(f"{link.name}_{k}", model, frame_id, geometry, *shape))
+    return visual
+
+
+def _shape(
+    document: Document, link: Link, geometry: Geometry, package_dirs: tuple[Path, ...]
+) -> tuple[coal.CollisionGeometry, str, np.ndarray] | None:
+    """Coal's geometry, and path and scale of a mesh; None where the mesh is missing."""
+    shape, one = geometry.shape, np.ones(3)
+    if shape.kind != "mesh":
+        kinds = {"box": coal.Box, "cylinder": coal.Cylinder, "capsule": coal.Capsule, "sphere": coal.Sphere}
+        return kinds[shape.kind](*shape.size), "", one
+    folder = document.file.parent if document.file else Path.cwd()
+    file = find_mesh(shape.filename or "", folder, package_dirs)
+    if file is None:
+        where = document.where(link, geometry.line)
+        warn(f"{where}: mesh '{shape.filename}' is missing and will not be shown", RobotWarning)
+        return None
+    return coal.BVHModelOBBRSS(), str(file), np.array(shape.size)
+
+
+def _placed(
+    name: str,
+    model: pin.Model,
+    frame_id: int,
+    geometry: Geometry,
+    shape: coal.CollisionGeometry,
+    mesh: str,
+    scale: np.ndarray,
+) -> pin.GeometryObject:
+    frame = model.frames[frame_id]
+    placement = frame.placement * geometry.origin.se3
+    color = np.array(geometry.color or DEFAULT_COLOR)
+    colored = geometry.color is not None
+    return pin.GeometryObject(
+        name, frame.parentJoint, frame_id, placement, shape, mesh, scale, colored, color
+    )
