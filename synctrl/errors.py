@@ -11,6 +11,7 @@ import sys
 import warnings
 from collections.abc import Iterable
 from difflib import get_close_matches
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -29,11 +30,28 @@ class Portable(BaseException):
 class SynctrlError(Portable, Exception):
     """Base of all errors raised by synctrl.
 
+    Args:
+        message: what is wrong: what is expected, and what was found.
+        subject: what it is about; the message then begins with it.
+        found: the number, word or shape that was found.
+
     Attributes:
+        subject: the argument or part at fault, spelled and counted as in the API, for example "dt", "Lambda"
+            or "robot 2, trajectory"; None if the error is not about one part alone.
+        found: what was found in its place, if that is a plain value; else None.
         result: a `Result` with what a run had computed until then; None if the error did not stop a run.
     """
 
+    subject: str | None = None
+    found: Any = None
     result: Any = None
+
+    def __init__(self, message: str = "", *, subject: str | None = None, found: Any = None):
+        super().__init__(message if subject is None else f"{subject}: {message}")
+        if subject is not None:
+            self.subject = subject
+        if found is not None:
+            self.found = found
 
 
 class InputError(SynctrlError, ValueError):
@@ -41,7 +59,32 @@ class InputError(SynctrlError, ValueError):
 
 
 class RobotError(SynctrlError):
-    """A robot description is missing, refused, or inconsistent."""
+    """A robot description is missing, refused, or inconsistent.
+
+    Args:
+        message, subject, found: see `SynctrlError`.
+        file: what it was read from; the message then begins with it.
+        line: where in the file.
+
+    Attributes:
+        subject: the link, joint or element at fault, for example "joint 'elbow', limit".
+        file: the description that was read, or None.
+        line: of the file, counted from 1, or None.
+    """
+
+    def __init__(
+        self,
+        message: str = "",
+        *,
+        subject: str | None = None,
+        found: Any = None,
+        file: str | Path | None = None,
+        line: int | None = None,
+    ):
+        super().__init__(message, subject=subject, found=found)
+        self.file, self.line = None if file is None else str(file), line or None
+        if self.file is not None:
+            self.args = (f"{self.file}{f':{line}' if line else ''}: {self}",)
 
 
 class RobotWarning(UserWarning):

@@ -149,7 +149,9 @@ def gain_condition_in_box(
     cell = experiment.cell
     low, high = (_corner(name, corner, cell) for name, corner in (("lower", lower), ("upper", upper)))
     if (low > high).any():
-        raise InputError(f"lower, upper: expected lower <= upper, found {low.tolist()} and {high.tolist()}")
+        raise InputError(
+            f"expected lower <= upper, found {low.tolist()} and {high.tolist()}", subject="lower, upper"
+        )
     span = positive_number("duration", experiment.duration if duration is None else duration)
     found = []
     for i, robot in enumerate(cell.robots):
@@ -243,5 +245,5 @@ def _corner(name: str, corner: ArrayLike, cell: object) -> np.ndarray:
     shape = cell.n, cell.nv  # type: ignore[attr-defined]
     array = finite_array(name, corner)
     if array.shape not in (shape, shape[1:]):
-        raise InputError(f"{name}: expected shape {shape[1:]} or {shape}, found {array.shape}")
+        raise InputError(f"expected shape {shape[1:]} or {shape}, found {array.shape}", subject=name)
     return np.broadcast_to(array, shape)

@@ -116,12 +116,12 @@ def settling_bands(*results: Result, fraction: float = SETTLING_FRACTION) -> dic
         InputError: no run, or one without instants.
     """
     if not results:
-        raise InputError("settling bands: expected at least one run, found none")
+        raise InputError("expected at least one run, found none", subject="settling bands")
     for result in results:
         instance("run", result, Result, "a Result")
         if not len(result.t):
             raise InputError(
-                f"run '{result.info['title']}': expected at least one logged instant, found none"
+                "expected at least one logged instant, found none", subject=f"run '{result.info['title']}'"
             )
     return {kind: fraction * max(float(np.abs(getattr(r, kind)).max()) for r in results) for kind in ERRORS}
 
@@ -201,7 +201,7 @@ def write_metrics(path: str | Path, runs: Mapping[str, Mapping], claims: list[Ma
     try:
         text = json.dumps(content, ensure_ascii=False, indent=1, allow_nan=False)
     except ValueError as error:
-        raise InputError(f"metrics: expected finite numbers only ({error})") from error
+        raise InputError(f"expected finite numbers only ({error})", subject="metrics") from error
     path = Path(path)
     try:
         write_whole(path, text + "\n")

@@ -145,8 +145,9 @@ def experiment_of(result: Result, experiment: Experiment | None) -> Experiment:
     experiment = result.experiment if experiment is None else experiment
     if experiment is None:
         raise InputError(
-            "experiment: this result was loaded from a file and does not know the closed loop that made it; "
-            "pass the experiment, for example certify(result, experiment=planar_four())"
+            "this result was loaded from a file and does not know the closed loop that made it; "
+            "pass the experiment, for example certify(result, experiment=planar_four())",
+            subject="experiment",
         )
     instance("experiment", experiment, Experiment, "an Experiment")
     return experiment
@@ -255,17 +256,19 @@ def _check_sizes(result: Result, loop: ClosedLoop) -> None:
         found = getattr(result, name).shape[1:]
         if found != shape:
             raise InputError(
-                f"experiment: expected the one that made the result; its {name} has the shape {shape} at an "
-                f"instant, but the result's has {found}"
+                f"expected the one that made the result; its {name} has the shape {shape} at an "
+                f"instant, but the result's has {found}",
+                subject="experiment",
             )
     if not len(result.t):
-        raise InputError("result: expected at least one logged instant, found none")
+        raise InputError("expected at least one logged instant, found none", subject="result")
     for name, shape in own_states(loop).items():
         found = result.outputs[name].shape[1:] if name in result.outputs else None
         if found != shape:
             raise InputError(
-                f"experiment: expected the one that made the result, with the whole state in the log; its "
-                f"output '{name}' has the shape {shape} at an instant, but the result's has {found}"
+                "expected the one that made the result, with the whole state in the log; its "
+                f"output '{name}' has the shape {shape} at an instant, but the result's has {found}",
+                subject="experiment",
             )
 
 
@@ -275,8 +278,9 @@ def _check_numbers(result: Result) -> None:
         if len(large):
             found = getattr(result, name)[tuple(large[0])]
             raise InputError(
-                f"result, {name}: expected numbers up to {LARGEST:g}, found {found:g} at "
-                f"t = {result.t[large[0][0]]:g} s; the run went astray, and nothing can be said of it"
+                f"expected numbers up to {LARGEST:g}, found {found:g} at "
+                f"t = {result.t[large[0][0]]:g} s; the run went astray, and nothing can be said of it",
+                subject=f"result, {name}",
             )
 
 
@@ -286,6 +290,7 @@ def _check_same(result: Result, rows: Row) -> None:
     if wrong.any():
         k = int(np.argmax(wrong))
         raise InputError(
-            f"experiment: expected the one that made the result; at t = {result.t[k]:g} s it gives a "
-            f"velocity error of {rows.s_q[k].tolist()}, but the result has {result.v_error[k].tolist()}"
+            f"expected the one that made the result; at t = {result.t[k]:g} s it gives a "
+            f"velocity error of {rows.s_q[k].tolist()}, but the result has {result.v_error[k].tolist()}",
+            subject="experiment",
         )

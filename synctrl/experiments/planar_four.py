@@ -112,7 +112,9 @@ def _disturbances(disturbance: str | Disturbance | Sequence[Disturbance] | None)
         return (disturbance,)
     if isinstance(disturbance, Sequence) and not isinstance(disturbance, str):
         return tuple(disturbance)
-    raise InputError(f"disturbance: expected None, 'torque' or Disturbance objects, found {disturbance!r}")
+    raise InputError(
+        f"expected None, 'torque' or Disturbance objects, found {disturbance!r}", subject="disturbance"
+    )
 
 
 def _title(synchronized: bool, disturbance: object) -> str:

@@ -114,7 +114,7 @@ def need(runs: Mapping[str, Result], *names: str) -> list[Result]:
     """
     missing = [name for name in names if name not in runs]
     if missing:
-        raise InputError(f"claims: expected runs {', '.join(names)}; missing: {', '.join(missing)}")
+        raise InputError(f"expected runs {', '.join(names)}; missing: {', '.join(missing)}", subject="claims")
     return [runs[name] for name in names]
 
 
@@ -137,7 +137,7 @@ def common(a: Result, b: Result) -> tuple[np.ndarray, np.ndarray]:
     """Instants that both runs have, and the first run's synchronization errors there."""
     t = a.t if len(a.t) < len(b.t) else b.t
     if not np.array_equal(a.t[: len(t)], b.t[: len(t)]):
-        raise InputError("claims: expected two runs logged at the same instants")
+        raise InputError("expected two runs logged at the same instants", subject="claims")
     return t, a.sync_error[: len(t)]
 
 

@@ -45,9 +45,13 @@ def compare_runs(ours: Result, theirs: Result) -> Comparison:
     for run in (ours, theirs):
         instance("runs", run, Result, "a Result")
     if not len(ours.t):
-        raise InputError(f"run '{ours.info['title']}': expected at least one logged instant, found none")
+        raise InputError(
+            "expected at least one logged instant, found none", subject=f"run '{ours.info['title']}'"
+        )
     if not np.array_equal(ours.t, theirs.t) or ours.x.shape != theirs.x.shape:
-        raise InputError(f"runs: expected the same instants of the same cell, found {ours!r} and {theirs!r}")
+        raise InputError(
+            f"expected the same instants of the same cell, found {ours!r} and {theirs!r}", subject="runs"
+        )
     tracking, sync = (
         _relative(getattr(ours, kind), getattr(theirs, kind)) for kind in ("tracking_error", "sync_error")
     )

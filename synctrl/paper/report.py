@@ -107,7 +107,9 @@ class Table:
         """
         for row in self.rows:
             if len(row) != len(self.head):
-                raise InputError(f"table: expected rows of {len(self.head)} cells, found {list(row)}")
+                raise InputError(
+                    f"expected rows of {len(self.head)} cells, found {list(row)}", subject="table"
+                )
         head = "".join(f"<th scope='col'>{words(cell)}</th>" for cell in self.head)
         body = "".join(_table_row(row) for row in self.rows)
         caption = f'<p class="caption">{words(self.caption)}</p>' if self.caption else ""
@@ -119,7 +121,9 @@ class Table:
             return ""
         covered = sum(width for _, width in self.groups)
         if covered != len(self.head) - 1:
-            raise InputError(f"table: expected groups over {len(self.head) - 1} columns, found {covered}")
+            raise InputError(
+                f"expected groups over {len(self.head) - 1} columns, found {covered}", subject="table"
+            )
         titles = (f"<th colspan='{width}'>{words(title)}</th>" for title, width in self.groups)
         return f'<tr class="groups"><th></th>{"".join(titles)}</tr>'
 

@@ -7,7 +7,20 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...errors import near
-from .document import MOVING_TYPES, Document, Geometry, Inertial, Joint, Limit, Link, Pose, Shape, Vector
+from .document import (
+    INERTIA,
+    MOVING_TYPES,
+    ZERO,
+    Document,
+    Geometry,
+    Inertial,
+    Joint,
+    Limit,
+    Link,
+    Pose,
+    Shape,
+    Vector,
+)
 from .meshes import check_filename
 from .xml import Element, parse_xml, printable, quoted, read_bytes
 
@@ -72,12 +85,11 @@ def _link(element: Element, colors: dict[str, Vector]) -> Link:
 def _inertial(element: Element) -> Inertial:
     element.know(("origin", "mass", "inertia"))
     mass, inertia = element.required("mass"), element.required("inertia")
-    keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     mass.know((), ("value",))
-    inertia.know((), keys)
+    inertia.know((), INERTIA)
     return Inertial(
         mass=mass.number("value"),
-        inertia=tuple(inertia.number(key) for key in keys),
+        inertia=tuple(inertia.number(key) for key in INERTIA),
         origin=_origin(element),
         line=element.line,
     )
@@ -88,8 +100,7 @@ def _origin(element: Element) -> Pose:
     if origin is None:
         return Pose()
     origin.know((), ("xyz", "rpy"))
-    zero = (0.0, 0.0, 0.0)
-    return Pose(origin.numbers("xyz", 3, zero), origin.numbers("rpy", 3, zero))
+    return Pose(origin.numbers("xyz", 3, ZERO), origin.numbers("rpy", 3, ZERO))
 
 
 # -- shapes ------------------------------------------------------------------------------------------------
