@@ -29,6 +29,6 @@ def mixed_four(synchronized: bool = True, gains: Gains | None = None, **parts: U
     Args:
         synchronized: False sets beta = K_eps = 0, independent adaptive control.
         gains: by default ones that converge within the run.
-        parts: `adaptation`, `law`, `network`, see `Experiment`.
+        parts: parts and options of the controller, see `Parts`.
     """
     return circle_cell(STATIONS, "mixed cell", gains, synchronized, parts)

@@ -24,7 +24,7 @@ def panda_four(synchronized: bool = True, gains: Gains | None = None, **parts: U
     Args:
         synchronized: False sets beta = K_eps = 0, independent adaptive control.
         gains: by default ones that converge within the run.
-        parts: `adaptation`, `law`, `network`, see `Experiment`.
+        parts: parts and options of the controller, see `Parts`.
     """
     stations = [Station("panda", POSTURE, DISTANCE, f"Panda {i}", K_R) for i in range(1, 5)]
     return circle_cell(stations, "four Pandas", gains, synchronized, parts)
