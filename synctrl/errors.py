@@ -190,7 +190,28 @@ class StepWarning(UserWarning):
 
 
 class ResultError(SynctrlError):
-    """A result file that is missing, damaged, or of another kind."""
+    """A file of results that is missing, damaged, of another kind, or that cannot be written.
+
+    Args:
+        message, subject, found: see `SynctrlError`.
+        file: the file or folder that the message speaks of.
+
+    Attributes:
+        file: its path as text, or None.
+    """
+
+    file: str | None = None
+
+    def __init__(
+        self,
+        message: str = "",
+        *,
+        subject: str | None = None,
+        found: Any = None,
+        file: str | Path | None = None,
+    ):
+        super().__init__(message, subject=subject, found=found)
+        self.file = None if file is None else str(file)
 
 
 class SweepError(SynctrlError):

@@ -11,10 +11,8 @@ import pytest
 from synctrl.analysis.identification import identify
 from synctrl.errors import InputError
 from synctrl.experiments import a460_full_pair, a460_pair
-from synctrl.paper.judge import AGREEMENT, compare_runs
-from synctrl.paper.judge_plots import differences
-from synctrl.paper.judge_section import judge_section
-from synctrl.paper.judged import joint_pair
+from synctrl.paper.judge import AGREEMENT, compare_runs, joint_pair
+from synctrl.paper.judge_section import differences, judge_section
 from synctrl.paper.plant_sections import friction_section, full_a460_section, identification_section
 from synctrl.paper.report import Row, write_page
 from synctrl.paper.reproduction import JOBS, judge_jobs, judged

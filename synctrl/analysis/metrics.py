@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from ..checks import instance, non_negative_number
-from ..errors import InputError, ResultError
-from ..files import write_whole
+from ..errors import InputError
+from ..files import reported, write_whole
 from ..simulation.result import Result
 
 FORMAT = "synctrl metrics 1"
@@ -202,12 +202,9 @@ def write_metrics(path: str | Path, runs: Mapping[str, Mapping], claims: list[Ma
         text = json.dumps(content, ensure_ascii=False, indent=1, allow_nan=False)
     except ValueError as error:
         raise InputError(f"expected finite numbers only ({error})", subject="metrics") from error
-    path = Path(path)
-    try:
+    with reported("write the metrics to", path):
         write_whole(path, text + "\n")
-    except OSError as error:
-        raise ResultError(f"cannot write the metrics to '{path}': {error.strerror or error}") from error
-    return path
+    return Path(path)
 
 
 def _finite(value: float) -> float | None:

@@ -14,7 +14,8 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any, Self
 
-from ..errors import ResultError, SimulationError, StepWarning
+from ..errors import SimulationError, StepWarning
+from ..files import reported
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 
@@ -143,9 +144,6 @@ def _reporter(name: str, duration: float) -> Callable[[float], None]:
 
 def _check_writable(folder: Path) -> None:
     """Fail before anything runs where nothing could be saved."""
-    try:
+    with reported("write into the folder", folder):
         folder.mkdir(parents=True, exist_ok=True)
-        with TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise ResultError(f"cannot write into the folder '{folder}': {error.strerror or error}") from error
+        TemporaryFile(dir=folder).close()

@@ -8,8 +8,8 @@ paper's; `MUCH` and the other constants below say what we ask for.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +29,8 @@ LITTLE = 0.10
 ALONG = 0.9
 
 
-class Quantity(NamedTuple):
+@dataclass(frozen=True)
+class Quantity:
     """A computed figure behind a verdict."""
 
     name: str
@@ -57,14 +58,7 @@ class Claim:
 
     def as_data(self) -> dict[str, Any]:
         """Plain data for a JSON file."""
-        figures = [quantity._asdict() for quantity in self.figures]
-        return {
-            "text": self.text,
-            "source": self.source,
-            "holds": self.holds,
-            "figures": figures,
-            "explanation": self.explanation,
-        }
+        return asdict(self)
 
 
 def sync_error_is_much_smaller(synchronized: Result, independent: Result, source: str) -> Claim:
@@ -112,9 +106,10 @@ def need(runs: Mapping[str, Result], *names: str) -> list[Result]:
     Raises:
         InputError: one is missing.
     """
-    missing = [name for name in names if name not in runs]
+    missing = tuple(name for name in names if name not in runs)
     if missing:
-        raise InputError(f"expected runs {', '.join(names)}; missing: {', '.join(missing)}", subject="claims")
+        words = f"expected runs {', '.join(names)}; missing: {', '.join(missing)}"
+        raise InputError(words, subject="claims", found=missing)
     return [runs[name] for name in names]
 
 

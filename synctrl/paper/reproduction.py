@@ -12,14 +12,13 @@ from ..experiments.planar_four import GAINS, planar_four
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .batch import Job
-from .judge import Comparison, compare_runs
-from .judged import joint_pair
+from .judge import DURATION as JUDGED_DURATION
+from .judge import Agreement, compare_runs, joint_pair
 
 #: Lambda + beta of the paper's four arms: what an independent controller could be given instead, 1/s
 STIFF = GAINS.replace(Lambda=110.0)
 #: in which the errors of the undisturbed arms have their peaks, s
 PEAKS = 1.0
-JUDGED_DURATION = 0.4  # s
 
 JOBS: Mapping[str, Job] = {
     "a460_pair_synchronized": Job(partial(a460_pair)),
@@ -58,7 +57,7 @@ def judge_jobs() -> dict[str, Job]:
     return jobs
 
 
-def judged(runs: Mapping[str, Result]) -> list[Comparison]:
-    """The comparisons that runs of `judge_jobs` make."""
+def judged(runs: Mapping[str, Result]) -> list[Agreement]:
+    """How far plants agree, from runs of `judge_jobs` make."""
     pairs = [(run, runs.get(f"{name}_mujoco")) for name, run in runs.items()]
     return [compare_runs(ours, theirs) for ours, theirs in pairs if theirs is not None]

@@ -29,17 +29,9 @@ def certificate_section(certificates: Mapping[str, Certificate], folder: Path) -
     """
     pictures = [_picture(name, c, folder) for name, c in certificates.items()]
     rows = [Row(tuple(pictures[k : k + 2])) for k in range(0, len(pictures), 2)]
-    texts = tuple(f"{_words(name)}\n{c}" for name, c in certificates.items())
-    return Section(
-        "The proof, watched",
-        (
-            Text((_INTRODUCTION,)),
-            Text((PROOF,), "formula"),
-            _verdicts(certificates),
-            *rows,
-            Text(texts, "formula"),
-        ),
-    )
+    texts = [Text(f"{_words(name)}\n{c}", "formula") for name, c in certificates.items()]
+    proof = (Text(_INTRODUCTION), Text(PROOF, "formula"), _verdicts(certificates))
+    return Section("The proof, watched", (*proof, *rows, *texts))
 
 
 def draw_certificate(name: str, certificate: Certificate, folder: Path) -> Path:
@@ -53,15 +45,12 @@ def draw_certificate(name: str, certificate: Certificate, folder: Path) -> Path:
 
 def baseline_section(comparisons: Sequence[Comparison]) -> Section:
     """Synchronized control beside independent controllers with as much gain, and part by part."""
-    blocks: list[Block] = [Text((_FAIRNESS,))]
+    blocks: list[Block] = [Text(_FAIRNESS)]
     for c in comparisons:
         what = f"{c.title}, the first {c.duration:g} s"
         parts = f"{what}: β, K_ε and the adaptation, each alone and together."
-        blocks += [
-            _trials(c, c.trials, f"{what}."),
-            _trials(c, c.ablation, parts),
-            Text(tuple(c.findings())),
-        ]
+        blocks += [_trials(c, c.trials, f"{what}."), _trials(c, c.ablation, parts)]
+        blocks += map(Text, c.findings())
     return Section("Fair comparisons", tuple(blocks))
 
 
