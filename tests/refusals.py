@@ -11,16 +11,17 @@ import pytest
 
 @contextmanager
 def refused(
-    kind: type[BaseException] | tuple[type[BaseException], ...], subject: str | None = None, **data: Any
+    kind: type[BaseException] | tuple[type[BaseException], ...], *subject: str | None, **data: Any
 ) -> Iterator[pytest.ExceptionInfo]:
     """A block that is refused by an error of this kind.
 
     Args:
         kind: of the error.
-        subject: what the error has to be about; None where it is about no part alone.
+        subject: what the error has to be about, if that is said.
         data: further attributes that it has to have.
     """
     with pytest.raises(kind) as caught:
         yield caught
-    found = {name: getattr(caught.value, name) for name in ("subject", *data)}
-    assert found == {"subject": subject, **data}, caught.value
+    expected = {**dict(zip(("subject",), subject, strict=False)), **data}
+    found = {name: getattr(caught.value, name) for name in expected}
+    assert found == expected, caught.value

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cells import SMALL_GAINS, small_cell
+from refusals import refused
 
 from synctrl import (
     CartesianSpace,
@@ -99,7 +100,7 @@ def test_what_makes_use_of_gains_takes_rows() -> None:
 
 def test_damping_in_task_space_has_as_many_entries_for_every_robot() -> None:
     mixed(([20.0, 15.0], [30.0, 40.0]), k_r_space="task")
-    with pytest.raises(InputError, match=r"^K_r: .*of 2, 2 entries, found rows of 2, 3"):
+    with refused(InputError, "K_r"):
         mixed(k_r_space="task")
 
 

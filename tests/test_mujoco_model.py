@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cells import small_cell
+from refusals import refused
 
 from synctrl import (
     CartesianSpace,
@@ -202,7 +203,7 @@ def test_arrays_of_another_kind_are_refused_and_nothing_is_written(bad):
     for arguments in ((bad, good), (good, bad)):
         with pytest.raises(InputError, match=r"^[qv]: expected"):
             joints.write(data, *arguments)
-    with pytest.raises(InputError, match=r"^tau: expected"):
+    with refused(InputError, "tau"):
         joints.command(data, bad)
     assert not data.qpos.any() and not data.qvel.any() and not data.ctrl.any()
 
@@ -218,7 +219,7 @@ def test_a_cell_that_mujoco_cannot_have_is_refused():
     model = arm.model.copy()
     model.gravity.linear = np.array([0.0, 0.0, -1.62])
     moon = Robot(model, arm.tip, document=arm.document)
-    with pytest.raises(InputError, match=r"one gravity .* robot 1, .* for robot 2 as well, found .*-1\.62"):
+    with refused(InputError, "cell"):
         mujoco_model(holding(arm, moon))
 
 
@@ -230,9 +231,9 @@ def holding(*robots: Robot) -> Cell:
 
 @pytest.mark.parametrize("timestep", [0.0, -1e-3, np.nan, "1 ms"])
 def test_a_timestep_that_is_none_is_refused(timestep):
-    with pytest.raises(InputError, match="timestep: expected"):
+    with refused(InputError, "timestep"):
         mujoco_model(small_cell(), timestep)
-    with pytest.raises(InputError, match="cell: expected a Cell"):
+    with refused(InputError, "cell"):
         mujoco_model([small_cell()])
 
 

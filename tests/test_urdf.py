@@ -14,6 +14,7 @@ import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusals import refused
 from urdf_corpus import CORPUS, GOOD, TRIANGLE, write
 
 from synctrl.errors import FrameNotFound, InputError, RobotError, RobotWarning
@@ -93,7 +94,7 @@ def test_a_missing_file_is_said_with_the_near_ones(tmp_path):
     assert "did you mean 'robot.urdf'" in refusal(tmp_path / "robto.urdf")
     assert "robot.urdf" in refusal(tmp_path / "else.urdf")
     assert "a folder" in refusal(tmp_path)
-    with pytest.raises(InputError, match="expected a path, found int"):
+    with refused(InputError, "path"):
         existing_file(3)
 
 
@@ -347,7 +348,7 @@ def test_a_joint_that_cannot_be_locked_is_refused(locked, words, tmp_path):
 
 
 def test_a_position_that_is_no_number_cannot_be_locked(tmp_path):
-    with pytest.raises(InputError, match="position of joint 'elbow'"):
+    with refused(InputError, "position of joint 'elbow'"):
         read_urdf(write(tmp_path, GOOD), locked={"elbow": float("nan")})
 
 
@@ -361,7 +362,7 @@ def test_a_model_that_is_not_the_document_is_refused(tmp_path):
     description = read_urdf(write(tmp_path, GOOD))
     lighter = pin.Model(description.model)
     lighter.inertias[2].mass *= 0.999
-    with pytest.raises(RobotError, match="joint 'elbow': expected a model with the inertial parameters"):
+    with refused(RobotError, "joint 'elbow'"):
         check_model(description.document, lighter)
     fewer = pin.buildReducedModel(description.model, [2], pin.neutral(description.model))
     with pytest.raises(RobotError, match="a model with the joints"):

@@ -61,10 +61,11 @@ def cache_folder() -> Path:
     try:
         return Path(chosen).expanduser().absolute()
     except RuntimeError as error:
-        raise InputError(f"SYNCTRL_CACHE: expected a folder, found {chosen!r}: {error}") from error
+        raise InputError(f"expected a folder, found {chosen!r}: {error}", subject="SYNCTRL_CACHE") from error
     except OSError as error:
         raise CompilationError(
-            f"SYNCTRL_CACHE: {chosen!r} is relative to a working folder that cannot be found: {error}"
+            f"{chosen!r} is relative to a working folder that cannot be found: {error}",
+            subject="SYNCTRL_CACHE",
         ) from error
 
 

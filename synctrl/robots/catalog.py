@@ -85,6 +85,7 @@ def load_description(name_or_path: str | Path, package_dirs: Iterable[str | Path
             f"expected a name of the catalogue or a path, found {name_or_path!a}"
             f"{near(name_or_path, CATALOG)}; the catalogue has: {', '.join(CATALOG)}",
             subject="robot",
+            found=name_or_path,
         )
     return _load(name_or_path, CATALOG[name_or_path])
 

@@ -103,12 +103,10 @@ def weld(
     if frame not in links:
         raise FrameNotFound(document.name, frame, links)
     if name in links or f"{name}_weld" in {joint.name for joint in document.joints}:
-        raise InputError(
-            f"expected one that robot '{document.name}' does not have yet, found '{name}'", subject="name"
-        )
-    origin = Pose(_triple("xyz", xyz), _triple("rpy", rpy))
+        expected = f"expected one that robot '{document.name}' does not have yet"
+        raise InputError(f"{expected}, found '{name}'", subject="name")
     payload = _payload(name, positive_number("mass", mass), _triple("com", com), size, inertia)
-    joint = Joint(f"{name}_weld", "fixed", frame, name, origin)
+    joint = Joint(f"{name}_weld", "fixed", frame, name, Pose(_triple("xyz", xyz), _triple("rpy", rpy)))
     return replace(document, links=(*document.links, payload), joints=(*document.joints, joint))
 
 

@@ -21,6 +21,7 @@ def check_joints(robot: str, model: pin.Model) -> None:
                 f"joint '{name}' has {joint.nv} degrees of freedom; "
                 "expected joints with one (fixed-base arms of revolute and prismatic joints)",
                 subject=f"robot '{robot}'",
+                found=name,
             )
 
 
@@ -33,6 +34,7 @@ def check_numbering(robot: str, model: pin.Model) -> None:
                 "expected joints numbered branch after branch, found joint "
                 f"'{model.names[joint]}' to carry the joints {carried}",
                 subject=f"robot '{robot}'",
+                found=model.names[joint],
             )
 
 
@@ -40,11 +42,12 @@ def check_inertia(robot: str, joint: str, row: np.ndarray) -> None:
     """Refuse ten inertial parameters that no body can have."""
     body = f"robot '{robot}', body of '{joint}'"
     if row[0] <= 0:
-        raise RobotError(f"expected a mass above 0 kg, found {row[0]:g}", subject=body)
+        raise RobotError(f"expected a mass above 0 kg, found {row[0]:g}", subject=body, found=row[0])
     lowest = principal_moments(row)[0]
     if lowest <= 0:
         raise RobotError(
             f"expected a positive definite inertia about the centre of mass, found a smallest eigenvalue of "
             f"{lowest:g} kg·m^2",
             subject=body,
+            found=lowest,
         )

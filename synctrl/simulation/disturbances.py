@@ -36,7 +36,9 @@ class Disturbance:
         start = finite_number("disturbance, start", self.start)
         stop = finite_number("disturbance, stop", self.stop)
         if not 0 <= start < stop:
-            raise InputError(f"disturbance: expected 0 <= start < stop, found {start:g} and {stop:g} s")
+            raise InputError(
+                f"expected 0 <= start < stop, found {start:g} and {stop:g} s", subject="disturbance"
+            )
 
 
 class DisturbanceSchedule:
@@ -77,12 +79,17 @@ class DisturbanceSchedule:
 
 def _check(cell: Cell, disturbance: Disturbance) -> None:
     if not isinstance(disturbance, Disturbance):
-        raise InputError(f"disturbances: expected Disturbance objects, found {type(disturbance).__name__}")
+        raise InputError(
+            f"expected Disturbance objects, found {type(disturbance).__name__}", subject="disturbances"
+        )
     robot = disturbance.robot
     if isinstance(robot, bool) or not isinstance(robot, (int, np.integer)) or not 0 <= robot < cell.n:
-        raise InputError(f"disturbance, robot: expected an index from 0 to {cell.n - 1}, found {robot!r}")
+        raise InputError(
+            f"expected an index from 0 to {cell.n - 1}, found {robot!r}", subject="disturbance, robot"
+        )
     nv = cell.robots[robot].nv
     if disturbance.torque.shape not in ((), (nv,)):
         raise InputError(
-            f"disturbance, torque: expected a number or shape ({nv},), found {disturbance.torque.shape}"
+            f"expected a number or shape ({nv},), found {disturbance.torque.shape}",
+            subject="disturbance, torque",
         )

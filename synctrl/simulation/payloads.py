@@ -52,7 +52,7 @@ class Payload:
         start = finite_number("payload, start", self.start)
         stop = np.inf if self.stop is None else finite_number("payload, stop", self.stop)
         if not 0 <= start < stop:
-            raise InputError(f"payload: expected 0 <= start < stop, found {start:g} and {stop:g} s")
+            raise InputError(f"expected 0 <= start < stop, found {start:g} and {stop:g} s", subject="payload")
 
     @property
     def load(self) -> Load:
@@ -118,7 +118,9 @@ def _loaded(robot: Robot, i: int, payloads: Sequence[Payload], t: float) -> Robo
 
 def _check(count: int, payload: Payload) -> None:
     if not isinstance(payload, Payload):
-        raise InputError(f"payloads: expected Payload objects, found {type(payload).__name__}")
+        raise InputError(f"expected Payload objects, found {type(payload).__name__}", subject="payloads")
     robot = payload.robot
     if isinstance(robot, bool) or not isinstance(robot, (int, np.integer)) or not 0 <= robot < count:
-        raise InputError(f"payload, robot: expected an index from 0 to {count - 1}, found {robot!r}")
+        raise InputError(
+            f"expected an index from 0 to {count - 1}, found {robot!r}", subject="payload, robot"
+        )

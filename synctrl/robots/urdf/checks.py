@@ -59,9 +59,10 @@ def check_tree(document: Document) -> None:
 def _check_counts(document: Document) -> None:
     count, moving = len(document.links), len(document.moving_joints)
     if not 1 <= count <= MAX_LINKS:
-        raise document.error(f"expected 1 to {MAX_LINKS} links, found {count}")
+        raise document.error(f"expected 1 to {MAX_LINKS} links, found {count}", found=count)
     if not 1 <= moving <= MAX_MOVING_JOINTS:
-        raise document.error(f"expected 1 to {MAX_MOVING_JOINTS} joints that move, found {moving}")
+        expected = f"expected 1 to {MAX_MOVING_JOINTS} joints that move"
+        raise document.error(f"{expected}, found {moving}", found=moving)
 
 
 def _check_unique(document: Document) -> None:

@@ -126,7 +126,8 @@ def lock_joints(document: Document, positions: Mapping[str, float]) -> Document:
         if name not in moving:
             raise document.error(
                 f"expected moving joints to lock, found '{name}'{near(name, moving)}; "
-                f"they are: {', '.join(moving)}"
+                f"they are: {', '.join(moving)}",
+                found=name,
             )
         _check_position(document, moving[name], finite_number(f"position of joint '{name}'", position))
     joints = (j.fixed(float(positions[j.name])) if j.name in positions else j for j in document.joints)
@@ -240,13 +241,19 @@ def _standard_error() -> Iterator[list[str]]:
 
 
 def _build_visual(document: Document, model: pin.Model, package_dirs: tuple[Path, ...]) -> pin.GeometryModel:
+    """All shapes for display, each at its place in the frame of its link."""
     visual = pin.GeometryModel()
     for link in document.links:
         frame_id = model.getFrameId(link.name, pin.BODY)
+        frame = model.frames[frame_id]
         for k, geometry in enumerate(link.visuals):
-            shape = _shape(document, link, geometry, package_dirs)
-            if shape is not None:
-                visual.addGeometryObject(_placed(f"{link.name}_{k}", model, frame_id, geometry, *shape))
+            found = _shape(document, link, geometry, package_dirs)
+            if found is None:
+                continue
+            colored, color = geometry.color is not None, np.array(geometry.color or DEFAULT_COLOR)
+            placement = frame.placement * geometry.origin.se3
+            place = (f"{link.name}_{k}", frame.parentJoint, frame_id, placement)
+            visual.addGeometryObject(pin.GeometryObject(*place, *found, colored, color))
     return visual
 
 
@@ -254,10 +261,10 @@ def _shape(
     document: Document, link: Link, geometry: Geometry, package_dirs: tuple[Path, ...]
 ) -> tuple[coal.CollisionGeometry, str, np.ndarray] | None:
     """Coal's geometry, and path and scale of a mesh; None where the mesh is missing."""
-    shape, one = geometry.shape, np.ones(3)
+    shape = geometry.shape
     if shape.kind != "mesh":
         kinds = {"box": coal.Box, "cylinder": coal.Cylinder, "capsule": coal.Capsule, "sphere": coal.Sphere}
-        return kinds[shape.kind](*shape.size), "", one
+        return kinds[shape.kind](*shape.size), "", np.ones(3)
     folder = document.file.parent if document.file else Path.cwd()
     file = find_mesh(shape.filename or "", folder, package_dirs)
     if file is None:
@@ -265,21 +272,3 @@ def _shape(
         warn(str(document.error(missing, link, line=geometry.line)), RobotWarning)
         return None
     return coal.BVHModelOBBRSS(), str(file), np.array(shape.size)
-
-
-def _placed(
-    name: str,
-    model: pin.Model,
-    frame_id: int,
-    geometry: Geometry,
-    shape: coal.CollisionGeometry,
-    mesh: str,
-    scale: np.ndarray,
-) -> pin.GeometryObject:
-    frame = model.frames[frame_id]
-    placement = frame.placement * geometry.origin.se3
-    color = np.array(geometry.color or DEFAULT_COLOR)
-    colored = geometry.color is not None
-    return pin.GeometryObject(
-        name, frame.parentJoint, frame_id, placement, shape, mesh, scale, colored, color
-    )

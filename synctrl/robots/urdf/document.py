@@ -214,7 +214,13 @@ class Document:
         return replace(self, links=(Link(name), *self.links), joints=(joint, *self.joints))
 
     def error(
-        self, problem: str, item: Link | Joint | None = None, *, part: str = "", line: int = 0
+        self,
+        problem: str,
+        item: Link | Joint | None = None,
+        *,
+        part: str = "",
+        line: int = 0,
+        found: str | float | None = None,
     ) -> RobotError:
         """The error to be raised where something in the document is wrong.
 
@@ -223,10 +229,10 @@ class Document:
             item: the link or joint at fault; None if it is the document as a whole.
             part: what of the item it is about, for example "inertial".
             line: where that part stands; by default the line of the item.
+            found: what was found.
         """
         robot = None if self.file else f"robot '{self.name}'"
         place = item and ", ".join(word for word in (item.title, part) if word)
         subject = ": ".join(word for word in (robot, place) if word)
-        return RobotError(
-            problem, subject=subject or None, file=self.file, line=line or (item.line if item else 0)
-        )
+        line = line or (item.line if item else 0)
+        return RobotError(problem, subject=subject or None, found=found, file=self.file, line=line)

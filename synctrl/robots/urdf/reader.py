@@ -25,6 +25,10 @@ from .meshes import check_filename
 from .xml import Element, parse_xml, printable, quoted, read_bytes
 
 JOINT_TYPES = (*MOVING_TYPES, "fixed")
+JOINT_PARTS = (
+    *("parent", "child", "origin", "axis", "limit", "dynamics", "mimic"),
+    *("calibration", "safety_controller"),
+)
 SHAPES = ("box", "cylinder", "sphere", "capsule", "mesh")
 EXTENSIONS = ("gazebo", "transmission", "ros2_control", "sensor")
 LINK_EXTENSIONS = ("contact", "surface", "gravity", "kinematic", "self_filter", "collision_checking")
@@ -180,24 +184,11 @@ def _color(element: Element, colors: dict[str, Vector]) -> Vector | None:
 
 
 def _joint(element: Element) -> Joint:
-    parts = (
-        "parent",
-        "child",
-        "origin",
-        "axis",
-        "limit",
-        "dynamics",
-        "mimic",
-        "calibration",
-        "safety_controller",
-    )
-    element.know(parts, ("name", "type", "dont_collapse"))
+    element.know(JOINT_PARTS, ("name", "type", "dont_collapse"))
     kind = element.text("type")
     if kind not in JOINT_TYPES:
-        element.refuse(
-            f"a joint type of {', '.join(JOINT_TYPES)}",
-            f"{quoted(kind)}{near(kind[:60], JOINT_TYPES)}",
-        )
+        found = f"{quoted(kind)}{near(kind[:60], JOINT_TYPES)}"
+        element.refuse(f"a joint type of {', '.join(JOINT_TYPES)}", found)
     joint = Joint(
         name=element.name(),
         type=kind,
