@@ -106,10 +106,10 @@ class Controller:
         joints = [robot.nv if self.k_r_space == "joint" else m for robot in cell.robots]
         self.K_r = spread_rows("K_r", gains.K_r, joints)
         learning = chosen(gains.Gamma, adaptation)
-        self.adaptation, self.adaptation_settings = learning.bind(cell), _settings(learning)
-        self.law, self.law_settings = options.law.bind(cell, gains), _settings(options.law)
+        self.adaptation, self.adaptation_settings = learning.bind(cell), settings_of(learning)
+        self.law, self.law_settings = options.law.bind(cell, gains), settings_of(options.law)
         connection = connected(network)
-        self.network, self.network_settings = connection.bind(cell), _settings(connection)
+        self.network, self.network_settings = connection.bind(cell), settings_of(connection)
         self._damping = self._joint_damping if self.k_r_space == "joint" else self._task_damping
         self._command = self._commander()
 
@@ -186,7 +186,7 @@ class Controller:
         return self.cell.task.to_torque(task, self.K_r * law.times(reference.c_inv, r))
 
 
-def _settings(part: Adaptation | Law | Network) -> dict[str, Any]:
+def settings_of(part: Adaptation | Law | Network) -> dict[str, Any]:
     """Name and settings of a part, by default the name of its type."""
     return {"name": type(part).__name__, **part.as_dict()}
 
