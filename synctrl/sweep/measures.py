@@ -8,7 +8,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..analysis.metrics import DEFINITIONS, ERRORS, SETTLING_FRACTION, ErrorMetrics, Metrics, metrics
+from ..analysis.metrics import (
+    DEFINITIONS,
+    ERRORS,
+    SETTLING_FRACTION,
+    ErrorMetrics,
+    Metrics,
+    finite_or_none,
+    metrics,
+)
 from ..analysis.metrics import squared as squared_unit
 from ..simulation.result import Result
 from ..simulation.step_error import LIMIT
@@ -77,7 +85,7 @@ def measures(result: Result, bands: Mapping[str, float]) -> list[float | None]:
         computed: Metrics = metrics(result, bands)
         values: list[Any] = [value for kind in ERRORS for value in _over_all(getattr(computed, kind))]
     values += [computed.peak_torque.max(), cut_off(result), (result.info["step_error"] or {}).get("estimate")]
-    return [_finite(value) for value in values]
+    return [finite_or_none(value) for value in values]
 
 
 def cut_off(result: Result) -> float:
@@ -94,7 +102,3 @@ def _over_all(error: ErrorMetrics) -> list[float]:
         np.abs(error.final).max(),
         error.settling_time.max(),
     ]
-
-
-def _finite(value: float | None) -> float | None:
-    return float(value) if value is not None and np.isfinite(value) else None

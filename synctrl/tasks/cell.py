@@ -19,6 +19,7 @@ from .coupling import Coupling
 from .desired import desired_motion, desired_weights
 from .member_checks import check_friction, check_labels, check_names, check_space, check_trajectory
 from .member_parameters import member_parameters
+from .padding import padded
 from .spaces import JointSpace, Space
 from .trajectories import Motion, Trajectory
 from .weights import Weights
@@ -191,7 +192,7 @@ class Cell:
             member_parameters(name, member.robot, member.friction, member.parameters)
             for name, member in zip(self.names, self.members, strict=True)
         )
-        self.theta = _pad([p.theta for p in self.parameters])
+        self.theta = padded([p.theta for p in self.parameters])
 
     def _set_initial_state(self) -> None:
         q0, v0, theta_hat0 = [], [], []
@@ -202,7 +203,7 @@ class Cell:
             size = len(parameters.theta)
             guess = np.zeros(size) if member.theta_hat0 is None else member.theta_hat0
             theta_hat0.append(finite_array(f"{name}, theta_hat0", guess, (size,)))
-        self.q0, self.v0, self.theta_hat0 = _pad(q0), _pad(v0), _pad(theta_hat0)
+        self.q0, self.v0, self.theta_hat0 = padded(q0), padded(v0), padded(theta_hat0)
 
     def _start(self, name: str, member: Member) -> ArrayLike:
         if member.q0 is not None:
@@ -222,11 +223,3 @@ class Cell:
 
     def __repr__(self) -> str:
         return f"Cell('{self.name}', {self.n} robots, {self.space!r}, {self.coupling!r})"
-
-
-def _pad(rows: Sequence[np.ndarray]) -> np.ndarray:
-    """Rows of different lengths as one array, filled up with zeros."""
-    padded = np.zeros((len(rows), max(len(row) for row in rows)))
-    for target, row in zip(padded, rows, strict=True):
-        target[: len(row)] = row
-    return padded
