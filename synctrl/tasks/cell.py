@@ -32,7 +32,8 @@ class Member:
     Args:
         robot: the robot, placed in the world.
         trajectory: its desired motion in the cell's space.
-        q0: joint positions at t = 0, (nv,), rad. In joint space, by default, on the path.
+        q0: joint positions at t = 0, (nv,), rad; by default on the path, in a space that says where that is,
+            as joint space does.
         v0: joint velocities at t = 0, (nv,), rad/s; by default at rest.
         parameters: what is adapted, or its name: "full", all inertial parameters, by default; "base", the
             fewest that give the same torques. Their true values have to be those of this robot, as it is
@@ -208,8 +209,8 @@ class Cell:
     def _start(self, name: str, member: Member) -> ArrayLike:
         if member.q0 is not None:
             return member.q0
-        if isinstance(self.space, JointSpace):
-            return member.trajectory(0.0).x
+        if hasattr(self.space, "start"):
+            return self.space.start(member.robot, member.trajectory(0.0).x)
         raise InputError(f"{name}, q0: expected joint positions to start from, found none")
 
     def _check_members(self) -> None:
