@@ -14,6 +14,7 @@ from ..control.gains import Gains
 from ..control.laws import Law
 from ..control.network import Network
 from ..errors import InputError
+from ..renamed import names_elsewhere
 from ..tasks.cell import Cell
 from .clock import make_clock
 from .closed_loop import ClosedLoop
@@ -282,3 +283,6 @@ def _describe(disturbance: Disturbance) -> dict[str, Any]:
         "start": float(disturbance.start),
         "stop": float(disturbance.stop),
     }
+
+
+__getattr__ = names_elsewhere(__name__, ".run", "run_reference", "run_compiled")
