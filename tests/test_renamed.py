@@ -23,6 +23,42 @@ MOVED = {
     "synctrl.simulation.simulate": ("synctrl.simulation.run", ["run_reference", "run_compiled"]),
     "synctrl.tasks.weights": ("synctrl.tasks.weight_checks", ["check_weights"]),
 }
+#: what version 0.1 exported
+EXPORTED = {
+    "synctrl": (
+        "Attached AxisRotation BaseParameters CartesianSpace Cell Circle "
+        "Controller Coupling Cubic Damping Disturbance Experiment "
+        "ExponentialApproach Friction FrictionParameters FullParameters "
+        "FunctionOrientation FunctionTrajectory Gains Hold JointSpace "
+        "LinearParameters Member Payload PoseSpace PoseTrajectory Redundancy "
+        "Result Robot SynchronizationFunction SynctrlError inverse_kinematics "
+        "load_robot simulate"
+    ),
+    "synctrl.analysis": "Certificate certify",
+    "synctrl.experiments": (
+        "a460_full_pair a460_pair mixed_four mobile_robot panda_four planar_four "
+        "quadratic_analysis rigid_object ur5_payload"
+    ),
+    "synctrl.show.animation": "payload_pair_scene planar_scene",
+    "synctrl.show.plots": (
+        "common_limits joint_trajectories new_figure plain save style sync_errors tracking_errors"
+    ),
+    "synctrl.sweep": (
+        "Choice Factor Grid LogUniform Normal Sweep Uniform control_period "
+        "disturbance_scale disturbance_start gain gain_scale initial_estimates "
+        "initial_positions initial_velocities load model_error trajectories "
+        "true_parameters weights"
+    ),
+    "synctrl.tune": "Tuned tune",
+}
+
+
+@pytest.mark.parametrize("module", EXPORTED)
+def test_what_version_0_1_exported_is_there_and_warns_of_nothing(module):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        missing = [name for name in EXPORTED[module].split() if not hasattr(import_module(module), name)]
+    assert not missing
 
 
 @pytest.mark.parametrize(("old", "name"), [(old, name) for old in MOVED for name in MOVED[old][1]])
