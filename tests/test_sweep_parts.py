@@ -32,7 +32,10 @@ from synctrl.sweep import (
     model_error,
     network,
     trajectories,
+    true_parameters,
+    weights,
 )
+from synctrl.tune import tune
 
 pytest.importorskip("pandas", reason="tables are read with pandas: pip install 'synctrl[sweep]'")
 BANDS = {"tracking_error": 1e-3, "sync_error": 1e-3}
@@ -144,6 +147,46 @@ def test_the_compiled_engine_makes_the_same_runs_or_refuses_the_part_by_name(nam
         for column in ("tracking_peak", "sync_rms", "peak_torque"):
             np.testing.assert_allclose(row[column], tables["pinocchio"].loc[run, column], rtol=1e-7)
     assert (tables["compiled"]["status"] == "refused").sum() == (4 if name == "network" else 0)
+
+
+def test_other_factors_keep_the_parts_of_the_base_and_a_folder_knows_them(tmp_path):
+    def sweep(T):
+        gains = start().gains.replace(Gamma=None)
+        mine = replace(start(), adaptation=Leaky(0.2, 0.1), law=Pulling(2.0), network=Lagging(T), gains=gains)
+        factors = [
+            gain("beta", Grid([1.0, 2.0])),
+            model_error(Uniform(-0.4, -0.1)),
+            true_parameters(Uniform(0.9, 1.1)),
+            weights(Uniform(0.5, 2.0)),
+        ]
+        return Sweep(mine, factors, dt=DT, engine="pinocchio", bands=BANDS)
+
+    quiet(sweep(0.01), tmp_path, backend="serial", keep_every=1)
+    assert set(load(tmp_path)["status"]) == {"completed"}
+    info = trajectories(tmp_path, 1).info
+    assert [info[name] for name in FACTORS] == [
+        {"name": "Leaky", "Gamma": 0.2, "nu": 0.1},
+        {"name": "Pulling", "k": 2.0},
+        {"name": "Lagging", "T": 0.01},
+    ]
+    with pytest.raises(ResultError, match=r"base\.network\.T is 0\.01 there and 0\.02 here"):
+        quiet(sweep(0.02), tmp_path, backend="serial", keep_every=1)
+
+
+def test_a_search_keeps_the_parts_of_its_base():
+    mine = replace(start(), adaptation=Leaky(0.2, 0.1), gains=start().gains.replace(Gamma=None))
+    options = {"generations": 1, "population": 5, "dt": DT, "engine": "pinocchio", "bands": BANDS}
+    best = tune(mine, {"K_r": Uniform(0.5, 2.0)}, backend="serial", progress=False, **options)
+    assert best.experiment.adaptation is mine.adaptation
+    assert best.gains == mine.gains.replace(K_r=best.values["K_r"])
+    assert best.measures["saturation"] == 0.0
+
+
+def test_long_settings_are_shown_short_and_written_whole():
+    part = Gradient(np.linspace(0.1, 0.2, 20))
+    values = Grid([part])
+    assert len(repr(adaptation(values))) < 100
+    assert values.values[0] == f"Gradient(Gamma={json.dumps(part.as_dict()['Gamma'])})"
 
 
 def test_parts_are_drawn_as_words_are():

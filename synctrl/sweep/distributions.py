@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from reprlib import Repr
 from types import MappingProxyType
 from typing import Any, Protocol
 
@@ -15,8 +16,10 @@ from ..control.controller import settings_of
 from ..errors import InputError
 
 Value = float | str
-#: how many listed values are shown one by one
-SHOWN = 8
+#: how many listed values are shown one by one, and of how many letters each
+SHOWN, LETTERS = 8, 40
+_SHORT = Repr()
+_SHORT.maxstring = LETTERS
 
 
 class Values(Protocol):
@@ -140,9 +143,10 @@ class _Listed:
 
     def __repr__(self) -> str:
         kind, count = type(self).__name__, len(self.values)
+        shown = [_SHORT.repr(value) for value in self.values[: SHOWN + 1]]
         if count <= SHOWN:
-            return f"{kind}({list(self.values)})"
-        return f"{kind}({count} values from {self.values[0]!r} to {self.values[-1]!r})"
+            return f"{kind}([{', '.join(shown)}])"
+        return f"{kind}({count} values from {shown[0]} to {_SHORT.repr(self.values[-1])})"
 
 
 class Choice(_Listed):
