@@ -239,5 +239,9 @@ def test_what_is_no_list_of_different_parts_is_an_input_error(wrong, said):
 @pytest.mark.parametrize("factor", [gain, gain_scale])
 def test_a_gain_that_an_adaptation_has_replaced_cannot_be_varied(factor, tmp_path):
     factors = [adaptation(Grid([Natural(0.1)])), factor("Gamma", Grid([2.0]))]
+    for order in (factors, factors[::-1]):
+        with pytest.raises(InputError, match="Gamma"):
+            Sweep(start(), order, bands=BANDS)
+    naturally = replace(start(), adaptation=Natural(0.1), gains=start().gains.replace(Gamma=None))
     with pytest.raises(InputError, match="Gamma"):
-        Sweep(start(), factors, bands=BANDS).experiment(0)
+        Sweep(naturally, factors[1:], bands=BANDS).experiment(0)
