@@ -27,11 +27,10 @@ def certificate_section(certificates: Mapping[str, Certificate], folder: Path) -
         certificates: by name of the run; the name is also that of its figure's file.
         folder: where `draw_certificate` has drawn each.
     """
-    pictures = [_picture(name, c, folder) for name, c in certificates.items()]
-    rows = [Row(tuple(pictures[k : k + 2])) for k in range(0, len(pictures), 2)]
+    pictures = tuple(_picture(name, c, folder) for name, c in certificates.items())
     texts = [Text(f"{_words(name)}\n{c}", "formula") for name, c in certificates.items()]
-    proof = (Text(_INTRODUCTION), Text(PROOF, "formula"), _verdicts(certificates))
-    return Section("The proof, watched", (*proof, *rows, *texts))
+    proof = (Text(_INTRODUCTION), Text(PROOF, "formula"), _verdicts(certificates), Row(pictures))
+    return Section("The proof, watched", (*proof, *texts))
 
 
 def draw_certificate(name: str, certificate: Certificate, folder: Path) -> Path:
