@@ -32,45 +32,22 @@ class SynctrlError(Portable, Exception):
 
     Args:
         message: what is wrong: what is expected, and what was found.
-        subject: what it is about; the message then begins with it.
-        found: the number, word or shape that was found.
+        subject, found, file, line: see below; the message then begins with the subject.
 
     Attributes:
         subject: the argument or part at fault, spelled and counted as in the API, for example "dt", "Lambda"
             or "robot 2, trajectory"; None if the error is not about one part alone.
         found: what was found in its place, if that is a plain value; else None.
+        file: the file or folder concerned, or None.
+        line: of that file, counted from 1, or None.
         result: a `Result` with what a run had computed until then; None if the error did not stop a run.
     """
 
     subject: str | None = None
     found: Any = None
+    file: str | None = None
+    line: int | None = None
     result: Any = None
-
-    def __init__(self, message: str = "", *, subject: str | None = None, found: Any = None):
-        super().__init__(message if subject is None else f"{subject}: {message}")
-        if subject is not None:
-            self.subject = subject
-        if found is not None:
-            self.found = found
-
-
-class InputError(SynctrlError, ValueError):
-    """A value given by the caller has the wrong type, shape, sign, or is not finite."""
-
-
-class RobotError(SynctrlError):
-    """A robot description is missing, refused, or inconsistent.
-
-    Args:
-        message, subject, found: see `SynctrlError`.
-        file: what it was read from; the message then begins with it.
-        line: where in the file.
-
-    Attributes:
-        subject: the link, joint or element at fault, for example "joint 'elbow', limit".
-        file: the description that was read, or None.
-        line: of the file, counted from 1, or None.
-    """
 
     def __init__(
         self,
@@ -81,10 +58,31 @@ class RobotError(SynctrlError):
         file: str | Path | None = None,
         line: int | None = None,
     ):
-        super().__init__(message, subject=subject, found=found)
-        self.file, self.line = None if file is None else str(file), line or None
-        if self.file is not None:
-            self.args = (f"{self.file}{f':{line}' if line else ''}: {self}",)
+        file = None if file is None else str(file)
+        data = {"subject": subject, "found": found, "file": file, "line": line or None}
+        vars(self).update({name: value for name, value in data.items() if value is not None})
+        super().__init__(self._whole(message))
+
+    def _whole(self, message: str) -> str:
+        """The message with what it begins with."""
+        return message if self.subject is None else f"{self.subject}: {message}"
+
+
+class InputError(SynctrlError, ValueError):
+    """A value given by the caller has the wrong type, shape, sign, or is not finite."""
+
+
+class RobotError(SynctrlError):
+    """A robot description is missing, refused, or inconsistent.
+
+    Its `subject` is the link, joint or element at fault, for example "joint 'elbow', limit". If a file is at
+    fault the message begins with the file and the line.
+    """
+
+    def _whole(self, message: str) -> str:
+        place = f"{self.file}:{self.line}" if self.line else self.file
+        message = super()._whole(message)
+        return message if place is None else f"{place}: {message}"
 
 
 class RobotWarning(UserWarning):
@@ -190,28 +188,7 @@ class StepWarning(UserWarning):
 
 
 class ResultError(SynctrlError):
-    """A file of results that is missing, damaged, of another kind, or that cannot be written.
-
-    Args:
-        message, subject, found: see `SynctrlError`.
-        file: the file or folder that the message speaks of.
-
-    Attributes:
-        file: its path as text, or None.
-    """
-
-    file: str | None = None
-
-    def __init__(
-        self,
-        message: str = "",
-        *,
-        subject: str | None = None,
-        found: Any = None,
-        file: str | Path | None = None,
-    ):
-        super().__init__(message, subject=subject, found=found)
-        self.file = None if file is None else str(file)
+    """A file of results that is missing, damaged, of another kind, or that cannot be written."""
 
 
 class SweepError(SynctrlError):
@@ -219,7 +196,7 @@ class SweepError(SynctrlError):
 
 
 class SweepFileError(SweepError, ResultError):
-    """A line in the folder of a sweep that cannot be of that sweep."""
+    """A line in the folder of a sweep that cannot be of that sweep; `file` and `line` say which."""
 
 
 class CompilationError(SynctrlError):

@@ -55,7 +55,7 @@ class _Interval:
     def _check_order(self) -> None:
         if not self.low < self.high:
             raise InputError(
-                f"{type(self).__name__}: expected low < high, found {self.low:g} and {self.high:g}"
+                f"expected low < high, found {self.low:g} and {self.high:g}", subject=f"{type(self).__name__}"
             )
 
 
@@ -132,10 +132,10 @@ class _Listed:
     def __init__(self, values: Sequence[Any]):
         kind = type(self).__name__
         if isinstance(values, str) or not len(values):
-            raise InputError(f"{kind}: expected a list of numbers, words or parts, found {values!r}")
+            raise InputError(f"expected a list of numbers, words or parts, found {values!r}", subject=kind)
         self.values = tuple(_plain(kind, part_label(value) if is_part(value) else value) for value in values)
         if len(set(self.values)) != len(self.values):
-            raise InputError(f"{kind}: expected different values, found {list(self.values)}")
+            raise InputError(f"expected different values, found {list(self.values)}", subject=kind)
         self.meant: Mapping[Value, Any] = dict(zip(self.values, values, strict=True))
 
     def describe(self) -> dict[str, Any]:
@@ -194,7 +194,7 @@ def described(description: Mapping[str, Any]) -> Values | None:
     try:
         return kind(**parameters)
     except TypeError as error:
-        raise InputError(f"{name}: {error}") from error
+        raise InputError(f"{error}", subject=name) from error
 
 
 def drawn(name: str, values: Any, rng: np.random.Generator) -> Value:
@@ -226,7 +226,8 @@ def part_label(part: Any) -> str:
         text = {name: json.dumps(x, ensure_ascii=False, allow_nan=False) for name, x in settings.items()}
     except (TypeError, ValueError) as error:
         raise InputError(
-            f"{type(part).__name__}: expected settings that are plain data from as_dict, found {settings!r}"
+            f"expected settings that are plain data from as_dict, found {settings!r}",
+            subject=f"{type(part).__name__}",
         ) from error
     return f"{settings['name']}({', '.join(f'{key}={text[key]}' for key in settings if key != 'name')})"
 
@@ -241,5 +242,5 @@ def _plain(name: str, value: Any) -> Value:
     if not isinstance(value, str):
         return finite_number(name, value)
     if not is_text(value):
-        raise InputError(f"{name}: expected a word that can be written to a file, found {value!a}")
+        raise InputError(f"expected a word that can be written to a file, found {value!a}", subject=name)
     return str(value)

@@ -63,15 +63,15 @@ class Factor:
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():
-            raise InputError(f"factor: expected a name, found {self.name!r}")
+            raise InputError(f"expected a name, found {self.name!r}", subject="factor")
         needed = ("describe",) if isinstance(self.values, Grid) else ("draw", "describe")
         if not all(callable(getattr(self.values, method, None)) for method in needed):
             raise InputError(
-                f"factor '{self.name}': expected a distribution, which has draw and describe, or a Grid, "
-                f"found {self.values!r}"
+                f"expected a distribution, which has draw and describe, or a Grid, found {self.values!r}",
+                subject=f"factor '{self.name}'",
             )
         if not callable(self.change):
-            raise InputError(f"factor '{self.name}': expected a function, found {self.change!r}")
+            raise InputError(f"expected a function, found {self.change!r}", subject=f"factor '{self.name}'")
 
     def apply(self, setup: Setup, value: Value) -> Setup:
         """The setup with this factor at a value.
@@ -201,7 +201,7 @@ def _part(name: str, values: Grid | Choice) -> Factor:
     instance(name, values, (Grid, Choice), f"a Grid or a Choice of kinds of {name}")
     for value in values.meant.values():
         if not is_part(value):
-            raise InputError(f"{name}: expected parts with bind and as_dict, found {value!r}")
+            raise InputError(f"expected parts with bind and as_dict, found {value!r}", subject=name)
     return Factor(name, values, partial(variations.with_part, part=name, meant=values.meant))
 
 
@@ -215,6 +215,6 @@ def _indexed(name: str, **indices: int | None) -> str:
         if index is None:
             continue
         if isinstance(index, bool) or not isinstance(index, (int, np.integer)) or index < 0:
-            raise InputError(f"{name}: expected the index of a {what}, counted from 0, found {index!r}")
+            raise InputError(f"expected the index of a {what}, counted from 0, found {index!r}", subject=name)
         name += f"_{what}{index}"
     return name

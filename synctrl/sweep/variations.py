@@ -33,7 +33,9 @@ def with_scaled_gain(experiment: Experiment, value: float, gain: str) -> Experim
     """
     entries = getattr(experiment.gains, gain)
     if entries is None:
-        raise InputError(f"{gain}_scale: expected gains with {gain}, found none beside an adaptation")
+        raise InputError(
+            f"expected gains with {gain}, found none beside an adaptation", subject=f"{gain}_scale"
+        )
     return with_gain(experiment, value * entries, gain)
 
 
@@ -130,8 +132,9 @@ def same_parameters(parameters: Parameters, robot: Robot) -> Parameters:
         theta = _fit(parameters.matrix, robot)
         return LinearParameters(robot, parameters.matrix, theta, parameters.names)
     raise InputError(
-        f"true parameters: expected full, linear or friction parameters, found {type(parameters).__name__} "
-        f"for robot '{robot.name}'; vary them with a function of your own"
+        f"expected full, linear or friction parameters, found {type(parameters).__name__} "
+        f"for robot '{robot.name}'; vary them with a function of your own",
+        subject="true parameters",
     )
 
 
@@ -179,5 +182,5 @@ def _index(what: str, index: int | None, count: int) -> slice:
     if index is None:
         return slice(None)
     if not 0 <= index < count:
-        raise InputError(f"{what}: expected an index from 0 to {count - 1}, found {index}")
+        raise InputError(f"expected an index from 0 to {count - 1}, found {index}", subject=what)
     return slice(index, index + 1)
