@@ -92,21 +92,17 @@ def margins(B: np.ndarray, K_r: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.
     )
 
 
-def gain_condition(result: Result, experiment: Experiment | None = None) -> GainCondition:
+def gain_condition(result: Result | Replay, experiment: Experiment | None = None) -> GainCondition:
     """The gain condition along a run, where it is tightest.
 
     Args:
-        result: the run.
+        result: the run; or its replay, where one has been made already.
         experiment: what made it; needed for a result loaded from a file.
 
     Raises:
         InputError: no experiment, or another than the one that made the result.
     """
-    return gain_condition_of(replay(result, experiment))
-
-
-def gain_condition_of(run: Replay) -> GainCondition:
-    """The gain condition along a run that has been gone through already."""
+    run = replay(result, experiment)
     x, loop = run.rows, run.loop
     found = []
     for i, robot in enumerate(loop.cell.robots):

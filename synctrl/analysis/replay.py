@@ -110,17 +110,19 @@ class Replay:
     learning: tuple[str, ...]
 
 
-def replay(result: Result, experiment: Experiment | None = None) -> Replay:
+def replay(result: Result | Replay, experiment: Experiment | None = None) -> Replay:
     """Evaluate the closed loop at every logged state of a run.
 
     Args:
-        result: the run.
+        result: the run; its replay, where one has been made already, is returned as it is.
         experiment: what made it; may be left out while the result still knows.
 
     Raises:
         InputError: no experiment for a result loaded from a file, another than the one that made it, numbers
             that have no squares, or a state of adaptation or plant that is not in the result.
     """
+    if isinstance(result, Replay):
+        return result
     instance("result", result, Result, "a Result")
     experiment = experiment_of(result, experiment)
     loop = experiment.closed_loop(result.info.get("plant", "pinocchio"))
