@@ -14,7 +14,7 @@ from synctrl.analysis import Certificate, certify
 from synctrl.errors import ResultError
 from synctrl.paper.baselines import Comparison, compare
 from synctrl.paper.report import Row, Table, Text, write_page
-from synctrl.paper.reproduction import JOBS
+from synctrl.paper.reproduction import PLANNED
 from synctrl.paper.theory import CERTIFIED, examine
 from synctrl.paper.theory_sections import baseline_section, certificate_section, draw_certificate
 from synctrl.show.lyapunov_plots import growth_mark, lyapunov_figure
@@ -87,8 +87,8 @@ def test_certificates_and_comparisons_travel_between_processes(certificates, com
 
 
 def test_every_run_of_the_figures_is_certified() -> None:
-    assert set(CERTIFIED) <= set(JOBS)
-    assert {name for name in JOBS if name.endswith(("synchronized", "independent", "disturbed"))} < set(
+    assert set(CERTIFIED) <= set(PLANNED)
+    assert {name for name in PLANNED if name.endswith(("synchronized", "independent", "disturbed"))} < set(
         CERTIFIED
     )
 
