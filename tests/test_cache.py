@@ -692,7 +692,7 @@ def test_the_key_covers_every_module_behind_generated_code():
     "name",
     [
         *("control/commands.py", "control/law.py", "robots/mechanism.py", "tasks/rotations.py"),
-        *("simulation/plant.py", "simulation/compiled/structs.py", "simulation/compiled/driver.c"),
+        *("simulation/plant.py", "simulation/compiled/quantities.py", "simulation/compiled/driver.c"),
     ],
 )
 def test_another_source_gives_another_key(tmp_path, name):
