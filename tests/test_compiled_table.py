@@ -178,4 +178,4 @@ def test_a_program_has_all_constants_and_refuses_one_of_another_shape():
 def test_tables_of_another_shape_are_refused_by_name():
     program = Program(Experiment(small_cell(), SMALL_GAINS, 0.05).closed_loop())
     with pytest.raises(CompilationError, match="desired_dot"):
-        program.steps({"desired_dot": np.zeros((2, 3, 5))})
+        program.tell(structs.Steps(), {"desired_dot": np.zeros((2, 3, 5))})

@@ -173,6 +173,9 @@ class _Steps:
         self._before = np.zeros((2, 2, v0.size))
         buffers = (part.ctypes.data for part in self._before)
         work.step_error = structs.StepError(0, np.abs(v0).max(), 0, 0, 0, *buffers)
+        self._steps = structs.Steps(holds=every is not None)
+        self._block: Block | None = None
+        program.tell(self._steps, {"disturbance": schedule.torques, "pi": program.carried})
         ctypes.memset(work.orientation, 0, 8 * program.loop.cell.n)
 
     def advance(self, block: Block, first: int, last: int, y: np.ndarray) -> None:
@@ -205,6 +208,13 @@ class _Steps:
             return np.ones(len(steps.starts[part]), dtype=bool)
         return steps.checked[part] & (steps.number[part] % self._every == 0)
 
+    def _of(self, block: Block) -> structs.Steps:
+        """The steps of a block."""
+        if block is not self._block:
+            self._program.tell(self._steps, block.desired)
+            self._steps.length, self._block = len(block.steps.starts), block
+        return self._steps
+
     def _call(
         self,
         block: Block,
@@ -215,10 +225,13 @@ class _Steps:
         y: np.ndarray,
     ) -> None:
         program, recorder, report = self._program, self._recorder, structs.Report()
-        times, (disturbed, loaded) = np.ascontiguousarray(times), windows
-        steps = program.steps({**block.desired, "disturbance": self._schedule.torques})
-        steps.first, steps.count, steps.length = first, len(marks), len(block.steps.starts)
-        steps.holds, steps.t, steps.marks = self._every is not None, times.ctypes.data, marks.ctypes.data
+        steps, times, (disturbed, loaded) = self._of(block), np.ascontiguousarray(times), windows
+        steps.first, steps.count, steps.t, steps.marks = (
+            first,
+            len(marks),
+            times.ctypes.data,
+            marks.ctypes.data,
+        )
         steps.disturbed, steps.loaded = disturbed.ctypes.data, loaded.ctypes.data
         log = structs.Log(**{name: recorder.address_ahead(name) for name in LOGS})
         try:

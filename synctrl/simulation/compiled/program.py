@@ -62,6 +62,7 @@ class CompiledLoop:
     Attributes:
         sizes: lengths of rows, see `SIZES`, and the numbers of robots and pairs, n and p.
         cell, quantities, work: what the driver is given; see `structs.py`.
+        carried: true inertial parameters with every load, (loads, n, bodies).
         scratch: sizes of the scratch arrays arg, res, iw and w that the generated functions ask for.
 
     Raises:
@@ -80,33 +81,33 @@ class CompiledLoop:
             setattr(self.quantities, name, self.address(checked(name, array, self.sizes)))
         self.scratch = _work_sizes(library)
         self.work = self._work()
-        self.carried = checked("pi", _carried(loop.plant, self.sizes["bodies"]), self.sizes)
+        self.carried = _carried(loop.plant, self.sizes["bodies"])
 
     def state_dot(self, reference: Reference, y: np.ndarray, disturbance: np.ndarray) -> np.ndarray:
         """y' at one instant, for comparison with `ClosedLoop.evaluate`."""
         y, y_dot, first = np.ascontiguousarray(y), np.zeros(self.loop.size), np.zeros(1, dtype=np.intc)
         desired = dict(zip(DESIRED, reference.desired, strict=True))
         weights = one_after_another(reference.weights)
-        steps = self.steps({**desired, "weights": weights, "disturbance": disturbance})
-        steps.disturbed = steps.loaded = first.ctypes.data
+        steps = structs.Steps(disturbed=first.ctypes.data, loaded=first.ctypes.data)
+        self.tell(steps, {**desired, "weights": weights, "disturbance": disturbance, "pi": self.carried})
         self.call("state_dot", steps, y, y_dot)
         return y_dot
 
-    def steps(self, arrays: Mapping[str, np.ndarray]) -> structs.Steps:
-        """Steps, and what is desired and acts in them; how many there are is left to be said.
+    def tell(self, steps: structs.Steps, arrays: Mapping[str, np.ndarray]) -> None:
+        """Say what is desired and acts in steps, instead of what was said before.
 
         Args:
-            arrays: of the quantities that change from step to step, by name, or several one after another.
+            steps: they keep the arrays.
+            arrays: of quantities that change from step to step, by name; one, or several one after another.
 
         Raises:
-            CompilationError: one of another shape than generated code reads.
+            CompilationError: an array of another shape than generated code reads.
         """
-        steps = structs.Steps()
-        steps.kept = {name: checked(name, array, self.sizes) for name, array in arrays.items()}
-        for name, array in {**steps.kept, "pi": self.carried}.items():
+        for name, array in arrays.items():
+            kept = checked(name, array, self.sizes)
             size = prod(shape(name, self.sizes))
-            setattr(steps, name, structs.Table(array.ctypes.data, size if array.size > size else 0))
-        return steps
+            setattr(steps, name, structs.Table(kept.ctypes.data, size if kept.size > size else 0))
+            steps.kept[name] = kept
 
     def call(self, function: str, steps: structs.Steps, y: np.ndarray, *others: Any) -> None:
         """Call a function of the driver with its structures, a state, and further arrays or structures."""

@@ -109,7 +109,9 @@ class Steps(ctypes.Structure):
         kept: the arrays that the tables point to.
     """
 
-    kept: dict[str, np.ndarray]
+    def __init__(self, **fields: Any):
+        super().__init__(**fields)
+        self.kept: dict[str, np.ndarray] = {}
 
     _fields_ = [
         *((name, ctypes.c_int) for name in ("first", "count", "length", "holds")),
