@@ -1,9 +1,9 @@
 /* The closed loop of a cell, from step to step.
  *
  * Above this text stand the sizes of rows (m, nv, P, Z, K, bodies, tip, spare), marks of steps, lists of quantities,
- * the structures, and the generated functions of each kind of robot with the table `kinds`; see header.py. Arrays are row-major and
- * have one row per robot or pair; rows are padded to the largest robot. The state y is q, v, z of the adaptation and
- * the integrals of epsilon, one after another.
+ * the structures, and the generated functions of each kind of robot with the table `kinds`; see header.py. What the
+ * quantities are is said in quantities.py. Arrays are row-major and have one row per robot or pair; rows are padded to
+ * the largest robot. The state y is made of the quantities in STATE, one after another.
  */
 
 #include <math.h>
@@ -42,12 +42,12 @@ static void take(Quantities *a, const Steps *s, int step) {
 #define ROW_one 0
 #define READ(name, rows, columns) *arg++ = a->name + (size_t)ROW_##rows * (columns);
 #define WRITE(name, rows, columns) *res++ = a->name + (size_t)ROW_##rows * (columns);
-#define CALL(function)                                                                     \
+#define CALL(function)                                                                      \
     static void call_##function(const Cell *c, const Quantities *a, int i, const Work *k) { \
-        const double **arg = k->arg;                                                       \
-        double **res = k->res;                                                             \
-        function##_INPUTS(READ) function##_OUTPUTS(WRITE)                                  \
-        kinds[c->kind[i]].function(k->arg, k->res, k->iw, k->w, 0);                        \
+        const double **arg = k->arg;                                                        \
+        double **res = k->res;                                                              \
+        function##_INPUTS(READ) function##_OUTPUTS(WRITE)                                   \
+        kinds[c->kind[i]].function(k->arg, k->res, k->iw, k->w, 0);                         \
     }
 FUNCTIONS(CALL)
 
@@ -65,7 +65,8 @@ static void couple(const Cell *c, Quantities *a) {
         }
     }
     for (int i = 0; i < c->n; i++) {
-        double *E = a->E + (size_t)i * m, *sigma = a->sigma + (size_t)i * m, *sigma_dot = a->sigma_dot + (size_t)i * m;
+        double *E = a->E + (size_t)i * m;
+        double *sigma = a->sigma + (size_t)i * m, *sigma_dot = a->sigma_dot + (size_t)i * m;
         for (int j = 0; j < m; j++) E[j] = sigma[j] = sigma_dot[j] = 0;
         for (int t = c->first[i]; t < c->first[i + 1]; t++) {
             size_t pair = (size_t)c->incident[t] * m;
@@ -274,6 +275,13 @@ static int begin(const Cell *c, Quantities *a, Work *k, const Steps *s, int step
     return 0;
 }
 
+/* Look at a step that has ended, by what the torque that was held through it does there: it may jump now. */
+static void look_at_end(const Cell *c, Quantities *a, Work *k, const Steps *s, int step, double h, const double *y) {
+    coast(c, a, k, s, 2, step, y, k->k[0]);
+    look_back(c, s->t[step + 1], h, y, k->k[3], k->k[0], &k->step_error);
+    k->step_error.h_before = 0;
+}
+
 /* Advance y through some steps; rows are counted in the report. */
 void advance(const Cell *c, Quantities *a, Work *k, const Steps *s, double *y, const Log *log, Report *report) {
     Rate *rate = s->holds ? coast : evaluate;
@@ -283,11 +291,7 @@ void advance(const Cell *c, Quantities *a, Work *k, const Steps *s, double *y, c
         if (s->holds) coast(c, a, k, s, 0, step, y, k->k[0]);
         runge_kutta(c, a, k, s, rate, step, h, y);
         k->step_error.h = h;
-        if (s->holds) {
-            coast(c, a, k, s, 2, step, y, k->k[0]);
-            look_back(c, s->t[step + 1], h, y, k->k[3], k->k[0], &k->step_error);
-            k->step_error.h_before = 0; /* torque may jump here */
-        }
+        if (s->holds) look_at_end(c, a, k, s, step, h, y);
     }
 }
 
