@@ -125,8 +125,8 @@ def test_structures_have_the_same_layout_in_c_and_in_python(tmp_path):
         places.append(f"sizeof({title})")
         expected.append(structs.ctypes.sizeof(structure))
         for field in (name for name, *_ in structure._fields_):
-            places.append(f"offsetof({title}, {field})")
-            expected.append(getattr(structure, field).offset)
+            places += [f"offsetof({title}, {field})", f"sizeof((({title} *)0)->{field})"]
+            expected += [getattr(structure, field).offset, getattr(structure, field).size]
     declarations = "".join(map(structs.declared, structs.STRUCTURES))
     lines = "".join(f'    printf("%zu\\n", {place});\n' for place in places)
     source = f"#include <stddef.h>\n#include <stdio.h>\n{declarations}int main(void) {{\n{lines}}}\n"
