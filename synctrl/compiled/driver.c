@@ -121,9 +121,9 @@ static void coast(const Cell *c, Quantities *a, Work *k, const Steps *s, int sta
 }
 
 /* From here on acts what the controller asks for here. */
-static void sample(const Cell *c, Quantities *a, Work *k) {
+static void sample(const Cell *c, Quantities *a, Work *k, const Steps *s) {
     memcpy(a->acting, a->tau, sizeof(double) * c->n * nv);
-    memcpy(k->held, k->k[0], sizeof(double) * state_size(c));
+    if (s->holds) memcpy(k->held, k->k[0], sizeof(double) * state_size(c));
 }
 
 /* One row of the log, of an instant at which the loop was evaluated. */
@@ -270,7 +270,7 @@ static int begin(const Cell *c, Quantities *a, Work *k, const Steps *s, int step
     if (!s->holds)
         look_back(c, s->t[step], marks & JOINED ? k->step_error.h : 0, y, k->k[3], k->k[0], &k->step_error);
     if (marks & CHECKED && check(c, a, k, y, report)) return 1;
-    if (marks & SAMPLED) sample(c, a, k);
+    if (marks & SAMPLED) sample(c, a, k, s);
     if (marks & LOGGED) record(c, a, k, report->rows++, log);
     return 0;
 }
