@@ -179,7 +179,7 @@ def test_an_unknown_name_lists_the_near_ones():
 
 @pytest.mark.parametrize("path", ["no/such/robot", "robot.urdf"])
 def test_a_text_that_looks_like_a_path_is_one(path):
-    with pytest.raises(RobotError, match="no such file"):
+    with refused(RobotError, None, file=path, line=None):
         load_description(path)
 
 
@@ -199,5 +199,5 @@ def test_without_example_robot_data_the_own_robots_load_and_the_others_say_what_
 
     monkeypatch.setattr(metadata, "distribution", missing)
     assert load_description("a460").model.nv == 3
-    with pytest.raises(MissingDependencyError, match="example-robot-data, which is not installed"):
+    with refused(MissingDependencyError, "robot 'ur5'"):
         load_description("ur5")

@@ -68,7 +68,7 @@ def test_numbers_that_are_not_finite_and_folders_that_are_files_are_refused(tmp_
     with refused(InputError, "metrics"):
         write_metrics(tmp_path / "m.json", {"a": {"peak": float("nan")}}, [])
     (tmp_path / "file").write_text("")
-    with pytest.raises(ResultError, match="cannot write"):
+    with refused(ResultError, file=str(tmp_path / "file" / "m.json")):
         write_metrics(tmp_path / "file" / "m.json", {}, [])
     with refused(InputError, "settling bands"):
         settling_bands()

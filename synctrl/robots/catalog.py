@@ -106,7 +106,8 @@ def _folder(name: str, entry: Entry) -> Path:
     data = data_folder()
     if data is None:
         raise MissingDependencyError(
-            f"robot '{name}' comes from the package example-robot-data, which is not installed; "
-            "install it with: pip install example-robot-data"
+            "it comes from the package example-robot-data, which is not installed; "
+            "install it with: pip install example-robot-data",
+            subject=f"robot '{name}'",
         )
     return data / "example-robot-data" / "robots"

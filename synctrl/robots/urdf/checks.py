@@ -224,9 +224,8 @@ def check_model(document: Document, model: pin.Model) -> None:
     """
     joints = sorted(joint.name for joint in document.moving_joints)
     if sorted(model.names) != sorted([*joints, "universe"]):
-        raise document.error(
-            f"expected a model with the joints {_some(joints)}, found {_some(model.names[1:])}"
-        )
+        found = _some(model.names[1:])
+        raise document.error(f"expected a model with the joints {_some(joints)}, found {found}", found=found)
     _check_inertias(document, model)
     for q in _configurations(model):
         _check_mass_matrix(document, model, q)

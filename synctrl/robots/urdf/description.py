@@ -209,7 +209,8 @@ def model_from_xml(source: str, xml: str) -> pin.Model:
             model, failure = None, error
     if failure is not None:
         reason = " ".join(written[0].split()) or str(failure)
-        raise RobotError(f"expected a URDF that Pinocchio accepts, found: {reason}", file=source) from failure
+        message = f"expected a URDF that Pinocchio accepts, found: {reason}"
+        raise RobotError(message, file=source, found=reason) from failure
     return model
 
 
