@@ -1,0 +1,78 @@
+"""Messages: what a network hears at instants of its own, between which it knows nothing new."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..tasks.cell import Cell, Reference
+from .commands import weighted
+from .network import BoundNetwork
+
+#: how far beyond an interval a message may be that counts as in it, as a share of its ends
+ROUNDING = 1e-12
+
+
+class Messages:
+    """The messages of a network; none of one that does not say when they come.
+
+    Args:
+        cell: the cell.
+        network: its network.
+    """
+
+    def __init__(self, cell: Cell, network: BoundNetwork):
+        self._measure, self._network = cell.task.measure, network
+        self._times: Any = getattr(network, "messages", None)
+
+    @property
+    def sent(self) -> bool:
+        """Whether the network has messages at all."""
+        return self._times is not None
+
+    def between(self, start: float, end: float) -> list[float]:
+        """Instants of the messages with start <= t < end, in order, s.
+
+        Raises:
+            InputError: the network gives something else.
+        """
+        if not self.sent:
+            return []
+        times = np.asarray(self._times(start, end), dtype=float)
+        slack = ROUNDING * max(abs(start), abs(end))
+        inside = bool(((times >= start - slack) & (times <= end + slack)).all())
+        if times.ndim != 1 or not inside or (np.diff(times) < 0).any():
+            raise InputError(
+                f"network {type(self._network).__qualname__}, messages: expected instants in order with "
+                f"{start:g} <= t < {end:g} s, found {times!s:.80}"
+            )
+        return times.tolist()
+
+    def received(
+        self, times: Sequence[float], reference: Reference, motion: np.ndarray, memory: np.ndarray
+    ) -> np.ndarray:
+        """Memory of the network after messages, which all robots send as they are now.
+
+        Args:
+            times: when the messages were due, s.
+            reference: what is desired now.
+            motion: joint positions and velocities, (2, n, nv).
+            memory: of the network, before.
+
+        Raises:
+            InputError: the network makes memory of another shape.
+        """
+        network: Any = self._network
+        w = weighted(self._measure(motion, reference.desired), reference) if times else None
+        for t in times:
+            found = np.asarray(network.meet(t, w, memory), dtype=float)
+            if found.shape != memory.shape:
+                raise InputError(
+                    f"network {type(network).__qualname__}, meet: expected memory of shape {memory.shape}, "
+                    f"found {found.shape}"
+                )
+            memory = found
+        return memory
