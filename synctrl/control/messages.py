@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, NonFiniteError
 from ..tasks.cell import Cell, Reference
 from .commands import weighted
 from .network import BoundNetwork
@@ -64,15 +64,26 @@ class Messages:
 
         Raises:
             InputError: the network makes memory of another shape.
+            NonFiniteError: it makes finite memory infinite.
         """
-        network: Any = self._network
-        w = weighted(self._measure(motion, reference.desired), reference) if times else None
+        if not times:
+            return memory
+        w = weighted(self._measure(motion, reference.desired), reference)
         for t in times:
-            found = np.asarray(network.meet(t, w, memory), dtype=float)
-            if found.shape != memory.shape:
-                raise InputError(
-                    f"network {type(network).__qualname__}, meet: expected memory of shape {memory.shape}, "
-                    f"found {found.shape}"
-                )
-            memory = found
+            memory = self._after(t, w, memory)
         return memory
+
+    def _after(self, t: float, w: np.ndarray, memory: np.ndarray) -> np.ndarray:
+        """Memory after one message, looked at."""
+        network: Any = self._network
+        found = np.asarray(network.meet(t, w, memory), dtype=float)
+        where = f"network {type(network).__qualname__}, meet"
+        if found.shape != memory.shape:
+            raise InputError(f"{where}: expected memory of shape {memory.shape}, found {found.shape}")
+        sound = np.isfinite(memory).all() and np.isfinite(w).all()
+        if sound and not np.isfinite(found).all():
+            raise NonFiniteError(
+                f"{where}: expected finite memory after the message of {t:g} s, found {found.tolist()}",
+                cause="part",
+            )
+        return found

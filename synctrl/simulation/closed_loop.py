@@ -60,12 +60,12 @@ class ClosedLoop:
             return
         shapes = {"acceleration": q.shape, "rate of its own state": hidden.shape}
         for (what, expected), rate in zip(shapes.items(), rates, strict=True):
-            self._check_shape(what, expected, rate)
+            self._check_shape(f"its {what}", expected, rate)
 
     def _check_shape(self, what: str, expected: tuple[int, ...], found: np.ndarray) -> None:
         if np.shape(found) != expected:
             raise InputError(
-                f"plant, {type(self.plant).__qualname__}: expected {expected} numbers as its {what}, "
+                f"plant, {type(self.plant).__qualname__}: expected {expected} numbers as {what}, "
                 f"found {np.shape(found)}"
             )
 
@@ -148,11 +148,18 @@ class ClosedLoop:
 
         Raises:
             InputError: the plant gives something of another shape.
+            NonFiniteError: it makes a finite state infinite.
         """
         parts = {"positions": state.q, "velocities": state.v, "state of its own": state.hidden}
-        found = [np.array(part) for part in self.plant.meet(t, state.q, state.v, state.hidden)]
-        for (what, part), after in zip(parts.items(), found, strict=True):
-            self._check_shape(f"{what} after the event at {t:g} s", part.shape, after)
+        sound = np.isfinite(state.flat).all()
+        found = [np.array(part, float) for part in self.plant.meet(t, state.q, state.v, state.hidden)]
+        for (name, part), after in zip(parts.items(), found, strict=True):
+            what = f"its {name} after the event at {t:g} s"
+            self._check_shape(what, part.shape, after)
+            if sound and not np.isfinite(after).all():
+                kind = type(self.plant).__qualname__
+                text = f"{kind} gives {after.tolist()} as {what}; expected finite numbers"
+                raise NonFiniteError(text, time=t, cause="part")
             part[...] = after
 
     def watch(self, state: State, signals: Signals, v_dot: np.ndarray) -> None:
