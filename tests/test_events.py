@@ -45,6 +45,15 @@ def catching(start: float, stop: float, **parts) -> Experiment:
     return loaded(start, stop, plant_type=Catching, **parts)
 
 
+class Kicked(Plant):
+    """A plant in which somebody kicks the robots, while nothing else changes."""
+
+    events = (0.08, 0.1607)
+
+    def meet(self, t, q, v, hidden):
+        return q, v + 0.2, hidden
+
+
 def everything() -> Experiment:
     push = [Disturbance(0, (0.3, -0.2), 0.08, 0.1507)]
     return replace(catching(0.08, 0.1613, network=Posted(0.0203)), disturbances=push)
@@ -65,6 +74,8 @@ KINDS: dict[str, tuple[Callable[[], Experiment], dict, tuple[str, ...]]] = {
     "catch and release on the grid": (lambda: catching(0.08, 0.16), {}, BOTH[:1]),
     "catch and release off the grid": (lambda: catching(0.0803, 0.1607), {}, BOTH[:1]),
     "catch and release between samples": (lambda: catching(0.0803, 0.1607), SAMPLED, BOTH[:1]),
+    "kicks": (lambda: pair(plant_type=Kicked), {}, BOTH[:1]),
+    "kicks between samples": (lambda: pair(plant_type=Kicked), SAMPLED, BOTH[:1]),
     "messages on the grid": (lambda: pair(network=Posted(0.024)), {}, BOTH[:1]),
     "messages off the grid": (lambda: pair(network=Posted(0.0203)), {}, BOTH[:1]),
     "messages to samples": (lambda: pair(network=Posted(0.0203)), SAMPLED, BOTH[:1]),

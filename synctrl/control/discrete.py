@@ -123,7 +123,8 @@ class DiscreteController:
             return self._hold(time, missed, fault)
         with np.errstate(all="ignore"):  # what is not finite is named
             reference = self._reference(time, wanted)
-            memory = self._heard(reference, motion, self._samples + missed)
+            due = self._due(self._samples + missed)
+            memory = self._messages.received(due, reference, motion, self.memory)
             signals = self.controller.unchecked(reference, motion, self.z, memory)
         check_signals(self.cell, time, signals)
         self._samples, self.held = self._samples + missed, self.held + missed
@@ -140,7 +141,8 @@ class DiscreteController:
         Returns:
             What the law computed, its torque neither cut off nor without gravity.
         """
-        reference, memory = self._reference(t), self.heard(t, motion)
+        reference = self._reference(t)
+        memory = self._messages.received(self._due(self._samples), reference, motion, self.memory)
         signals = self.controller.unchecked(reference, motion, self.z, memory)
         self._advance(motion[0], memory, signals)
         return signals
@@ -152,7 +154,8 @@ class DiscreteController:
             t: time of the sample, s.
             motion: joint positions and velocities, (2, n, nv).
         """
-        return self._heard(self._reference(t), motion, self._samples)
+        due = self._due(self._samples)
+        return self._messages.received(due, self._reference(t), motion, self.memory) if due else self.memory
 
     # -- memory -------------------------------------------------------------------------------------------
 
@@ -268,11 +271,10 @@ class DiscreteController:
         reference = self.cell.references(np.array([t]))[0]
         return reference if desired is None else Reference(desired, reference.weights, reference.t)
 
-    def _heard(self, reference: Reference, motion: np.ndarray, sample: int) -> np.ndarray:
-        """Memory with the messages of the period that ends with a sample; with the first, those at it."""
+    def _due(self, sample: int) -> list[float]:
+        """Messages of the period that ends with a sample; with the first, those at it."""
         start = self._end(sample - 1) if sample else self._t0
-        times = self._messages.between(start, self._end(sample))
-        return self._messages.received(times, reference, motion, self.memory)
+        return self._messages.between(start, self._end(sample))
 
     def _end(self, sample: int) -> float:
         """Before this time a message is due with a sample or with one before; roundings do not matter."""
