@@ -13,9 +13,10 @@ from seams.posted_network import BoundPosted, Posted
 from synctrl import Experiment, Payload, Result
 from synctrl.analysis.certify import certify
 from synctrl.analysis.lyapunov import first_growth
-from synctrl.errors import InputError, NonFiniteError, SimulationError
+from synctrl.errors import InputError, NonFiniteError, ResultError, SimulationError
 from synctrl.experiments import a460_pair
 from synctrl.simulation.plant import Plant
+from synctrl.sweep import Grid, Sweep, gain
 
 CATCH, RELEASE = 0.05, 0.1
 BOX = Payload(0, 2.0, (0.05, 0.02, 0.1), start=CATCH, stop=RELEASE)
@@ -128,6 +129,30 @@ def test_runs_with_events_are_saved_loaded_and_certified_again(options, tmp_path
     loaded = Result.load(run.save(tmp_path / "run.npz"))
     assert loaded == run
     assert certify(loaded, experiment).as_dict() == certify(run).as_dict()
+
+
+# -- the sweep --------------------------------------------------------------------------------------------
+
+
+class Later(Kicked):
+    events = (0.05, 0.0804)
+
+
+class Harder(Kicked):
+    def meet(self, t, q, v, hidden):
+        return q, v + 0.6, hidden
+
+
+@pytest.mark.parametrize("kind", [Later, Harder])
+def test_the_folder_of_a_sweep_takes_no_runs_with_other_events(kind, tmp_path):
+    def sweep(plant: type[Plant]) -> Sweep:
+        experiment = replace(a460_pair(friction=False), plant_type=plant)
+        return Sweep(experiment, [gain("beta", Grid([1.0]))], duration=0.06, engine="pinocchio")
+
+    sweep(Kicked).run(tmp_path, backend="serial", progress=False)
+    sweep(Kicked).run(tmp_path, backend="serial", progress=False)
+    with pytest.raises(ResultError, match="dynamics"):
+        sweep(kind).run(tmp_path, backend="serial", progress=False)
 
 
 # -- what is refused --------------------------------------------------------------------------------------
