@@ -123,8 +123,7 @@ class DiscreteController:
             return self._hold(time, missed, fault)
         with np.errstate(all="ignore"):  # what is not finite is named
             reference = self._reference(time, wanted)
-            due = self._due(self._samples + missed)
-            memory = self._messages.received(due, reference, motion, self.memory)
+            memory = self._heard(reference, motion, self._samples + missed)
             signals = self.controller.unchecked(reference, motion, self.z, memory)
         check_signals(self.cell, time, signals)
         self._samples, self.held = self._samples + missed, self.held + missed
@@ -142,7 +141,7 @@ class DiscreteController:
             What the law computed, its torque neither cut off nor without gravity.
         """
         reference = self._reference(t)
-        memory = self._messages.received(self._due(self._samples), reference, motion, self.memory)
+        memory = self._heard(reference, motion, self._samples)
         signals = self.controller.unchecked(reference, motion, self.z, memory)
         self._advance(motion[0], memory, signals)
         return signals
@@ -154,8 +153,9 @@ class DiscreteController:
             t: time of the sample, s.
             motion: joint positions and velocities, (2, n, nv).
         """
-        due = self._due(self._samples)
-        return self._messages.received(due, self._reference(t), motion, self.memory) if due else self.memory
+        if not self._due(self._samples):
+            return self.memory
+        return self._heard(self._reference(t), motion, self._samples)
 
     # -- memory -------------------------------------------------------------------------------------------
 
@@ -168,14 +168,9 @@ class DiscreteController:
         (n, nv), N·m, the torque that is held; `start`, s, `period`, s, and `samples`, the place on the grid;
         `held`. What is set has to be of the same cell and period.
         """
-        numbers = {
-            "start": self._t0,
-            "period": self.period,
-            "samples": float(self._samples),
-            "held": float(self.held),
-        }
+        numbers = {"start": self._t0, "period": self.period, "samples": self._samples, "held": self.held}
         arrays = {"z": self.z, self._memory_name: self.memory, "tau": self._tau}
-        return {name: np.array(value) for name, value in {**arrays, **numbers}.items()}
+        return {name: np.array(value, dtype=float) for name, value in {**arrays, **numbers}.items()}
 
     @state.setter
     def state(self, state: Mapping[str, ArrayLike]) -> None:
@@ -270,6 +265,9 @@ class DiscreteController:
     def _reference(self, t: float, desired: np.ndarray | None = None) -> Reference:
         reference = self.cell.references(np.array([t]))[0]
         return reference if desired is None else Reference(desired, reference.weights, reference.t)
+
+    def _heard(self, reference: Reference, motion: np.ndarray, sample: int) -> np.ndarray:
+        return self._messages.received(self._due(sample), reference, motion, self.memory)
 
     def _due(self, sample: int) -> list[float]:
         """Messages of the period that ends with a sample; with the first, those at it."""
