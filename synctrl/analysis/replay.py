@@ -253,30 +253,16 @@ def _friction(
 
 
 def _check_sizes(result: Result, loop: ClosedLoop) -> None:
-    cell = loop.cell
-    expected = {
-        "q": (cell.n, cell.nv),
-        "theta_hat": cell.theta.shape,
-        "sync_error": (cell.coupling.pairs, cell.m),
-    }
-    for name, shape in expected.items():
-        found = getattr(result, name).shape[1:]
+    """Compare shapes, also those of the states that adaptation, network and plant have for themselves."""
+    cell, own = loop.cell, own_states(loop)
+    errors = {"theta_hat": cell.theta.shape, "sync_error": (cell.coupling.pairs, cell.m)}
+    for name, shape in {"q": (cell.n, cell.nv), **errors, **own}.items():
+        array = result.outputs.get(name) if name in own else getattr(result, name)
+        found = None if array is None else array.shape[1:]
         if found != shape:
-            raise InputError(
-                f"expected the one that made the result; its {name} has the shape {shape} at an "
-                f"instant, but the result's has {found}",
-                subject="experiment",
-            )
+            raise _another(f"its {name} has the shape {shape} at an instant, but the result's has {found}")
     if not len(result.t):
         raise InputError("expected at least one logged instant, found none", subject="result")
-    for name, shape in own_states(loop).items():
-        found = result.outputs[name].shape[1:] if name in result.outputs else None
-        if found != shape:
-            raise InputError(
-                "expected the one that made the result, with the whole state in the log; its "
-                f"output '{name}' has the shape {shape} at an instant, but the result's has {found}",
-                subject="experiment",
-            )
 
 
 def _check_numbers(result: Result) -> None:
@@ -296,8 +282,12 @@ def _check_same(result: Result, rows: Row) -> None:
     wrong = ~(difference <= MISMATCH * (np.abs(rows.v_ref) + np.abs(rows.v)).max(axis=(1, 2)))
     if wrong.any():
         k = int(np.argmax(wrong))
-        raise InputError(
-            f"expected the one that made the result; at t = {result.t[k]:g} s it gives a "
-            f"velocity error of {rows.s_q[k].tolist()}, but the result has {result.v_error[k].tolist()}",
-            subject="experiment",
+        raise _another(
+            f"at t = {result.t[k]:g} s it gives a velocity error of {rows.s_q[k].tolist()}, but the result "
+            f"has {result.v_error[k].tolist()}"
         )
+
+
+def _another(reason: str) -> InputError:
+    """The error about an experiment that is another one than that of the result."""
+    return InputError(f"expected the one that made the result; {reason}", subject="experiment")
