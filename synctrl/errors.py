@@ -230,9 +230,10 @@ def failed(what: str, t: float, error: Exception, robot: int | None = None) -> S
         error: what it raised.
         robot: index of the robot concerned, counted from 0, or None.
     """
-    return SimulationError(
-        f"{what} failed at t = {t:g} s with {type(error).__name__}: {error}", time=t, robot=robot
-    )
+    message = f"{what} failed at t = {t:g} s with {type(error).__name__}: {error}"
+    stop = SimulationError(message, time=t, robot=robot)
+    stop.subject = what
+    return stop
 
 
 def _remade(kind: type[BaseException], args: tuple) -> BaseException:

@@ -193,4 +193,4 @@ def _check_outputs(result: Result) -> None:
         try:
             check_shape(name, array.dtype, array.shape, expected[f"{OUTPUTS}{name}"])
         except ResultError as error:
-            raise InputError(f"{error}", subject="outputs") from None
+            raise InputError(str(error), subject="outputs") from None
