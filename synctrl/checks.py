@@ -37,6 +37,14 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | No
     return array
 
 
+def symmetric_matrix(name: str, value: ArrayLike, size: int) -> np.ndarray:
+    """`value` as a read-only symmetric float array, (size, size)."""
+    array = finite_array(name, value, (size, size))
+    if not np.allclose(array, array.T, rtol=1e-12, atol=0):
+        raise InputError(f"expected a symmetric matrix, found {array.tolist()}", subject=name)
+    return array
+
+
 def finite_number(name: str, value: object) -> float:
     """`value` as a finite float."""
     if isinstance(value, (bool, np.bool_)):
@@ -68,6 +76,23 @@ def count(name: str, value: object, least: int = 1) -> int:
             f"expected a whole number of at least {least}, found {value!r}", subject=name, found=value
         )
     return int(value)  # type: ignore[call-overload]
+
+
+def index(name: str, value: object, count: int) -> int:
+    """`value` as the index of one of so many things, counted from 0."""
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not whole or not 0 <= value < count:  # type: ignore[operator]
+        raise InputError(f"expected an index from 0 to {count - 1}, found {value!r}", subject=name)
+    return int(value)  # type: ignore[call-overload]
+
+
+def window(name: str, start: object, stop: object) -> tuple[float, float]:
+    """Two times, s, of which the second is later than the first; None stands for no end."""
+    first = finite_number(f"{name}, start", start)
+    last = np.inf if stop is None else finite_number(f"{name}, stop", stop)
+    if not 0 <= first < last:
+        raise InputError(f"expected 0 <= start < stop, found {first:g} and {last:g} s", subject=name)
+    return first, last
 
 
 def boolean(name: str, value: object) -> bool:

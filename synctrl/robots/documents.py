@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, positive_number
+from ..checks import finite_array, positive_number, symmetric_matrix
 from ..errors import FrameNotFound, InputError
 from ..files import write_whole
 from .catalog import load_description
@@ -166,13 +166,8 @@ def _payload(
 ) -> Link:
     sides = tuple(positive_number(f"size[{k}]", side) for k, side in enumerate(_triple("size", size)))
     x, y, z = (side**2 for side in sides)
-    I = (
-        np.diag([y + z, x + z, x + y]) * mass / 12
-        if inertia is None
-        else finite_array("inertia", inertia, (3, 3))
-    )
-    if not np.allclose(I, I.T, rtol=1e-12, atol=0):
-        raise InputError(f"expected a symmetric matrix, found {I.tolist()}", subject="inertia")
+    box = np.diag([y + z, x + z, x + y]) * mass / 12
+    I = symmetric_matrix("inertia", box if inertia is None else inertia, 3)
     inertial = Inertial(mass, upper_triangle(I), Pose(com))
     if fault := inertial_fault(inertial):
         raise InputError(fault, subject="inertia")

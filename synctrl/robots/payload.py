@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from ..checks import finite_array, instance, positive_number
+from ..checks import finite_array, instance, positive_number, symmetric_matrix
 from ..errors import FrameNotFound, InputError
 from .documents import weld
 from .robot import Robot
@@ -47,11 +47,8 @@ class Load:
             radius = np.cbrt(3 * self.mass / (4 * np.pi * 1000.0))
             return 0.4 * self.mass * radius**2 * np.eye(3)
         given = finite_array("payload, inertia", self.inertia)
-        inertia = finite_array("payload, inertia", np.diag(given) if given.shape == (3,) else given, (3, 3))
-        if not np.allclose(inertia, inertia.T, rtol=1e-12, atol=0):
-            raise InputError(
-                f"expected a symmetric matrix, found {inertia.tolist()}", subject="payload, inertia"
-            )
+        full = np.diag(given) if given.shape == (3,) else given
+        inertia = symmetric_matrix("payload, inertia", full, 3)
         moments = np.linalg.eigvalsh(inertia)
         if moments[0] <= 0 or moments[2] > (1 + 1e-9) * (moments[0] + moments[1]):
             raise InputError(

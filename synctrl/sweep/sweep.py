@@ -6,10 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Unpack
 
-import numpy as np
-
-from ..checks import count
-from ..errors import InputError
+from ..checks import count, index
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .distributions import Value
@@ -151,6 +148,5 @@ class Sweep:
 
     def _task(self, run: int) -> Task:
         """A run and its values."""
-        if isinstance(run, bool) or not isinstance(run, (int, np.integer)) or not 0 <= run < len(self):
-            raise InputError(f"expected a number from 0 to {len(self) - 1}, found {run!r}", subject="run")
-        return Task(int(run), tuple(self._draws.at(int(run))))  # type: ignore[arg-type]
+        number = index("run", run, len(self))
+        return Task(number, tuple(self._draws.at(number)))  # type: ignore[arg-type]

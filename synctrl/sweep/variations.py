@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import index
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
 from ..errors import InputError
@@ -169,18 +170,17 @@ def _with_estimates(
 
 
 def _with_disturbance(
-    experiment: Experiment, index: int, change: Callable[[Disturbance], Disturbance]
+    experiment: Experiment, disturbance: int, change: Callable[[Disturbance], Disturbance]
 ) -> Experiment:
     disturbances = list(experiment.disturbances)
-    here = _index("disturbance", index, len(disturbances))
+    here = _index("disturbance", disturbance, len(disturbances))
     disturbances[here] = [change(d) for d in disturbances[here]]
     return replace(experiment, disturbances=disturbances)
 
 
-def _index(what: str, index: int | None, count: int) -> slice:
+def _index(what: str, given: int | None, count: int) -> slice:
     """One of so many, or all of them."""
-    if index is None:
+    if given is None:
         return slice(None)
-    if not 0 <= index < count:
-        raise InputError(f"expected an index from 0 to {count - 1}, found {index}", subject=what)
-    return slice(index, index + 1)
+    k = index(what, given, count)
+    return slice(k, k + 1)
