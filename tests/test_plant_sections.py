@@ -14,7 +14,7 @@ from synctrl.experiments import a460_full_pair, a460_pair
 from synctrl.paper.judge import AGREEMENT, compare_runs, joint_pair
 from synctrl.paper.judge_section import differences, judge_section
 from synctrl.paper.plant_sections import friction_section, full_a460_section, identification_section
-from synctrl.paper.report import Row, write_page
+from synctrl.paper.report import SideBySide, write_page
 from synctrl.paper.reproduction import PLANNED, judge_runs, judged
 from synctrl.show.plots import joint_trajectories, save
 
@@ -44,7 +44,7 @@ def test_the_page_shows_three_and_six_joints_side_by_side(runs, tmp_path) -> Non
         save(joint_trajectories(runs[kind], robot), tmp_path / f"figure_{figure:02d}")
     section = full_a460_section(runs, tmp_path)
     page = write_page(tmp_path / "index.html", "page", [section]).read_text("utf-8")
-    rows = [block for block in section.blocks if isinstance(block, Row)]
+    rows = [block for block in section.blocks if isinstance(block, SideBySide)]
     assert len(rows) == 6
     for figure, row in enumerate(rows, start=2):
         for picture, joints in zip(row.blocks, ("three", "six"), strict=True):

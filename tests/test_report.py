@@ -13,13 +13,13 @@ from browser import open_page, require_browser
 from refusals import refused
 
 from synctrl.errors import InputError, ResultError
-from synctrl.paper.claims import Claim, Quantity
+from synctrl.paper.claims import Claim, Finding
 from synctrl.paper.report import (
     Formulas,
     Links,
     Picture,
-    Row,
     Section,
+    SideBySide,
     Table,
     Text,
     Verdicts,
@@ -39,12 +39,12 @@ def page_of(tmp_path, *blocks):
 
 
 def test_words_from_data_never_become_markup(tmp_path):
-    claim = Claim(NASTY, NASTY, False, (Quantity(NASTY, 1.0, NASTY),), NASTY)
+    claim = Claim(NASTY, NASTY, False, (Finding(NASTY, 1.0, NASTY),), NASTY)
     svg = tmp_path / "f.svg"
     svg.write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")
     blocks = [Text(NASTY), Table((NASTY,), ((NASTY,),), NASTY), Verdicts((claim,)), Picture(svg, NASTY)]
     blocks += [Formulas((("x", NASTY, NASTY),)), Table(("", ""), (), groups=((NASTY, 1),))]
-    text = page_of(tmp_path, *blocks, Row((Text(NASTY),)), Links(((NASTY, NASTY),)))
+    text = page_of(tmp_path, *blocks, SideBySide((Text(NASTY),)), Links(((NASTY, NASTY),)))
     assert "<script" not in text
     assert "<img src=x" not in text
     assert text.count("&lt;script&gt;") >= 10

@@ -14,7 +14,7 @@ from synctrl import Disturbance
 from synctrl.analysis import Certificate, certify
 from synctrl.errors import ResultError
 from synctrl.paper.baselines import Comparison, compare
-from synctrl.paper.report import Row, Table, Text, write_page
+from synctrl.paper.report import SideBySide, Table, Text, write_page
 from synctrl.paper.reproduction import PLANNED
 from synctrl.paper.theory import CERTIFIED, examine
 from synctrl.paper.theory_sections import baseline_section, certificate_section, draw_certificate
@@ -48,7 +48,7 @@ def test_the_section_has_a_figure_and_a_verdict_for_every_run(certificates, tmp_
 
 def test_an_odd_number_of_figures_stands_in_one_grid_and_none_alone(certificates, tmp_path: Path) -> None:
     three = {**certificates, "third": certificates["free"]}
-    rows = [block for block in certificate_section(three, tmp_path).blocks if isinstance(block, Row)]
+    rows = [block for block in certificate_section(three, tmp_path).blocks if isinstance(block, SideBySide)]
     assert [len(row.blocks) for row in rows] == [3]
 
 

@@ -23,7 +23,7 @@ from ..robots.robot import Robot, load_robot
 from ..simulation.simulate import Experiment
 from ..tasks.spaces import JointSpace
 from ..tasks.trajectories import Cubic
-from .parts import Parts, ready_experiment
+from .parts import ControllerParts, ready_experiment
 
 INITIAL = np.deg2rad([[73.3340, 60.3330, -169.8120], [15.2520, 71.6830, -181.9800]])  # Table I
 FINAL = np.deg2rad([[90.0, 63.6090, -174.7290], [-2.9730, 74.1070, -185.1080]])
@@ -43,7 +43,7 @@ def a460_pair(
     friction: bool = True,
     gains: Gains | None = None,
     adapt_friction: bool = False,
-    **parts: Unpack[Parts],
+    **parts: Unpack[ControllerParts],
 ) -> Experiment:
     """The two-arm cell of section V-A, in joint space with epsilon = e_1 - e_2, eq. (45).
 
@@ -52,7 +52,7 @@ def a460_pair(
         friction: whether the plant has friction, which is outside the controller's model.
         gains: by default the paper's.
         adapt_friction: whether the controller's model has friction too, see `FrictionParameters`.
-        parts: parts and options of the controller, see `Parts`.
+        parts: parts and options of the controller, see `ControllerParts`.
     """
     boolean("friction", friction)
     boolean("adapt_friction", adapt_friction)

@@ -15,7 +15,7 @@ from ..simulation.disturbances import Disturbance
 from ..simulation.simulate import Experiment
 
 
-class Parts(TypedDict, total=False):
+class ControllerParts(TypedDict, total=False):
     """Parts and options of the controller, as `Experiment` takes them."""
 
     adaptation: Adaptation | None
@@ -31,7 +31,7 @@ def ready_experiment(
     default: Gains,
     gains: Gains | None,
     synchronized: bool,
-    parts: Parts,
+    parts: ControllerParts,
     *remarks: str,
     disturbances: Sequence[Disturbance] = (),
 ) -> Experiment:

@@ -22,7 +22,7 @@ from ..simulation.disturbances import Disturbance
 from ..simulation.simulate import Experiment
 from ..tasks.spaces import CartesianSpace
 from ..tasks.trajectories import ExponentialApproach
-from .parts import Parts, ready_experiment
+from .parts import ControllerParts, ready_experiment
 
 R, D = 5.0, 1.0  # m
 TURN = 0.02  # rad, how far each desired path goes along its circle
@@ -45,7 +45,7 @@ def planar_four(
     phi: float = 0.1,
     radii: str = "text",
     gains: Gains | None = None,
-    **parts: Unpack[Parts],
+    **parts: Unpack[ControllerParts],
 ) -> Experiment:
     """The four-arm cell of section V-B, in Cartesian space with the ring (47)-(48).
 
@@ -56,7 +56,7 @@ def planar_four(
         radii: "text" puts robots 2 and 3 on the larger circle as (46) and (47) do, "table" 2 and 4 as
             Table II.
         gains: by default the paper's.
-        parts: parts and options of the controller, see `Parts`.
+        parts: parts and options of the controller, see `ControllerParts`.
 
     Raises:
         InputError: an unknown word, or a number that is not finite.

@@ -21,7 +21,7 @@ from ..tasks.pose import PoseSpace
 from ..tasks.poses import Attached, AxisRotation, PoseTrajectory
 from ..tasks.rotations import exp
 from ..tasks.trajectories import FunctionTrajectory
-from .parts import Parts, ready_experiment
+from .parts import ControllerParts, ready_experiment
 
 DISTANCE = 0.65  # m, of each base from the middle
 LENGTH = 0.40  # m, of the payload: from hand to hand
@@ -44,7 +44,9 @@ GAINS = Gains(
 )
 
 
-def ur5_payload(synchronized: bool = True, gains: Gains | None = None, **parts: Unpack[Parts]) -> Experiment:
+def ur5_payload(
+    synchronized: bool = True, gains: Gains | None = None, **parts: Unpack[ControllerParts]
+) -> Experiment:
     """The two-arm cell in pose space, with epsilon = e_1 - e_2 in position and orientation.
 
     Without friction, and with 0.7 of the true inertial parameters as the first estimate. The arms start at
@@ -53,7 +55,7 @@ def ur5_payload(synchronized: bool = True, gains: Gains | None = None, **parts: 
     Args:
         synchronized: False sets beta = K_eps = 0, independent adaptive control.
         gains: by default ones that converge within the run.
-        parts: parts and options of the controller, see `Parts`.
+        parts: parts and options of the controller, see `ControllerParts`.
     """
     members = [_member(i) for i in range(2)]
     cell = Cell(members, Coupling.pair(), PoseSpace(), name="UR5 pair with payload")

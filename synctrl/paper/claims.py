@@ -30,7 +30,7 @@ ALONG = 0.9
 
 
 @dataclass(frozen=True)
-class Quantity:
+class Finding:
     """A computed figure behind a verdict."""
 
     name: str
@@ -53,7 +53,7 @@ class Claim:
     text: str
     source: str
     holds: bool
-    figures: tuple[Quantity, ...]
+    figures: tuple[Finding, ...]
     explanation: str
 
     def as_data(self) -> dict[str, Any]:
@@ -66,7 +66,7 @@ def sync_error_is_much_smaller(synchronized: Result, independent: Result, source
     ours, theirs = metrics(synchronized).sync_error, metrics(independent).sync_error
     peak, rms = theirs.peak / ours.peak, theirs.rms / ours.rms
     figures = [
-        Quantity(f"{name} of {error_name(synchronized, *at)}, independent / synchronized", value)
+        Finding(f"{name} of {error_name(synchronized, *at)}, independent / synchronized", value)
         for name, ratios in (("peak", peak), ("RMS", rms))
         for at, value in extremes(ratios)
     ]
@@ -88,9 +88,9 @@ def errors_converge(run: Result, source: str) -> Claim:
         source,
         bool(max(tracking, sync) <= CONVERGED),
         (
-            Quantity("late tracking error / peak", tracking),
-            Quantity("late synchronization error / peak", sync),
-            Quantity("length of the run", run.t[-1], "s"),
+            Finding("late tracking error / peak", tracking),
+            Finding("late synchronization error / peak", sync),
+            Finding("length of the run", run.t[-1], "s"),
         ),
         f"Asked: over the last tenth of the run at most {CONVERGED:.0%} of each peak left. A run of finite "
         "length can show decay, not the limit; the limit is the theorem's.",

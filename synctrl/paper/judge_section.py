@@ -13,7 +13,7 @@ from ..show.panels import power_of_ten
 from ..show.plots import new_figure, style
 from ..show.style import ACCENT, robot_color
 from .judge import AGREEMENT, Agreement
-from .report import Section, Table, Text, drawn
+from .report import Section, Table, Text, as_picture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,7 +51,7 @@ def judge_section(cells: Sequence[Agreement], folder: Path) -> Section:
         for cell in cells
     )
     return Section(
-        TITLE, (Text(words), drawn(differences(cells), folder / "judge", caption), Table(head, rows))
+        TITLE, (Text(words), as_picture(differences(cells), folder / "judge", caption), Table(head, rows))
     )
 
 

@@ -19,7 +19,19 @@ from .claims import Claim
 from .claims import kind as kind_of
 from .claims_a460 import a460_claims
 from .claims_planar import own_findings, planar_four_claims
-from .report import Block, Formulas, Links, Picture, Row, Section, Table, Text, Verdicts, drawn, number
+from .report import (
+    Block,
+    Formulas,
+    Links,
+    Picture,
+    Section,
+    SideBySide,
+    Table,
+    Text,
+    Verdicts,
+    as_picture,
+    number,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -98,7 +110,7 @@ def a460_section(runs: Mapping[str, Result], folder: Path, animations: Links) ->
         "Synchronization errors of the joints": lambda run: sync_errors(run, limits),
     }
     blocks: list[Block] = [_A460, _SYNTHETIC, animations]
-    blocks += [*_side_by_side(folder, 2, pair, drawings), *metrics_tables(*pair.values())]
+    blocks += [*_compared(folder, 2, pair, drawings), *metrics_tables(*pair.values())]
     blocks.append(Verdicts(tuple(a460_claims(runs))))
     return Section("Two CRS A460 robots (section V-A)", tuple(blocks))
 
@@ -144,7 +156,7 @@ def _planar_pair(folder: Path, first: int, pair: Mapping[str, Result]) -> list[B
         "Position errors": lambda run: tracking_errors(run, e),
         "Synchronization errors": lambda run: sync_errors(run, epsilon),
     }
-    return [*_side_by_side(folder, first, pair, drawings), *metrics_tables(*pair.values())]
+    return [*_compared(folder, first, pair, drawings), *metrics_tables(*pair.values())]
 
 
 _PLANAR = Text(
@@ -178,18 +190,18 @@ KINDS = ("synchronized", "independent")
 Drawings = Mapping[str, Callable[[Result], "Figure"]]
 
 
-def _side_by_side(folder: Path, first: int, runs: Mapping[str, Result], drawings: Drawings) -> list[Row]:
+def _compared(folder: Path, first: int, runs: Mapping[str, Result], drawings: Drawings) -> list[Block]:
     """A column of figures per run, a row per drawing; as in the paper, they are numbered down the columns."""
     numbers = count(first)
     columns = [
         [_numbered(folder, next(numbers), draw(run), f"{what}, {kind}.") for what, draw in drawings.items()]
         for kind, run in runs.items()
     ]
-    return [Row(row) for row in zip(*columns, strict=True)]
+    return [SideBySide(row) for row in zip(*columns, strict=True)]
 
 
 def _numbered(folder: Path, k: int, figure: Figure, caption: str) -> Picture:
-    return drawn(figure, folder / f"figure_{k:02d}", f"Figure {k}. {caption}")
+    return as_picture(figure, folder / f"figure_{k:02d}", f"Figure {k}. {caption}")
 
 
 # -- tables -----------------------------------------------------------------------------------------------

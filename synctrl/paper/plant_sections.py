@@ -12,7 +12,7 @@ from ..analysis.identification import LEARNED, Identification
 from ..show.plots import common_limits, joint_trajectories, sync_errors, tracking_errors
 from ..show.style import display
 from ..simulation.result import Result
-from .report import Block, Picture, Row, Section, Table, Text, drawn, number
+from .report import Block, Picture, Section, SideBySide, Table, Text, as_picture, number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,10 +40,12 @@ def full_a460_section(runs: Mapping[str, Result], folder: Path) -> Section:
         pair = (runs[kind], runs[FULL[kind]])
         for k, robot in enumerate(range(2), start=first):
             known = Picture(folder / f"figure_{k:02d}.svg", _caption(k, kind, "three"))  # drawn already
-            blocks.append(Row((known, _figure(folder, k, joint_trajectories(pair[1], robot), kind, "six"))))
+            blocks.append(
+                SideBySide((known, _figure(folder, k, joint_trajectories(pair[1], robot), kind, "six")))
+            )
         errors = zip(pair, ("three", "six"), strict=True)
         both = (_figure(folder, first + 2, sync_errors(run, limits), kind, joints) for run, joints in errors)
-        blocks.append(Row(tuple(both)))
+        blocks.append(SideBySide(tuple(both)))
     return Section("The A460 with six joints", (*blocks, _wrist_table(runs), _error_table(runs)))
 
 
@@ -57,7 +59,9 @@ def friction_section(runs: Mapping[str, Result], folder: Path) -> Section:
     pair = (runs["friction_unknown"], runs["friction_adapted"])
     limits = common_limits("tracking_error", *pair)
     pictures = tuple(
-        drawn(tracking_errors(run, limits), folder / f"friction_{name}", f"Tracking errors, friction {name}.")
+        as_picture(
+            tracking_errors(run, limits), folder / f"friction_{name}", f"Tracking errors, friction {name}."
+        )
         for run, name in zip(pair, ("unknown", "adapted"), strict=True)
     )
     unit, factor = display(pair[0].unit("tracking_error"))
@@ -71,7 +75,7 @@ def friction_section(runs: Mapping[str, Result], folder: Path) -> Section:
         "for the plant with friction, and the offset that friction leaves goes away. The coefficients start "
         "at 0.7 of the true ones, as the other parameters do."
     )
-    return Section("Friction among what is adapted", (words, Row(pictures), Table(head, tuple(rows))))
+    return Section("Friction among what is adapted", (words, SideBySide(pictures), Table(head, tuple(rows))))
 
 
 def identification_section(found: Mapping[str, Sequence[Identification]]) -> Section:
@@ -108,7 +112,7 @@ def identification_section(found: Mapping[str, Sequence[Identification]]) -> Sec
 
 def _figure(folder: Path, k: int, figure: Figure, kind: str, joints: str) -> Picture:
     """One figure of the paper for the plant with three joints, or with six."""
-    return drawn(figure, folder / f"figure_{k:02d}_{joints}_joints", _caption(k, kind, joints))
+    return as_picture(figure, folder / f"figure_{k:02d}_{joints}_joints", _caption(k, kind, joints))
 
 
 def _caption(k: int, kind: str, joints: str) -> str:

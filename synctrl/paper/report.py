@@ -19,7 +19,7 @@ from ..files import reported, write_whole
 from ..show.panels import ten_to
 from ..show.plots import save
 from ..show.style import display
-from .claims import Claim, Quantity
+from .claims import Claim, Finding
 from .formulas import formula_svg
 
 if TYPE_CHECKING:
@@ -78,14 +78,14 @@ class Picture:
         return f"<figure>{picture}<figcaption>{words(self.caption)}</figcaption></figure>"
 
 
-def drawn(figure: Figure, stem: Path, caption: str) -> Picture:
+def as_picture(figure: Figure, stem: Path, caption: str) -> Picture:
     """A figure, which is written to `<stem>.svg` and `<stem>.png`, as a picture of the page."""
     _, svg = save(figure, stem)
     return Picture(svg, caption)
 
 
 @dataclass(frozen=True)
-class Row:
+class SideBySide:
     """Blocks side by side."""
 
     blocks: tuple[Block, ...]
@@ -237,7 +237,7 @@ def _claim(claim: Claim) -> str:
     )
 
 
-def _shown(quantity: Quantity) -> str:
+def _shown(quantity: Finding) -> str:
     """A figure in the unit that people read."""
     unit, factor = display(quantity.unit)
     return f"{number(factor * quantity.value)} {unit}".strip()

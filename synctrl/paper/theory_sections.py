@@ -10,7 +10,7 @@ from ..show.lyapunov_plots import growth_mark, lyapunov_figure
 from ..show.plots import save
 from ..show.style import display
 from .baselines import Comparison
-from .report import Block, Picture, Row, Section, Table, Text, number
+from .report import Block, Picture, Section, SideBySide, Table, Text, number
 from .trials import Trial
 
 PROOF = """\
@@ -29,7 +29,7 @@ def certificate_section(certificates: Mapping[str, Certificate], folder: Path) -
     """
     pictures = tuple(_picture(name, c, folder) for name, c in certificates.items())
     texts = [Text(f"{_words(name)}\n{c}", "formula") for name, c in certificates.items()]
-    proof = (Text(_INTRODUCTION), Text(PROOF, "formula"), _verdicts(certificates), Row(pictures))
+    proof = (Text(_INTRODUCTION), Text(PROOF, "formula"), _verdicts(certificates), SideBySide(pictures))
     return Section("The proof, watched", (*proof, *texts))
 
 

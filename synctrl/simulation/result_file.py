@@ -21,7 +21,7 @@ import numpy as np
 
 from ..errors import ResultError
 from ..files import whole_file
-from .result_schema import check_arrays, check_info, check_names, check_shape, shapes
+from .result_schema import check_array_names, check_arrays, check_info, check_shape, shapes
 from .schema import read_json
 
 #: what reading a file that is no archive, or a damaged one, may raise
@@ -114,7 +114,7 @@ def _read_arrays(
     with archive.open(members["t"]) as stream:
         instants = _read_header(stream, members["t"]).shape
     expected = shapes(info, instants[0] if instants else 0)
-    check_names(members, expected)
+    check_array_names(members, expected)
     return {name: _read_array(archive, members[name], name, expected[name]) for name in expected}
 
 

@@ -203,7 +203,7 @@ def check_arrays(info: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> N
         ResultError: the array, what is expected and what is found.
     """
     expected = shapes(info, arrays["t"].size)
-    check_names(arrays, expected)
+    check_array_names(arrays, expected)
     for name, array in arrays.items():
         check_shape(name, array.dtype, array.shape, expected[name])
         if name in LAYOUT and not np.isfinite(array).all():
@@ -214,7 +214,7 @@ def check_arrays(info: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> N
     _check_times(arrays["t"])
 
 
-def check_names(found: Iterable[str], expected: Iterable[str]) -> None:
+def check_array_names(found: Iterable[str], expected: Iterable[str]) -> None:
     """Refuse arrays that are too many or too few.
 
     Raises:

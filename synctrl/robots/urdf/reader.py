@@ -22,7 +22,7 @@ from .document import (
     Vector,
 )
 from .meshes import check_filename
-from .xml import Element, parse_xml, printable, quoted, read_bytes
+from .xml import Element, parse_xml, quoted, read_bytes, shown_tag
 
 JOINT_TYPES = (*MOVING_TYPES, "fixed")
 JOINT_PARTS = (
@@ -53,7 +53,7 @@ def read_text(file: Path, data: bytes) -> Document:
     """`read_document` for the content `data` of `file`."""
     root = parse_xml(str(file), data)
     if root.tag != "robot":
-        root.refuse("a URDF with the root element <robot>", f"<{printable(root.tag)}>")
+        root.refuse("a URDF with the root element <robot>", f"<{shown_tag(root.tag)}>")
     _refuse_xacro(root)
     root.know(("link", "joint", "material", *EXTENSIONS), ("name", "version"))
     colors = _colors(root)

@@ -96,7 +96,7 @@ class Element:
         children, attributes = tuple(children), tuple(attributes)
         for child in self.children:
             if child.tag not in children:
-                _unknown(child, f"<{printable(child.tag)}>", child.tag, children)
+                _unknown(child, f"<{shown_tag(child.tag)}>", child.tag, children)
         for attribute in self.attributes:
             if attribute not in attributes and not attribute.startswith("xmlns"):
                 _unknown(self, f"attribute {quoted(attribute)}", attribute, attributes)
@@ -148,7 +148,7 @@ class Element:
         return float(word)
 
 
-def printable(tag: str) -> str:
+def shown_tag(tag: str) -> str:
     """An XML tag as it can be shown."""
     return quoted(tag)[1:-1]
 
@@ -248,5 +248,5 @@ class _Reader:
 def _place(parent: Element | None, tag: str, attributes: dict[str, str]) -> str:
     """Where an element stands: "robot", "link 'arm'", "link 'arm', inertial, mass"."""
     named = parent is not None and parent.tag == "robot" and "name" in attributes
-    here = f"{printable(tag)} {quoted(attributes['name'])}" if named else printable(tag)
+    here = f"{shown_tag(tag)} {quoted(attributes['name'])}" if named else shown_tag(tag)
     return here if parent is None or parent.tag == "robot" else f"{parent.place}, {here}"
