@@ -200,8 +200,8 @@ def test_arrays_of_another_kind_are_refused_and_nothing_is_written(bad):
     model, joints = mujoco_model(small_cell())
     data = mujoco.MjData(model)
     good = np.ones((2, 2))
-    for arguments in ((bad, good), (good, bad)):
-        with pytest.raises(InputError, match=r"^[qv]: expected"):
+    for name, arguments in {"q": (bad, good), "v": (good, bad)}.items():
+        with refused(InputError, name):
             joints.write(data, *arguments)
     with refused(InputError, "tau"):
         joints.command(data, bad)
@@ -211,10 +211,10 @@ def test_arrays_of_another_kind_are_refused_and_nothing_is_written(bad):
 def test_a_cell_that_mujoco_cannot_have_is_refused():
     arm = load_robot("a460")
     other = arm.with_parameters(1.1 * arm.inertial_parameters)
-    with pytest.raises(InputError, match=r"robot 'a460' has none that describes it"):
+    with refused(InputError, "plant='mujoco', robot 'a460'"):
         mujoco_model(holding(other))
     changed = Robot(other.model, other.tip, document=arm.document)
-    with pytest.raises(InputError, match=r"robot 'a460' has another mass matrix"):
+    with refused(InputError, "plant='mujoco', robot 'a460'"):
         mujoco_model(holding(changed))
     model = arm.model.copy()
     model.gravity.linear = np.array([0.0, 0.0, -1.62])

@@ -82,7 +82,7 @@ class Journal:
                 write_whole(self.folder / ABOUT, json.dumps(self.about, ensure_ascii=False, indent=1) + "\n")
             elif found := difference(known, json.loads(json.dumps(self.about))):
                 other = f"'{self.folder}' holds another sweep: {found}; choose another folder"
-                raise ResultError(other, file=self.folder)
+                raise ResultError(other, file=self.folder, found=found)
             content = read_regular(self.folder / RUNS)
             self.rows = Format(about["columns"], runs, about["duration"]).read(self.folder / RUNS, content)
             self._file.truncate(content.rfind(b"\n") + 1)  # an incomplete last line does not count
