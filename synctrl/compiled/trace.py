@@ -12,10 +12,13 @@ from typing import Any
 import numpy as np
 
 from ..control import law
-from ..control.commands import REFERENCE_ACCELERATIONS
+from ..control.laws import Asked, Errors
+from ..control.laws.protocol import ROWS
+from ..control.laws.sun_mills import BoundSunMills
+from ..coupling.weights import Weights
+from ..robots.friction_parameters import friction_diagonals
 from ..robots.symbolic import Symbols
 from .kind import Kind
-from .lawful import TracedLaw
 
 
 class Trace:
@@ -35,6 +38,7 @@ class Trace:
         self.q, self.v = sym("q", nv), sym("v", nv)
         self.sine, self.cosine = sym("sine", nv), sym("cosine", nv)
         self.base = sym("base", 12)  # rotation row by row, translation, of the first joint's placement
+        self.posture = [sym(name, nv) for name in ("W_inv", "posture", "gain")]
         self.desired, self.weights = sym("desired", 3 * m), sym("weights", 4 * m * m)
         tasks = 0 if kind.space == "joint" else 1
         self.J, self.J_dot = sym("J", tasks * m * nv), sym("J_dot", tasks * m * nv)
@@ -50,8 +54,7 @@ class Trace:
         x, e, x_dot, xd_dot, xd_ddot, J, J_dot = self._task(sine, cosine)
         J_inv, G = self._inverse(J, W_inv)
         c, c_dot = self._weights()[:2]
-        w = law.weighted_error(c, e)
-        w_dot = law.weighted_error_dot(c, c_dot, e, xd_dot - x_dot)
+        w, w_dot = law.compute_weighted_errors(c, c_dot, np.array((e, xd_dot - x_dot)))
         outputs = [x, e, x_dot, xd_dot, xd_ddot, w, w_dot]
         inputs = [self.q, self.v, self.base, self.desired, self.weights, W_inv]
         flat = [*map(self._flat, outputs), sine, cosine, *map(self._flat, (J, J_dot, J_inv, G))]
@@ -105,50 +108,36 @@ class Trace:
         gains = [sym(name, m) for name in ("Lambda", "beta", "K_eps")]
         K_r = sym("K_r", nv if kind.k_r_space == "joint" else m)
         Gamma = sym("Gamma", P)
-        posture = [sym(name, nv) for name in ("W_inv", "posture", "gain")]
-        e_star, r, xref_dot, xref_ddot, force = self._law(task, shares, gains)
-        v_ref, a_ref = self._to_joints(xref_dot, xref_ddot, posture)
+        e, x_dot, xd_dot, xd_ddot, w, w_dot = (self._array(part, m) for part in task)
+        heard = np.array([self._array(part, m) for part in shares])
+        errors = Errors(
+            None, np.array((e, xd_dot - x_dot)), x_dot, np.array((xd_dot, xd_ddot)), np.array((w, w_dot)),
+            heard, Weights(*self._weights()),
+        )  # fmt: skip
+        asked = self._asked(errors, gains)
         v = self._array(self.v, nv)
-        s_q = v_ref - v
-        damping = self._damping(K_r, s_q, r)
+        v_ref, a_ref, s_q, feedback = law.compute_joint_command(
+            asked, errors, v, self, self._array(K_r, K_r.numel()), kind.k_r_space
+        )
         z, model_torque, z_dot = self._adaptive(Gamma, v_ref, a_ref, s_q)
-        tau = model_torque + damping + self._to_torque(force)
+        tau, e_star = model_torque + feedback, asked.e_star
         inputs = [
             self.q, self.v, self.sine, self.cosine, z, *shares, *task, self.J, self.J_dot, self.J_inv,
-            self.G, self.weights, *gains, K_r, Gamma, *posture, self.base,
+            self.G, self.weights, *gains, K_r, Gamma, *self.posture, self.base,
         ]  # fmt: skip
         outputs = [self._flat(tau), z_dot, self._flat(e_star), self._flat(s_q)]
         return self._function("control", inputs, outputs)
 
-    def _law(self, task: list, shares: list, gains: list) -> tuple:
-        """The same lines as `Controller.evaluate`, for one robot."""
-        m = self.kind.m
-        c, c_dot, c_ddot, c_inv = self._weights()
-        E, sigma, sigma_dot = (self._array(part, m) for part in shares)
-        e, x_dot, xd_dot, xd_ddot, w, w_dot = (self._array(part, m) for part in task)
-        if self.kind.law is not None:
-            given = [e, xd_dot - x_dot, x_dot, xd_dot, xd_ddot, w, w_dot, E, sigma, sigma_dot]
-            return self._other_law(self.kind.law, given)
-        Lambda, beta, K_eps = (self._array(part, m) for part in gains)
-        e_star = law.coupled_error(w, E, beta)
-        u = law.command(c, c_dot, xd_dot, e, sigma, e_star, beta, Lambda)
-        u_dot = law.command_dot(
-            c, c_dot, c_ddot, xd_dot, xd_ddot, e, xd_dot - x_dot, w_dot, sigma, sigma_dot, beta, Lambda
-        )
-        r = law.coupled_velocity_error(u, c, x_dot)
-        xref_dot = law.reference_velocity(c_inv, u)
-        acceleration = REFERENCE_ACCELERATIONS[self.kind.reference_acceleration]
-        xref_ddot = acceleration(c_inv, c_dot, u_dot, xref_dot, x_dot)
-        return e_star, r, xref_dot, xref_ddot, law.synchronizing_force(c, sigma, K_eps)
+    def _asked(self, errors: Errors, gains: list) -> Asked:
+        """What the law asks of one robot."""
+        kind, m = self.kind, self.kind.m
+        if kind.law is None:
+            Lambda, beta, K_eps = (self._array(part, m) for part in gains)
+            return BoundSunMills(Lambda, beta, K_eps, kind.reference_acceleration).command(errors)
+        parts = kind.law.command(*(self._back(getattr(errors, name)) for name in ROWS), self.weights)
+        return Asked(*(self._array(part, m) for part in parts))
 
-    def _other_law(self, other: TracedLaw, given: list) -> tuple:
-        """e*, r, xref', xref'' and force of a law that was traced."""
-        asked = other.command(*map(self._back, given), self.weights)
-        xref_dot, xref_ddot, force, e_star, u = (self._array(part, self.kind.m) for part in asked)
-        r = law.coupled_velocity_error(u, self._weights()[0], given[2])
-        return e_star, r, xref_dot, xref_ddot, force
-
-    def _to_joints(self, xref_dot: np.ndarray, xref_ddot: np.ndarray, posture: list) -> tuple:
+    def to_joints(self, task: Any, xref_dot: np.ndarray, xref_ddot: np.ndarray) -> tuple:
         """v_ref and a_ref, by the formulas of `Inverse` and `Pseudoinverse` in tasks/redundancy.py."""
         kind = self.kind
         if kind.space == "joint":
@@ -157,23 +146,18 @@ class Trace:
         if not kind.redundant:
             v_ref = np.matvec(J_inv, xref_dot)
             return v_ref, np.matvec(J_inv, xref_ddot - np.matvec(J_dot, v_ref))
-        W_inv, preferred, gain = (self._array(part, kind.nv) for part in posture)
+        W_inv, preferred, gain = (self._array(part, kind.nv) for part in self.posture)
         q, v = self._array(self.q, kind.nv), self._array(self.v, kind.nv)
         zeta, zeta_dot = gain * (preferred - q), -gain * v
         gap = xref_dot - np.matvec(J, zeta)
         mu = np.matvec(self._array(self.G, kind.m, kind.m), gap)
         v_ref = zeta + np.matvec(J_inv, gap)
-        h = zeta_dot + W_inv * law.transposed_times(J_dot, mu)
+        h = zeta_dot + W_inv * np.matvec(J_dot.T, mu)
         return v_ref, h + np.matvec(J_inv, xref_ddot - np.matvec(J_dot, v_ref) - np.matvec(J, h))
 
-    def _damping(self, K_r: Any, s_q: np.ndarray, r: np.ndarray) -> np.ndarray:
-        gain = self._array(K_r, K_r.numel())
-        if self.kind.k_r_space == "joint":
-            return gain * s_q
-        return self._to_torque(gain * law.times(self._weights()[3], r))
-
-    def _to_torque(self, force: np.ndarray) -> np.ndarray:
-        return force if self.kind.space == "joint" else law.transposed_times(self._jacobians()[0], force)
+    def to_torque(self, task: Any, force: np.ndarray) -> np.ndarray:
+        """J^T f."""
+        return force if self.kind.space == "joint" else np.matvec(self._jacobians()[0].T, force)
 
     def estimate(self) -> Any:
         """z -> theta_hat, of an adaptation whose state is something else."""
@@ -191,7 +175,7 @@ class Trace:
         )
         torque, gradient = self._model(theta_hat, *motion)
         if kind.learning is None:
-            return theta_hat, self._array(torque, kind.nv), law.adaptation(gradient, Gamma)
+            return theta_hat, self._array(torque, kind.nv), Gamma * gradient
         z = ca.SX.sym("z", kind.learned)
         torque, gradient = ca.substitute([torque, gradient], [theta_hat], [kind.learning.estimate(z)])
         return z, self._array(torque, kind.nv), kind.learning.rate(z, self.q, self.v, *motion, gradient)
@@ -204,9 +188,10 @@ class Trace:
         symbols = Symbols(kind.fixed, self.q, self.sine, self.cosine)
         torque = symbols.torque(pi, self.v, v_ref, a_ref, self._gravity())
         if kind.smoothing is not None:
-            columns = [v_ref, ca.tanh(self.v / kind.smoothing), *([a_ref] if kind.rotors else [])]
             rubbing = theta_hat[kind.rigid_parameters :]
-            torque += sum(rubbing[k * kind.nv : (k + 1) * kind.nv] * c for k, c in enumerate(columns))
+            v, v_ref, a_ref = (self._array(part, kind.nv) for part in (self.v, v_ref, a_ref))
+            diagonals = friction_diagonals(v, v_ref, a_ref, kind.smoothing, kind.rotors)
+            torque += self._back(sum(self._array(rubbing, len(diagonals), kind.nv) * np.stack(diagonals)))
         return torque, ca.jtimes(torque, theta_hat, s_q, True)
 
     # -- the plant ----------------------------------------------------------------------------------------

@@ -113,10 +113,9 @@ class SampleRecorder(Recorder):
         """Log one instant."""
         s, row, y = sample.signals, self._log[self.count], self._loop.state(sample.y)
         integral = self._loop.controller.network.integral(y.memory)
-        task, command = s.task, s.command
         row[0] = sample.t
         values = (
-            task.motion[0], s.reference.desired[0], task.error[0], command.epsilon, command.e_star,
+            s.task.motion[0], s.reference.desired[0], s.e, s.epsilon, s.e_star,
             s.s_q, s.tau, sample.disturbance, y.motion, s.theta_hat, integral,
             *([y.z] if self._logs_z else []), *([y.memory] if self._logs_memory else []), y.hidden,
         )  # fmt: skip

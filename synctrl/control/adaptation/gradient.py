@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from ...coupling.cell import Cell
 from ...errors import InputError
-from .. import law
 from ..gains import read_gain, spread_rows
 from ..rows import Rows
 from .protocol import Adaptation, Seen
@@ -78,7 +77,7 @@ class BoundGradient:
         return z
 
     def rate(self, z: np.ndarray, seen: Seen) -> np.ndarray:
-        return law.adaptation(seen.gradient, self.Gamma)
+        return self.Gamma * seen.gradient
 
     def settle(self, z: np.ndarray) -> np.ndarray:
         return z
@@ -91,4 +90,4 @@ class BoundGradient:
 
     def powers(self, z: np.ndarray, theta: np.ndarray, seen: Seen) -> Mapping[str, float]:
         frozen = np.where(self.Gamma > 0, 0.0, theta - z)
-        return {"model error": float(np.sum(seen.s_q * seen.regressor.times(frozen)))}
+        return {"model error": float(np.sum(seen.s_q * np.matvec(seen.regressor, frozen)))}
