@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ...coupling.cell import Cell
 from ...errors import InputError
 from ..gains import read_gain, spread_rows
-from ..rows import Rows
+from ..ragged_gain import RaggedGain
 from .protocol import Adaptation, Seen
 
 
@@ -29,7 +29,7 @@ class Gradient:
         InputError: not numbers, not finite, or below 0.
     """
 
-    def __init__(self, Gamma: ArrayLike | Rows):
+    def __init__(self, Gamma: ArrayLike | RaggedGain):
         self.Gamma = read_gain("Gamma", Gamma)
         if self.Gamma.size and self.Gamma.min() < 0:
             raise InputError(f"Gamma: expected entries of at least 0, found {self.Gamma.min():g}")
@@ -47,7 +47,7 @@ class Gradient:
         return {"name": "Gradient", "Gamma": self.Gamma.tolist()}
 
 
-def chosen(Gamma: np.ndarray | Rows | None, adaptation: Adaptation | None) -> Adaptation:
+def chosen(Gamma: np.ndarray | RaggedGain | None, adaptation: Adaptation | None) -> Adaptation:
     """The adaptation of a controller: the one given, or the paper's with the rate among its gains.
 
     Raises:
