@@ -14,10 +14,13 @@ from typing import Any
 import numpy as np
 
 from ..control import law
-from ..control.commands import REFERENCE_ACCELERATIONS
+from ..control.laws import Asked, Errors
+from ..control.laws.protocol import ROWS
+from ..control.laws.sun_mills import BoundSunMills
+from ..coupling.weights import Weights
+from ..robots.friction_parameters import friction_diagonals
 from ..robots.symbolic import Symbols
 from .kind import Kind
-from .lawful import TracedLaw
 from .learning import Learning
 from .quantities import DESIRED, FUNCTIONS, QUANTITIES, columns
 
@@ -55,8 +58,7 @@ class Trace:
         x, e, x_dot, xd_dot, xd_ddot, J, J_dot = self._task(sine, cosine)
         J_inv, G = self._inverse(J)
         c, c_dot = self._weights()[:2]
-        w = law.weighted_error(c, e)
-        w_dot = law.weighted_error_dot(c, c_dot, e, xd_dot - x_dot)
+        w, w_dot = law.compute_weighted_errors(c, c_dot, np.array((e, xd_dot - x_dot)))
         return self._function(
             "measure",
             x=x, e=e, x_dot=x_dot, xd_dot=xd_dot, xd_ddot=xd_ddot, w=w, w_dot=w_dot,
@@ -104,42 +106,37 @@ class Trace:
 
     def control(self) -> Any:
         """The law: torque, z' of the adaptation, e*, s_q."""
-        e_star, r, xref_dot, xref_ddot, force = self._law()
-        v_ref, a_ref = self._to_joints(xref_dot, xref_ddot)
-        s_q = v_ref - self._row("v")
-        model_torque, z_dot = self._adaptive(v_ref, a_ref, s_q)
-        tau = model_torque + self._damping(s_q, r) + self._to_torque(force)
-        return self._function("control", tau=tau, z_dot=z_dot, e_star=e_star, s_q=s_q)
-
-    def _law(self) -> tuple:
-        """The same lines as `Controller.evaluate`, for one robot."""
-        c, c_dot, c_ddot, c_inv = self._weights()
-        E, sigma, sigma_dot = map(self._row, ("E", "sigma", "sigma_dot"))
-        task = "e", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot"
-        e, x_dot, xd_dot, xd_ddot, w, w_dot = map(self._row, task)
-        if self.kind.law is not None:
-            given = [e, xd_dot - x_dot, x_dot, xd_dot, xd_ddot, w, w_dot, E, sigma, sigma_dot]
-            return self._other_law(self.kind.law, given)
-        Lambda, beta, K_eps = map(self._row, ("Lambda", "beta", "K_eps"))
-        e_star = law.coupled_error(w, E, beta)
-        u = law.command(c, c_dot, xd_dot, e, sigma, e_star, beta, Lambda)
-        u_dot = law.command_dot(
-            c, c_dot, c_ddot, xd_dot, xd_ddot, e, xd_dot - x_dot, w_dot, sigma, sigma_dot, beta, Lambda
+        errors = self._errors()
+        asked = self._asked(errors)
+        v_ref, a_ref, s_q, feedback = law.compute_joint_command(
+            asked, errors, self._row("v"), self, self._row("K_r"), self.kind.k_r_space
         )
-        r = law.coupled_velocity_error(u, c, x_dot)
-        xref_dot = law.reference_velocity(c_inv, u)
-        acceleration = REFERENCE_ACCELERATIONS[self.kind.reference_acceleration]
-        xref_ddot = acceleration(c_inv, c_dot, u_dot, xref_dot, x_dot)
-        return e_star, r, xref_dot, xref_ddot, law.synchronizing_force(c, sigma, K_eps)
+        model_torque, z_dot = self._adaptive(v_ref, a_ref, s_q)
+        return self._function(
+            "control", tau=model_torque + feedback, z_dot=z_dot, e_star=asked.e_star, s_q=s_q
+        )
 
-    def _other_law(self, other: TracedLaw, given: list) -> tuple:
-        """e*, r, xref', xref'' and force of a law that was traced."""
-        asked = other.command(*map(self._back, given), self.given["weights"])
-        xref_dot, xref_ddot, force, e_star, u = (self._array(part, self.kind.m) for part in asked)
-        r = law.coupled_velocity_error(u, self._weights()[0], given[2])
-        return e_star, r, xref_dot, xref_ddot, force
+    def _errors(self) -> Errors:
+        """What a law is told of one robot."""
+        names = "e", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot"
+        e, x_dot, xd_dot, xd_ddot, w, w_dot = map(self._row, names)
+        heard = np.array([self._row(name) for name in ("E", "sigma", "sigma_dot")])
+        return Errors(
+            None, np.array((e, xd_dot - x_dot)), x_dot, np.array((xd_dot, xd_ddot)), np.array((w, w_dot)),
+            heard, Weights(*self._weights()),
+        )  # fmt: skip
 
-    def _to_joints(self, xref_dot: np.ndarray, xref_ddot: np.ndarray) -> tuple:
+    def _asked(self, errors: Errors) -> Asked:
+        """What the law asks of one robot."""
+        kind = self.kind
+        if kind.law is None:
+            Lambda, beta, K_eps = map(self._row, ("Lambda", "beta", "K_eps"))
+            return BoundSunMills(Lambda, beta, K_eps, kind.reference_acceleration).command(errors)
+        rows = (self._back(getattr(errors, name)) for name in ROWS)
+        parts = kind.law.command(*rows, self.given["weights"])
+        return Asked(*(self._array(part, kind.m) for part in parts))
+
+    def to_joints(self, task: Any, xref_dot: np.ndarray, xref_ddot: np.ndarray) -> tuple:
         """v_ref and a_ref, by the formulas of `Inverse` and `Pseudoinverse` in tasks/redundancy.py."""
         kind = self.kind
         if kind.space == "joint":
@@ -153,17 +150,12 @@ class Trace:
         gap = xref_dot - np.matvec(J, zeta)
         mu = np.matvec(self._array(self.given["G"], kind.m, kind.m), gap)
         v_ref = zeta + np.matvec(J_inv, gap)
-        h = zeta_dot + W_inv * law.transposed_times(J_dot, mu)
+        h = zeta_dot + W_inv * np.matvec(J_dot.T, mu)
         return v_ref, h + np.matvec(J_inv, xref_ddot - np.matvec(J_dot, v_ref) - np.matvec(J, h))
 
-    def _damping(self, s_q: np.ndarray, r: np.ndarray) -> np.ndarray:
-        gain = self._row("K_r")
-        if self.kind.k_r_space == "joint":
-            return gain * s_q
-        return self._to_torque(gain * law.times(self._weights()[3], r))
-
-    def _to_torque(self, force: np.ndarray) -> np.ndarray:
-        return force if self.kind.space == "joint" else law.transposed_times(self._jacobians()[0], force)
+    def to_torque(self, task: Any, force: np.ndarray) -> np.ndarray:
+        """J^T f."""
+        return force if self.kind.space == "joint" else np.matvec(self._jacobians()[0].T, force)
 
     def estimate(self, learning: Learning) -> Any:
         """z -> theta_hat, of an adaptation whose state is something else."""
@@ -176,7 +168,7 @@ class Trace:
         if learning is None:
             torque, gradient = self._model(z, *motion)
             Gamma: Any = self.given["Gamma"]
-            return self._array(torque, self.kind.nv), law.adaptation(gradient, Gamma)
+            return self._array(torque, self.kind.nv), Gamma * gradient
         theta_hat = self.given["theta_hat"]
         parts = self.ca.substitute([*self._model(theta_hat, *motion)], [theta_hat], [learning.estimate(z)])
         return self._array(parts[0], self.kind.nv), learning.rate(z, self.q, self.v, *motion, parts[1])
@@ -189,9 +181,10 @@ class Trace:
         symbols = Symbols(kind.fixed, self.q, self.sine, self.cosine)
         torque = symbols.torque(pi, self.v, v_ref, a_ref, self._gravity())
         if kind.smoothing is not None:
-            columns = [v_ref, ca.tanh(self.v / kind.smoothing), *([a_ref] if kind.rotors else [])]
             rubbing = theta_hat[kind.rigid_parameters :]
-            torque += sum(rubbing[k * kind.nv : (k + 1) * kind.nv] * c for k, c in enumerate(columns))
+            v, v_ref, a_ref = (self._array(part, kind.nv) for part in (self.v, v_ref, a_ref))
+            diagonals = friction_diagonals(v, v_ref, a_ref, kind.smoothing, kind.rotors)
+            torque += self._back(sum(self._array(rubbing, len(diagonals), kind.nv) * np.stack(diagonals)))
         return torque, ca.jtimes(torque, theta_hat, s_q, True)
 
     # -- the plant ----------------------------------------------------------------------------------------

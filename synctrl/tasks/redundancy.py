@@ -111,6 +111,15 @@ class Inversion(NamedTuple):
     damping_rate: Any = None
 
 
+class Inverted(Protocol):
+    """What a way to joint space needs to know of an instant; a `Measurement` does."""
+
+    J: Any
+    J_inv: Any
+    J_dot: Any
+    inversion: Any
+
+
 class InverseMap(Protocol):
     """A way from task space to joint space."""
 
@@ -118,12 +127,7 @@ class InverseMap(Protocol):
         """Everything about this instant that does not depend on the reference."""
 
     def to_joints(
-        self,
-        J: np.ndarray,
-        J_dot: np.ndarray,
-        inversion: Inversion,
-        xref_dot: np.ndarray,
-        xref_ddot: np.ndarray,
+        self, task: Inverted, xref_dot: np.ndarray, xref_ddot: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """v_ref and a_ref = d/dt v_ref, (n, nv), from the reference in task space, (n, m)."""
 
@@ -138,15 +142,11 @@ class Inverse:
         return Inversion(inverse(J))
 
     def to_joints(
-        self,
-        J: np.ndarray,
-        J_dot: np.ndarray,
-        inversion: Inversion,
-        xref_dot: np.ndarray,
-        xref_ddot: np.ndarray,
+        self, task: Inverted, xref_dot: np.ndarray, xref_ddot: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        v_ref = np.matvec(inversion.J_inv, xref_dot)
-        return v_ref, np.matvec(inversion.J_inv, xref_ddot - np.matvec(J_dot, v_ref))
+        J_inv = task.J_inv
+        v_ref = np.matvec(J_inv, xref_dot)
+        return v_ref, np.matvec(J_inv, xref_ddot - np.matvec(task.J_dot, v_ref))
 
 
 class Pseudoinverse:
@@ -173,13 +173,9 @@ class Pseudoinverse:
         return Inversion(W_inv_JT @ G, G, *self._preferred(q, v))
 
     def to_joints(
-        self,
-        J: np.ndarray,
-        J_dot: np.ndarray,
-        inversion: Inversion,
-        xref_dot: np.ndarray,
-        xref_ddot: np.ndarray,
+        self, task: Inverted, xref_dot: np.ndarray, xref_ddot: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
+        J, J_dot, inversion = task.J, task.J_dot, task.inversion
         J_inv, G, zeta, zeta_dot = inversion[:4]
         gap = xref_dot - np.matvec(J, zeta)
         mu = np.matvec(G, gap)
@@ -240,7 +236,8 @@ def inverse(A: np.ndarray) -> np.ndarray:
     """A^-1 row by row; nothing finite where there is none, so that the run's guard can name the robot."""
     if A.shape[-1] == 2:
         with np.errstate(divide="ignore", invalid="ignore"):
-            return _CHECKERED * A[:, ::-1, ::-1].mT / determinant(A)[:, None, None]
+            minors = A[:, :1, :1] * A[:, 1:, 1:] - A[:, :1, 1:] * A[:, 1:, :1]
+            return _CHECKERED * A[:, ::-1, ::-1].mT / minors
     try:
         return np.linalg.inv(A)
     except np.linalg.LinAlgError:

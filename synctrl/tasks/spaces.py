@@ -258,9 +258,7 @@ class BoundTipSpace:
 
     def __init__(self, tips: Tips, inverse: InverseMap):
         self._tips, self._inverse = tips, inverse
-
-    def to_joints(self, task: Measurement, xref_dot: np.ndarray, xref_ddot: np.ndarray) -> Joints:
-        return self._inverse.to_joints(task.J, task.J_dot, task.inversion, xref_dot, xref_ddot)  # type: ignore[arg-type]
+        self.to_joints = inverse.to_joints
 
     def to_torque(self, task: Measurement, force: np.ndarray) -> np.ndarray:
         return np.vecmat(force, task.J)  # type: ignore[arg-type]
