@@ -664,7 +664,7 @@ def test_real_meshes_are_shaded_and_hostile_names_do_nothing(tmp_path: Path) -> 
         assert page.evaluate("document.querySelectorAll('img').length") == 0
         assert page.evaluate("document.querySelector('h1').textContent") == HOSTILE
         counts = page.evaluate(COUNT_NORMALS)
-        assert counts["all"] > 100_000
+        assert counts["all"] > 50_000
         assert counts["unit"] > 0.99 * counts["all"]  # a triangle without area has no normal
 
 

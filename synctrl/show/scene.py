@@ -20,7 +20,7 @@ from .meshes import MeshLibrary
 from .nodes import Node, bounding_box, label, pack, scene_commands
 from .rotations import TINY, continuous, towards
 from .shapes import Color, Shape
-from .view import fit_camera, ground_command, view_commands, viewer_axes
+from .view import fit_camera, view_commands, viewer_axes
 
 if TYPE_CHECKING:
     import pinocchio as pin
@@ -177,8 +177,7 @@ class Scene:
     def commands(self) -> list[dict]:
         """The scene as MeshCat commands, the animation last; numpy arrays stand for typed arrays."""
         position, target, box = self._view()
-        view = [*view_commands(position, target, box), ground_command(box)]
-        return view + scene_commands(self.nodes, self.fps)
+        return view_commands(position, target, box) + scene_commands(self.nodes, self.fps)
 
     def page(self) -> str:
         """The scene as the text of a self-contained HTML page."""
