@@ -32,9 +32,10 @@ EMPTY = np.array([[-0.5, -0.5, 0.0], [0.5, 0.5, 0.5]])  # what the camera shows 
 class Scene:
     """Robots, lines and solids over T frames, exported as one HTML file that plays offline.
 
-    Positions are in the world, in m, z up; quaternions are x y z w, as Pinocchio's. A colour is "#rrggbb" (or
-    "#rrggbbaa") or three or four numbers in [0, 1]. What moves is given at all T frames, the same T for all;
-    what stands still is given once. Names are text: nothing in them is ever markup or script.
+    Positions are in the world, in m, z up; quaternions are x y z w, as Pinocchio's. A colour is one that
+    matplotlib knows, such as "#ffd700" or "gold", or three or four numbers in [0, 1]. What moves is given at
+    all T frames, the same T for all; what stands still is given once. Names are text: nothing in them is ever
+    markup or script.
 
     Args:
         fps: frames per second, at which all samples are taken and played.
