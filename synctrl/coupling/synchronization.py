@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, finite_number, instance, positive_number
 from ..errors import CouplingError, InputError, SynchronizationError
-from ..tasks.chebyshev import ACCURACY, NotSmoothError, certify
+from ..tasks.chebyshev import NotSmoothError, certify
 from ..tasks.trajectories import Trajectory
 from .coupling import Coupling
 from .expansion import Expansion, expand, least_linear
@@ -146,10 +146,8 @@ class SynchronizationFunction:
             smooth = certify(self.c, positive_number("duration", duration))
         except NotSmoothError as error:
             raise SynchronizationError(
-                f"the weights cannot be differentiated with a relative error below {ACCURACY:g}: near t = "
-                f"{error.time:g} s {DERIVATIVES[error.order]} of robot {error.row + 1} is off by "
-                f"{ACCURACY * error.error:.2g}; expected functions of time that are smooth and not noisy, "
-                "or their derivatives, see SynchronizationFunction.from_matrices"
+                f"the weights cannot be differentiated: {DERIVATIVES[error.order]} of robot {error.row + 1}: "
+                f"{error}, or its derivatives, see SynchronizationFunction.from_matrices"
             ) from None
         constant = smooth.constant()
         return SmoothWeights(smooth) if constant is None else ConstantWeights(constant)

@@ -13,7 +13,8 @@ pieces.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -64,11 +65,14 @@ class NotSmoothError(Portable, Exception):
 
     def __init__(self, time: float, order: int, row: int, error: float):
         self.time, self.order, self.row, self.error = time, order, row, error
-        super().__init__(f"derivative {order} of row {row} near t = {time:g} s: error {error:g}")
+        super().__init__(
+            f"near t = {time:g} s it is off by {ACCURACY * error:.2g} of its size, of which {ACCURACY:g} are "
+            "allowed; expected a smooth function of time that is not noisy"
+        )
 
 
 class SmoothFunction:
-    """Polynomials that follow each other from 0 to `duration`."""
+    """Polynomials that follow each other from 0 to `duration`, each from its start on."""
 
     def __init__(self, pieces: list[Piece]):
         self._starts = np.array([piece.start for piece in pieces])
@@ -92,33 +96,45 @@ class SmoothFunction:
             out[:, chosen] = _values(s, piece.series)
         return out
 
+    def first_outside(self, times: np.ndarray) -> float | None:
+        """The first of some times, (T,), for which it was not made, s."""
+        slack = ACCURACY * self.duration
+        outside = times[(times < -slack) | (times > self.duration + slack)]
+        return float(outside[0]) if outside.size else None
+
     def pieces_at(self, times: np.ndarray) -> np.ndarray:
         """Which piece holds each of the times, (T,); at the end of one it is the next."""
         return np.clip(np.searchsorted(self._starts, times, side="right") - 1, 0, None)
 
 
-def certify(function: Function, duration: float) -> SmoothFunction:
+def certify(function: Function, duration: float, breaks: Iterable[float] = ()) -> SmoothFunction:
     """Polynomials for a function of time with rows for n robots, (n, m, m), accurate as `tolerances` says.
+
+    Args:
+        function: of one time, s.
+        duration: it is looked at from 0 to this time, s.
+        breaks: instants at which a derivative may jump, s.
 
     Raises:
         NotSmoothError: no short pieces are accurate enough.
     """
-    pieces = [_piece(function, 0.0, duration)]
+    edges = [0.0, *sorted({b for b in breaks if 0 < b < duration}), duration]
+    pieces = [_piece(function, start, stop) for start, stop in pairwise(edges)]
     checks = duration * np.modf((np.arange(CHECKS) + 0.5) * (np.sqrt(5) - 1) / 2)[0]
     expected = np.array([function(t) for t in checks])
     for _ in range(DEPTH):
         allowed = tolerances(pieces, duration)
-        pieces = _with_jumps(pieces)
+        pieces = _with_jumps(pieces, edges)
         missed = _missed(SmoothFunction(pieces), checks, expected, allowed[0])
         bad = [i in missed or bool((p.error > allowed).any()) for i, p in enumerate(pieces)]
         if not any(bad):
             return SmoothFunction(pieces)
-        if len(pieces) > MAX_PIECES:
+        if len(pieces) > MAX_PIECES + len(edges):
             break
         pieces = [
             half for p, b in zip(pieces, bad, strict=True) for half in (_halves(function, p) if b else [p])
         ]
-    raise _not_smooth(_with_jumps(pieces), tolerances(pieces, duration))
+    raise _not_smooth(_with_jumps(pieces, edges), tolerances(pieces, duration))
 
 
 def tolerances(pieces: list[Piece], duration: float) -> np.ndarray:
@@ -135,7 +151,7 @@ def tolerances(pieces: list[Piece], duration: float) -> np.ndarray:
 
 def _piece(function: Function, start: float, stop: float) -> Piece:
     middle, half = 0.5 * (start + stop), 0.5 * (stop - start)
-    samples = np.array([function(middle + half * s) for s in PLACES])
+    samples = np.array([function(min(middle + half * s, stop)) for s in PLACES])
     first, *_ = flat = samples.reshape(len(PLACES), -1)
     flat = flat - first  # what does not change has no rounding errors either
     both = []
@@ -166,11 +182,12 @@ def _halves(function: Function, piece: Piece) -> list[Piece]:
     return [_piece(function, piece.start, middle), _piece(function, middle, piece.stop)]
 
 
-def _with_jumps(pieces: list[Piece]) -> list[Piece]:
-    """Pieces whose errors count what the function or a derivative seems to jump by on the way to the next."""
+def _with_jumps(pieces: list[Piece], edges: list[float]) -> list[Piece]:
+    """Pieces whose errors count what the function or a derivative seems to jump by where it should not."""
     ends = np.array([_values(ENDS, piece.series) for piece in pieces])  # (pieces, 3, 2, n, m, m)
     jumps = np.zeros((len(pieces), *pieces[0].error.shape))
     jumps[:-1] = np.abs(ends[:-1, :, 1] - ends[1:, :, 0]).max(axis=(3, 4))
+    jumps[[piece.stop in edges for piece in pieces], 1:] = 0.0  # only derivatives may jump at a break
     return [p._replace(error=np.maximum(p.error, jump)) for p, jump in zip(pieces, jumps, strict=True)]
 
 
