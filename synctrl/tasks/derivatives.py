@@ -104,6 +104,33 @@ def find_misfit(
     return None
 
 
+def find_misfit_in_motion(
+    motion: Callable[[np.ndarray], Sequence[np.ndarray]],
+    windows: Windows,
+    groups: Sequence[slice],
+    displacement: Displacement = difference,
+) -> tuple[int, Misfit] | None:
+    """The first of two derivatives that does not fit, 1 or 2, and where.
+
+    Args:
+        motion: times, (T,), -> a function and its first and second derivative, (T, d) each.
+        windows, groups: see `find_misfit`.
+        displacement: from one value of the function to another; its derivative is a vector as any.
+    """
+    largest = np.abs(motion(windows.start)[0]).max()
+    end = (windows.start + windows.room).max()
+    for order, way in ((1, displacement), (2, difference)):
+
+        def sample(t: np.ndarray, order: int = order) -> tuple[np.ndarray, np.ndarray]:
+            parts = motion(t)
+            return parts[order - 1], parts[order]
+
+        misfit = find_misfit(sample, windows, groups, (order - 1) * largest / end, way)
+        if misfit is not None:
+            return order, misfit
+    return None
+
+
 def _lengths(needed: np.ndarray, undecided: np.ndarray) -> Iterator[tuple[float, np.ndarray]]:
     """Lengths of windows, each with the coordinates that it serves: those that need about as much, (K, d)."""
     left = undecided.any(axis=0)
