@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import CouplingError
-from ..tasks.asked import finite_weights
 from ..tasks.derivatives import find_misfit_in_motion, look_at
+from .desired import desired_weights
 from .weights import ConstantWeights, FunctionWeights, Weights, WeightSource
 
 
@@ -31,7 +31,7 @@ def check_weights(source: WeightSource, times: np.ndarray, m: int) -> None:
     times = np.unique(times[np.linspace(0, len(times) - 1, _instants(source.robots)).astype(int)])
 
     def look(at: np.ndarray) -> Weights:
-        return finite_weights(lambda instants: source.at(instants, m), at)
+        return desired_weights(lambda instants: source.at(instants, m), at)
 
     c, c_dot, _, c_inv = look(times)
     if isinstance(source, ConstantWeights) or len(times) < 2:
