@@ -9,8 +9,7 @@ from ..errors import InputError
 from ..robots.robot import Robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .arms import arms_scene, error_color
-from .bars import bars
+from .arms import add_bars, arms_scene, error_color
 from .runs import check_run, frame_indices, shown_experiment
 from .scene import Scene
 from .style import DESIRED, robot_color
@@ -31,7 +30,7 @@ def planar_scene(
 ) -> Scene:
     """Planar arms with their desired paths, and bars between the tips of robots that are compared.
 
-    A bar grows and turns red with the synchronization error of its robots, see `bars`. A thin bar in the
+    A bar grows and turns red with the synchronization error of its robots, see `add_bars`. A thin bar in the
     colour of its robot leads from where a tip should be to where it would be if its error were
     `PLANAR_TIMES` as large.
 
@@ -60,9 +59,8 @@ def planar_scene(
     robots = shown_experiment(result, experiment).cell.robots
     height = float(robots[0].tip_position(result.q[0, 0, : robots[0].nv])[2])
     tips, desired = (_with_height(x[frames], height) for x in (result.x, result.x_desired))
-    for bar in bars(result.info["pairs"], tips, "error"):
-        own = share[frames, bar.row]
-        scene.add_segment(bar.name, bar.start, bar.end, THIN + own * (THICK - THIN), error_color(own))
+    shown = share[frames]
+    add_bars(scene, "error", result.info["pairs"], tips, THIN + shown * (THICK - THIN), shown)
     _add_tracking(scene, result, desired, tips, PLANAR_TIMES)
     _add_disturbances(scene, result, robots, frames)
     return scene

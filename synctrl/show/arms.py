@@ -1,4 +1,4 @@
-"""What animations of arms have in common: the arms, and the colours of marks that redden with an error."""
+"""What animations of arms have in common: the arms, and marks that redden with synchronization errors."""
 
 from __future__ import annotations
 
@@ -48,6 +48,36 @@ def arms_scene(
         scene.add_robot(result.names[i], robot.model, robot.visual, q, color)
         scene.add_legend(result.names[i], robot_color(i))
     return scene
+
+
+def add_bars(
+    scene: Scene,
+    name: str,
+    compared: Sequence[Sequence[int]],
+    tips: np.ndarray,
+    radii: np.ndarray,
+    share: np.ndarray,
+) -> None:
+    """Bars between the tips of robots that are compared, which redden with the synchronization error.
+
+    Two robots have one bar from tip to tip. More than two that are compared all at once, as by
+    `Coupling.sum`, have one each, from the middle of their tips.
+
+    Args:
+        scene: where they are added.
+        name: of the bars, to which their numbers are added.
+        compared: the robots of each of p synchronization errors, counted from 0.
+        tips: positions of the tips, (T, n, 3), m.
+        radii: of the bars of each error over time, (T, p), m.
+        share: the errors from 0, no error, to 1, fully red, (T, p).
+    """
+    for k, robots in enumerate(compared):
+        bars = {f"{name} {k + 1}": (tips[:, robots[0]], tips[:, robots[-1]])}
+        if len(robots) > 2:
+            middle = tips[:, robots].mean(axis=1)
+            bars = {f"{name} {k + 1}, robot {i + 1}": (middle, tips[:, i]) for i in robots}
+        for bar, (start, end) in bars.items():
+            scene.add_segment(bar, start, end, radii[:, k], error_color(share[:, k]))
 
 
 def error_color(share: np.ndarray) -> np.ndarray:

@@ -10,8 +10,7 @@ from ..errors import InputError
 from ..simulation.result import Result
 from ..tasks import rotations
 from ..tasks.poses import Attached
-from .arms import arms_scene, error_color
-from .bars import bars
+from .arms import add_bars, arms_scene, error_color
 from .runs import check_run, frame_indices
 from .scene import Scene
 from .style import DESIRED, robot_color
@@ -46,9 +45,8 @@ def formation_scene(result: Result, fps: float = 25) -> Scene:
     for i, name in enumerate(result.names):
         scene.add_line(f"desired path of {name}", result.x_desired[frames, i], robot_color(i), LINE)
         scene.add_sphere(f"tip of {name}", BALL, tips[:, i], robot_color(i))
-    colors = error_colors(result)[frames]
-    for bar in bars(result.info["pairs"], tips, "pair"):
-        scene.add_segment(bar.name, bar.start, bar.end, BAR, colors[:, bar.row])
+    share = _error_share(result)[frames]
+    add_bars(scene, "pair", result.info["pairs"], tips, np.full_like(share, BAR), share)
     return scene
 
 
@@ -84,8 +82,13 @@ def payload_scene(result: Result, size: ArrayLike, fps: float = 25) -> Scene:
 def error_colors(result: Result) -> np.ndarray:
     """A colour per instant and pair, (T, p, 3), which reddens with the synchronization error."""
     check_run(result, "sync_error")
+    return error_color(_error_share(result))
+
+
+def _error_share(result: Result) -> np.ndarray:
+    """Synchronization errors from 0 to 1, (T, p): from none to fully red."""
     size = np.linalg.norm(result.sync_error[:, :, :3], axis=2)
-    return error_color(np.clip(size / max(RED * float(size.max()), 1e-12), 0, 1))
+    return np.clip(size / max(RED * float(size.max()), 1e-12), 0, 1)
 
 
 def _held(x: np.ndarray, hands: list[Attached]) -> tuple[np.ndarray, np.ndarray]:
