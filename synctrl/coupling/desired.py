@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..errors import NonFiniteError, SynctrlError, failed
-from ..tasks.trajectories import Motion, Trajectory
-
-if TYPE_CHECKING:
-    from .weights import Weights
+from ..tasks.trajectories import PARTS, Motion, Trajectory
+from .weights import DERIVATIVES, Weights
 
 Found = TypeVar("Found")
 
@@ -37,7 +35,7 @@ def desired_motion(name: str, robot: int, trajectory: Trajectory, times: np.ndar
 
     what = f"the desired motion of {name}"
     motion = _asked(call, times, what, robot)
-    for part, value in zip(("position", "velocity", "acceleration"), motion, strict=True):
+    for part, value in zip(PARTS, motion, strict=True):
         _check_finite(what, f"its {part}", value, times, robot, "motion")
     return motion
 
@@ -55,7 +53,7 @@ def desired_weights(weights: Callable[[np.ndarray], Weights], times: np.ndarray)
         NonFiniteError: they are infinite or not numbers; with robot and time.
     """
     found = _asked(weights, times, "the weights of the coupling", None)
-    for name, value in zip(("c", "c'", "c''"), found, strict=False):
+    for name, value in zip(DERIVATIVES, found, strict=False):
         wrong = ~np.isfinite(value).all(axis=(0, 2, 3))
         for i in np.flatnonzero(wrong)[:1].tolist():
             _check_finite(f"{name} of the robot at index {i}", "it", value[:, i], times, i, "weights")

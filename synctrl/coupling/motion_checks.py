@@ -11,10 +11,8 @@ from ..checks import finite_array
 from ..errors import InputError, SimulationError, TrajectoryError
 from ..tasks.derivatives import Misfit, difference, find_misfit_in_motion, look_at
 from ..tasks.spaces import units_of
-from ..tasks.trajectories import Motion
+from ..tasks.trajectories import PARTS, Motion
 from .cell import Cell
-
-PARTS = ("position", "velocity", "acceleration")
 
 
 def check_motions(cell: Cell, times: np.ndarray) -> None:

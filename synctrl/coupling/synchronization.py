@@ -15,13 +15,12 @@ from ..tasks.trajectories import Trajectory
 from .coupling import Coupling
 from .expansion import Expansion, expand, least_linear
 from .member_checks import check_trajectory
-from .weights import ConstantWeights, FunctionWeights, SmoothWeights, WeightSource, as_matrices
+from .weights import DERIVATIVES, ConstantWeights, FunctionWeights, SmoothWeights, WeightSource, as_matrices
 
 #: a number of evenly spaced instants of a run
 INSTANTS = 401
 #: f may bend, or be off zero on the desired motion, by these shares of the size of its terms
 LINEAR, SATISFIED = 1e-9, 1e-6
-DERIVATIVES = ("c", "c'", "c''")
 
 MatrixFunction = Callable[[float], ArrayLike]
 GraphLike = Callable[..., Coupling]

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import CouplingError
 from ..tasks.derivatives import find_misfit_in_motion, look_at
 from .desired import desired_weights
-from .weights import ConstantWeights, FunctionWeights, Weights, WeightSource
+from .weights import DERIVATIVES, ConstantWeights, FunctionWeights, Weights, WeightSource
 
 
 def check_weights(source: WeightSource, times: np.ndarray, m: int) -> None:
@@ -66,7 +66,7 @@ def _check_derivatives(
     if found is not None:
         order, misfit = found
         i, entry = divmod(misfit.coordinate, entries)
-        name, derivative = ("c", "c'", "c''")[order - 1 : order + 1]
+        name, derivative = DERIVATIVES[order - 1 : order + 1]
         raise CouplingError(
             f"{derivative} of the robot at index {i} is not the derivative of {name}: near "
             f"t = {misfit.time:.6g} s entry {divmod(entry, m)} of {name} changes by "

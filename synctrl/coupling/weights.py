@@ -14,6 +14,8 @@ from ..tasks.chebyshev import NotSmoothError, SmoothFunction, certify
 
 #: A condition number above this counts as "no inverse".
 SINGULAR = 1e12
+#: weights and their derivatives, for messages
+DERIVATIVES = ("c", "c'", "c''")
 
 #: t -> c, c', c'', each (n,), (n, m) or (n, m, m)
 WeightFunction = Callable[[float], tuple[ArrayLike, ArrayLike, ArrayLike]]
@@ -105,7 +107,7 @@ class FunctionWeights:
                 "SmoothWeights.from_function takes one that returns c alone"
             )
         try:
-            parts = [finite_array(name, part) for name, part in zip(("c", "c'", "c''"), value, strict=True)]
+            parts = [finite_array(name, part) for name, part in zip(DERIVATIVES, value, strict=True)]
             if any(part.ndim == 0 or len(part) != self.robots for part in parts):
                 found = ", ".join(str(part.shape) for part in parts)
                 raise InputError(

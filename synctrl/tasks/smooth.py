@@ -16,9 +16,7 @@ from ..errors import InputError, TrajectoryError
 from . import rotations
 from .chebyshev import Function, NotSmoothError, SmoothFunction, certify
 from .poses import Turning
-from .trajectories import Motion, finite_value
-
-PARTS = ("position", "velocity", "acceleration")
+from .trajectories import PARTS, Motion, finite_value
 
 
 class SmoothTrajectory:

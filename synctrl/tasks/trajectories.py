@@ -15,6 +15,9 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, finite_number, instance, positive_number
 from ..errors import InputError, TrajectoryError
 
+#: what a motion consists of, for messages
+PARTS = ("position", "velocity", "acceleration")
+
 
 class Motion(NamedTuple):
     """Desired position, velocity and acceleration, each (m,), or (T, m) for T times."""
@@ -178,7 +181,7 @@ class FunctionTrajectory:
         acceleration: Callable[[float], ArrayLike],
         breaks: tuple[float, ...] = (),
     ):
-        self._functions = {"position": position, "velocity": velocity, "acceleration": acceleration}
+        self._functions = dict(zip(PARTS, (position, velocity, acceleration), strict=True))
         for name, function in self._functions.items():
             instance(name, function, Callable, "a function of time")  # type: ignore[arg-type]
         self.breaks = tuple(finite_array("breaks", breaks, (None,)).tolist())
