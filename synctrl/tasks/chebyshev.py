@@ -66,8 +66,8 @@ class NotSmoothError(Portable, Exception):
     def __init__(self, time: float, order: int, row: int, error: float):
         self.time, self.order, self.row, self.error = time, order, row, error
         super().__init__(
-            f"near t = {time:g} s it is off by {ACCURACY * error:.2g} of its size, of which {ACCURACY:g} are "
-            "allowed; expected a smooth function of time that is not noisy"
+            f"near t = {time:g} s its relative error is {ACCURACY * error:.2g}, allowed is {ACCURACY:g}; "
+            "expected a smooth function of time that is not noisy"
         )
 
 
