@@ -9,7 +9,7 @@ import numpy as np
 
 from ..checks import finite_array
 from ..errors import InputError, SimulationError, TrajectoryError
-from ..tasks.derivatives import Misfit, difference, find_misfit_in_motion, look_at
+from ..tasks.derivatives import Misfit, difference, find_misfit_in_motion, spread_windows
 from ..tasks.spaces import units_of
 from ..tasks.trajectories import PARTS, Motion
 from .cell import Cell
@@ -38,7 +38,7 @@ def check_motions(cell: Cell, times: np.ndarray) -> None:
 
 
 def _check_motion(cell: Cell, robot: int, start: float, stop: float, count: int) -> None:
-    windows = look_at(start, stop, cell.members[robot].trajectory.breaks, count)
+    windows = spread_windows(start, stop, cell.members[robot].trajectory.breaks, count)
     groups = _groups(units_of(cell.space, cell.m))
     way = getattr(cell.space, "displacement", difference)
     found = find_misfit_in_motion(lambda t: _motion(cell, robot, t), windows, groups, way)

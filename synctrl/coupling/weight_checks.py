@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import CouplingError
-from ..tasks.derivatives import find_misfit_in_motion, look_at
+from ..tasks.derivatives import find_misfit_in_motion, spread_windows
 from .desired import desired_weights
 from .weights import DERIVATIVES, ConstantWeights, FunctionWeights, Weights, WeightSource
 
@@ -59,7 +59,7 @@ def _check_derivatives(
     """Compare c' and c'' with differences of c and c'."""
     entries = m * m
     groups = [slice(i * entries, (i + 1) * entries) for i in range(n)]
-    windows = look_at(start, stop, (), int(np.clip(1000 // n, 4, 24)))
+    windows = spread_windows(start, stop, (), int(np.clip(1000 // n, 4, 24)))
     found = find_misfit_in_motion(
         lambda t: [part.reshape(len(t), -1) for part in look(t)[:3]], windows, groups
     )

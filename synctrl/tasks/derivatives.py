@@ -91,16 +91,16 @@ def find_misfit(
     for noise in NOISE:
         for length, mine in _lengths(noise * scale.size / (RESOLVED * TOLERANCE * scale.rate), undecided):
             lengths = np.clip(length, floor, windows.room)
-            look = _look(sample, windows.start, lengths, scale, displacement)
-            wrong = look.wrong & mine & ~(noisy & look.stuck)
+            compared = _compare(sample, windows.start, lengths, scale, displacement)
+            wrong = compared.wrong & mine & ~(noisy & compared.stuck)
             for share in AGAIN:
                 if wrong.any():
-                    again = _look(sample, windows.start, share * lengths, scale, displacement)
+                    again = _compare(sample, windows.start, share * lengths, scale, displacement)
                     wrong &= ~(again.rough | again.fits)
             if wrong.any():
-                return look.worst(wrong, windows.start)
-            undecided &= ~(mine & (look.fits | look.wrong))
-            noisy |= mine & ~(look.fits | look.wrong | look.rough)
+                return compared.worst(wrong, windows.start)
+            undecided &= ~(mine & (compared.fits | compared.wrong))
+            noisy |= mine & ~(compared.fits | compared.wrong | compared.rough)
     return None
 
 
@@ -141,7 +141,7 @@ def _lengths(needed: np.ndarray, undecided: np.ndarray) -> Iterator[tuple[float,
         left &= ~near
 
 
-def look_at(start: float, stop: float, breaks: Sequence[float], count: int) -> Windows:
+def spread_windows(start: float, stop: float, breaks: Sequence[float], count: int) -> Windows:
     """Windows spread over a run, none of which reaches across a break.
 
     Args:
@@ -196,7 +196,7 @@ def _scale(
     return _Scale(size, np.maximum(rate, np.finfo(float).tiny), rate * end > STILL * size, end)
 
 
-class _Look(NamedTuple):
+class _Comparison(NamedTuple):
     """What windows say, each (K, d); where it is neither rough nor wrong and does not fit, there is noise.
 
     Attributes:
@@ -220,9 +220,9 @@ class _Look(NamedTuple):
         return Misfit(float(start[k]), int(i), float(self.integral[k, i]), float(self.change[k, i]))
 
 
-def _look(
+def _compare(
     sample: Sample, start: np.ndarray, length: np.ndarray, scale: _Scale, displacement: Displacement
-) -> _Look:
+) -> _Comparison:
     times = start[:, None] + length[:, None] * NODES
     value, derivative = (part.reshape(*times.shape, -1) for part in sample(times.ravel()))
     way = displacement(value[:, :1], value) / length[:, None, None]
@@ -236,4 +236,4 @@ def _look(
     close = np.abs(change - integral) <= TOLERANCE * rate + doubt
     clear = doubt <= allowed
     stuck = (way == 0).all(axis=1)
-    return _Look(change, integral, error > allowed, clear & close, clear & ~close, stuck)
+    return _Comparison(change, integral, error > allowed, clear & close, clear & ~close, stuck)
