@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..errors import NonFiniteError, SynctrlError, failed
-from ..tasks.trajectories import PARTS, Motion, Trajectory
+from ..tasks.trajectories import MOTION_PARTS, Motion, Trajectory
 from .weights import DERIVATIVES, Weights
 
 Found = TypeVar("Found")
@@ -35,7 +35,7 @@ def desired_motion(name: str, robot: int, trajectory: Trajectory, times: np.ndar
 
     what = f"the desired motion of {name}"
     motion = _asked(call, times, what, robot)
-    for part, value in zip(PARTS, motion, strict=True):
+    for part, value in zip(MOTION_PARTS, motion, strict=True):
         _check_finite(what, f"its {part}", value, times, robot, "motion")
     return motion
 

@@ -16,7 +16,7 @@ from ..errors import InputError, TrajectoryError
 from . import rotations
 from .chebyshev import Function, NotSmoothError, SmoothFunction, certify
 from .poses import Turning
-from .trajectories import PARTS, Motion, finite_value
+from .trajectories import MOTION_PARTS, Motion, finite_value
 
 
 class SmoothTrajectory:
@@ -103,7 +103,8 @@ def _certified(
         return certify(function, positive_number("duration", duration), instants), instants
     except NotSmoothError as error:
         raise TrajectoryError(
-            f"the {PARTS[error.order]} cannot be found: {error}, with `breaks` where a derivative jumps"
+            f"the {MOTION_PARTS[error.order]} cannot be found: {error}, with `breaks` where a derivative "
+            "jumps"
         ) from None
 
 

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, finite_number, instance, positive_number
 from ..errors import InputError, TrajectoryError
 
-#: what a motion consists of, for messages
-PARTS = ("position", "velocity", "acceleration")
+#: what a `Motion` has, in words
+MOTION_PARTS = ("position", "velocity", "acceleration")
 
 
 class Motion(NamedTuple):
@@ -181,7 +181,7 @@ class FunctionTrajectory:
         acceleration: Callable[[float], ArrayLike],
         breaks: tuple[float, ...] = (),
     ):
-        self._functions = dict(zip(PARTS, (position, velocity, acceleration), strict=True))
+        self._functions = dict(zip(MOTION_PARTS, (position, velocity, acceleration), strict=True))
         for name, function in self._functions.items():
             instance(name, function, Callable, "a function of time")  # type: ignore[arg-type]
         self.breaks = tuple(finite_array("breaks", breaks, (None,)).tolist())
