@@ -46,7 +46,6 @@ class Recorder:
         numbers = sum(int(np.prod(shape[1:])) for shape in shapes.values())
         check_fits(clock, 8 * numbers)
         self._arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
-        self._rows = tuple(self._arrays[name] for name in LAYOUT)
         self._damping = DampingLog(instants, loop.cell.n)
         self.count, self.reached, self.state = 0, 0.0, loop.initial_state()
 
@@ -59,17 +58,13 @@ class Recorder:
         self._damping.add(self.count, sample.signals)
         self.count += 1
 
-    def rows_ahead(self) -> list[np.ndarray]:
-        """The part of every array not logged yet, in the order of `LAYOUT`, to be filled from outside."""
-        return [array[self.count :] for array in self._rows]
-
     def address_ahead(self, name: str) -> int | None:
         """Where the part of an array begins that is not logged yet; None if there is no such array."""
         return self._arrays[name][self.count :].ctypes.data if name in self._arrays else None
 
     def advance(self, times: np.ndarray) -> None:
         """Count rows that were filled from outside."""
-        self._rows[0][self.count : self.count + len(times)] = times
+        self._arrays["t"][self.count : self.count + len(times)] = times
         self.count += len(times)
 
     def last(self, name: str) -> np.ndarray:
