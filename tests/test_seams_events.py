@@ -191,12 +191,24 @@ class Timeless(BoundPosted):
         return [np.nan]
 
 
+class Wordy(BoundPosted):
+    def messages(self, start, end):
+        return ["soon"]
+
+
+class Silent(BoundPosted):
+    def messages(self, start, end):
+        return None
+
+
 @pytest.mark.parametrize(
     ("kind", "says"),
     [
         (Shifted, r"Shifted, messages: expected instants in order with 0 <= t < .* s, found"),
         (Backwards, "Backwards, messages: expected instants in order"),
-        (Timeless, "Timeless, messages: expected instants in order"),
+        (Timeless, "Timeless, messages: expected finite numbers, found nan"),
+        (Wordy, "Wordy, messages: expected numbers, found .*soon"),
+        (Silent, "Silent, messages: expected numbers, found None"),
         (Narrow, r"Narrow, meet: expected memory of shape \(5, 3\), found \(4, 3\)"),
     ],
 )
