@@ -149,6 +149,12 @@ def test_a_rate_of_another_size_than_the_state_is_refused_before_the_run():
         lagging(Wrong).simulate(0.01)
 
 
+@pytest.mark.parametrize("start", [[0.0] * 8, None, 1.0, np.zeros((2, 4)), np.full(8, np.nan)], ids=repr)
+def test_a_state_that_is_no_row_of_finite_numbers_is_refused_by_name(start):
+    with pytest.raises(InputError, match="plant Started, hidden0: expected"):
+        lagging(type("Started", (LaggingMotors,), {"hidden0": start}))
+
+
 class Failing(LaggingMotors):
     """Motors that break."""
 

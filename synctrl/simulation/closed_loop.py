@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..checks import finite_array
+from ..checks import finite_array, instance
+from ..control.adaptation.check import check_adaptation
 from ..control.controller import Controller, Signals
 from ..control.messages import Messages
+from ..control.network import BoundNetwork
 from ..coupling.cell import Reference
 from ..errors import InputError, NonFiniteError
 from .plant import Plant
@@ -25,13 +27,17 @@ class ClosedLoop:
         messages: those of the network.
 
     Raises:
-        InputError: events that are no instants.
+        InputError: events that are no instants, or parts of one's own that start from no finite numbers or
+            give arrays that do not fit.
     """
 
     def __init__(self, controller: Controller, plant: Plant):
         self.controller, self.plant = controller, plant
         self.cell, self._law = controller.cell, controller.unchecked
-        self._z0, self._memory0 = controller.adaptation.start(), np.asarray(controller.network.start())
+        if not _is_ours(type(controller.adaptation)):
+            check_adaptation(controller.adaptation, self.cell)
+        self._z0, self._memory0 = controller.adaptation.start(), _memory_of(controller.network)
+        _check_own_state(plant)
         self._layout = Layout(self.cell, self._z0.shape, self._memory0.shape, plant.hidden0.size)
         self.size = self._layout.size
         self.events = finite_array(f"events of the plant {type(plant).__qualname__}", plant.events, (None,))
@@ -186,6 +192,16 @@ class ClosedLoop:
                     robot=i,
                     cause="part",
                 )
+
+
+def _memory_of(network: BoundNetwork) -> np.ndarray:
+    return finite_array(f"network {type(network).__qualname__}, start", network.start())
+
+
+def _check_own_state(plant: Plant) -> None:
+    where = f"plant {type(plant).__qualname__}, hidden0"
+    instance(where, plant.hidden0, np.ndarray, "an array")
+    finite_array(where, plant.hidden0, (None,))
 
 
 def _is_ours(kind: type) -> bool:
