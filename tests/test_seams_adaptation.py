@@ -166,6 +166,22 @@ def test_arrays_that_do_not_fit_are_refused_with_the_adaptation_before_anything_
         with_adaptation(a460_pair(), Unfit(0.3, 0.1))
 
 
+class Clipped(Leaky):
+    """Estimates that keep to their first values, whatever the rate is."""
+
+    def bind(self, cell):
+        bound = super().bind(cell)
+        bound.settle = lambda z: np.clip(z, bound.theta_hat0 - 1e-6, bound.theta_hat0 + 1e-6)
+        return bound
+
+
+@pytest.mark.parametrize("integrator", ["rk4", "RK45", "LSODA"])
+def test_every_integrator_lets_estimates_settle_where_steps_end(integrator):
+    experiment = with_adaptation(a460_pair(), Clipped(0.3, 0.1))
+    moved = np.abs((run := experiment.simulate(0.02, integrator=integrator)).theta_hat - run.theta_hat[0])
+    assert moved.max() == pytest.approx(1e-6)
+
+
 def test_maps_without_bodies_are_refused_by_name():
     with pytest.raises(InputError, match=r"Natural needs all inertial parameters .* LinearParameters"):
         with_adaptation(planar_four(), Natural(0.1))

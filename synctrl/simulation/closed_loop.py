@@ -143,11 +143,17 @@ class ClosedLoop:
         if hidden_dot.size:
             rate.hidden[...] = hidden_dot
 
-    def settle(self, state: State) -> None:
-        """Let the adaptation make of its own state what it does after a step, for example project it."""
+    def settle(self, state: State) -> bool:
+        """Let the adaptation make of its own state what it does after a step, for example project it.
+
+        Returns:
+            Whether that moved the state.
+        """
         z = self.controller.adaptation.settle(state.z)
-        if z is not state.z:
+        moved = z is not state.z and not np.array_equal(z, state.z)
+        if moved:
             state.z[...] = z
+        return moved
 
     def meet(self, t: float, state: State) -> None:
         """Make the state before the plant's event at time t the one after it.
