@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..checks import finite_array, instance
@@ -154,6 +156,11 @@ class ClosedLoop:
         if moved:
             state.z[...] = z
         return moved
+
+    def events_within(self, end: float) -> list[dict[str, Any]]:
+        """The plant's events of a run with 0 <= t < end, in order, as plain data: `t`, s, and `part`."""
+        part = type(self.plant).__qualname__
+        return [{"t": t, "part": part} for t in np.sort(self.events).tolist() if 0 <= t < end]
 
     def meet(self, t: float, state: State) -> None:
         """Make the state before the plant's event at time t the one after it.
