@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..checks import finite_array, instance
-from ..control.adaptation.check import check_adaptation
+from ..control.adaptation_check import check_adaptation
 from ..control.controller import Controller, Signals
 from ..control.messages import Messages
 from ..control.network import BoundNetwork
@@ -37,7 +37,7 @@ class ClosedLoop:
         self.controller, self.plant = controller, plant
         self.cell, self._law = controller.cell, controller.unchecked
         if not _is_ours(type(controller.adaptation)):
-            check_adaptation(controller.adaptation, self.cell)
+            check_adaptation(controller)
         self._z0, self._memory0 = controller.adaptation.start(), _memory_of(controller.network)
         _check_own_state(plant)
         self._layout = Layout(self.cell, self._z0.shape, self._memory0.shape, plant.hidden0.size)
