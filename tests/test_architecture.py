@@ -7,8 +7,10 @@ import warnings
 from pathlib import Path
 
 import test_imports
+from test_trip import trip
 
 from synctrl.errors import StepWarning
+from synctrl.experiments import a460_pair, planar_four
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = (DOCS / "architecture.md").read_text("utf-8")
@@ -23,6 +25,12 @@ def test_the_examples_of_the_page_run_one_after_another():
         warnings.simplefilter("ignore", StepWarning)
         for number, block in enumerate(blocks, start=1):
             exec(compile(block, f"block {number} of docs/architecture.md", "exec"), names)
+
+
+def test_the_way_to_a_torque_is_the_one_that_the_page_tells():
+    told = re.findall(r"^\| \d+ \| `([\w.]+)` \|", PAGE, flags=re.MULTILINE)
+    assert told == trip(planar_four())
+    assert len(trip(a460_pair())) == 9  # "in joint space there are nine"
 
 
 def test_the_picture_has_the_rooms_from_the_ground_up():
