@@ -21,7 +21,7 @@ from synctrl.show.animation import (
     payload_pair_scene,
     planar_scene,
 )
-from synctrl.show.rotations import matrices as rotations
+from synctrl.tasks.rotations import from_quaternion as rotations
 
 FPS = 25.0
 
