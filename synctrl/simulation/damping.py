@@ -27,7 +27,7 @@ class DampingLog:
         if task.J is None or task.inversion is None or task.inversion.damping is None:
             return
         lost = np.matvec(signals.reference.c_inv, signals.u) - np.matvec(task.J, signals.v_ref)
-        self._damping[k] = task.inversion.damping
+        self._damping[k] = task.inversion.damping[:, 0]
         self._lost[k] = np.linalg.norm(lost, axis=1)
 
     def report(self, t: np.ndarray) -> list[dict[str, Any]]:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..robots.robot import Robot
 from . import rotations
-from .redundancy import Damping, Redundancy
+from .redundancy import Damping, InverseMap, Redundancy
 from .spaces import BoundTipSpace, Measurement, TipSpace
-from .tips import Tips
-from .validity import Invalid, too_turned
+from .tips import Kinematics
 
 #: An orientation error beyond this ends a run: at pi its direction is not defined, rad.
 MAX_ANGLE = 3.0
@@ -55,24 +55,13 @@ class PoseSpace(TipSpace):
         """x, y, z, and the three coordinates of the rotation vector."""
         return "x", "y", "z", "rx", "ry", "rz"
 
-    def bind(self, robots: Sequence[Robot]) -> BoundPoseSpace:
-        """Pose space of these robots.
+    @property
+    def limits(self) -> Mapping[str, float]:
+        """Of the orientation error, rad, and of the condition number."""
+        return {"orientation": MAX_ANGLE, **super().limits}
 
-        Raises:
-            InputError: a robot has fewer than six joints, or a redundancy that does not fit.
-        """
-        return BoundPoseSpace(Tips(robots), self.inverse_map(robots))
-
-    def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        pose, J, _ = robot.tip_kinematics(q, np.zeros(robot.nv))
-        e_o = rotations.log(rotations.exp(target[3:]) @ pose.rotation.T)
-        e = np.concatenate((target[:3] - pose.translation, e_o))
-        return e, np.vstack((J[:3], rotations.left_jacobian_inverse(e_o).T @ J[3:]))
-
-    def invalid(self, task: Measurement) -> Invalid | None:
-        """The robot with the largest orientation error, if that is too large; else as every tip's space."""
-        turned = too_turned(task.e[:, 3:], MAX_ANGLE)
-        return super().invalid(task) if turned is None else turned
+    def over(self, tips: Kinematics, inverse: InverseMap, square: ArrayLike) -> BoundPoseSpace:
+        return BoundPoseSpace(tips, inverse, square, self.limits)
 
     def displacement(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
         """From one pose to another, (..., 6): a translation and, in world axes, a rotation vector."""
@@ -90,25 +79,25 @@ class BoundPoseSpace(BoundTipSpace):
     x'' = (acceleration, w_d'), all in world axes, see poses.py.
     """
 
-    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
-        (q, v), (xd, xd_dot, xd_ddot) = motion, desired
-        (position, _), R, J_t, J_t_dot = self._tips.poses(q, v)
-        J_w, J_w_dot = J_t[:, 3:], J_t_dot[:, 3:]
-        e_o, phi = rotations.log(np.stack((rotations.exp(xd[:, 3:]) @ np.swapaxes(R, 1, 2), R)))
+    def place(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+        v, (xd, xd_dot, xd_ddot) = motion[1], desired
+        (position, _), R, J_t, J_t_dot = self._tips.poses(*motion)
+        J_w, J_w_dot, wd, wd_dot = J_t[..., 3:, :], J_t_dot[..., 3:, :], xd_dot[..., 3:], xd_ddot[..., 3:]
+        e_o, phi = rotations.log(np.stack((rotations.exp(xd[..., 3:]) @ R.mT, R)))
         left = rotations.left_jacobian_inverse(e_o)
-        right = np.swapaxes(left, 1, 2)
-        J = np.concatenate((J_t[:, :3], right @ J_w), axis=1)
-        x_dot = np.matvec(J, v)
-        wd, wd_dot = xd_dot[:, 3:], xd_ddot[:, 3:]
-        turning = np.matvec(left, wd)
-        left_dot = rotations.left_jacobian_inverse_dot(e_o, turning - x_dot[:, 3:])
+        J = _below(J_t[..., :3, :], left.mT @ J_w)
+        x_dot, turning = np.matvec(J, v), np.matvec(left, wd)
+        left_dot = rotations.left_jacobian_inverse_dot(e_o, turning - x_dot[..., 3:])
+        J_dot = _below(J_t_dot[..., :3, :], left_dot.mT @ J_w + left.mT @ J_w_dot)
+        x, e = _beside(position, phi), _beside(xd[..., :3] - position, e_o)
         turning_dot = np.matvec(left_dot, wd) + np.matvec(left, wd_dot)
-        J_o_dot = np.swapaxes(left_dot, 1, 2) @ J_w + right @ J_w_dot
-        J_dot = np.concatenate((J_t_dot[:, :3], J_o_dot), axis=1)
-        inversion = self._inverse.invert(J, J_dot, q, v)
-        x = np.concatenate((position, phi), axis=1)
-        e = np.concatenate((xd[:, :3] - position, e_o), axis=1)
-        rates = desired[1:].copy()
-        rates[:, :, 3:] = turning, turning_dot
-        moved, error = np.stack((x, x_dot)), np.stack((e, rates[0] - x_dot))
-        return Measurement(moved, error, rates, J, inversion.J_inv, J_dot, inversion)
+        rates = np.stack((_beside(xd_dot[..., :3], turning), _beside(xd_ddot[..., :3], turning_dot)))
+        return Measurement(np.stack((x, x_dot)), np.stack((e, rates[0] - x_dot)), rates, J, J_dot=J_dot)
+
+
+def _beside(linear: np.ndarray, angular: np.ndarray) -> np.ndarray:
+    return np.concatenate((linear, angular), axis=-1)
+
+
+def _below(linear: np.ndarray, angular: np.ndarray) -> np.ndarray:
+    return np.concatenate((linear, angular), axis=-2)

@@ -1,23 +1,25 @@
 """The space in which robots are told what to do: joint positions, or the position of their tips.
 
 A space is bound to the robots of a cell. It then measures their task coordinates and maps what the law wants
-there to joint space. All arrays have one row per robot.
+there to joint space. All arrays have one row per robot; with that axis left out they describe a single robot.
+No formula asks what its numbers are: the compiled engine traces the same lines, bound to tips of symbols.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..checks import choice, instance, positive_number
 from ..errors import InputError
 from ..robots.robot import Robot
-from .redundancy import Damping, InverseMap, Inversion, Redundancy, inverse_map
-from .tips import Tips
-from .validity import Invalid, determinant_sides, too_singular
+from .redundancy import Damping, Inverse, InverseMap, Inversion, Redundancy, inverse_map
+from .tips import Kinematics, Tip, Tips
+from .validity import WATCHED
 
 AXES = "xyz"
 Joints = tuple[np.ndarray, np.ndarray]
@@ -53,7 +55,16 @@ class Measurement:
 
 
 class BoundSpace(Protocol):
-    """A space bound to the robots of a cell."""
+    """A space bound to the robots of a cell.
+
+    Beside what is below it may offer any of the following, and is asked for it where it does.
+
+    - `limits: Mapping[str, float]` and `watched(task) -> (n, len(limits))`: names and limits of numbers that
+      make a `Measurement` mean nothing once they reach their limits, and these numbers; a run then ends with
+      an error that names time and robot.
+    - `sides(task) -> (n, 1)`: numbers of which the sign says on which side of a singular configuration robots
+      are; a run ends where one has changed within a step. 0 where there are no sides.
+    """
 
     def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
         """Where the robots are and where they should be.
@@ -77,10 +88,6 @@ class Space(Protocol):
     of the following, and is asked for it where it does; what it does not offer is not looked at.
 
     - `units`: unit of each of the m coordinates, where they differ.
-    - `invalid(task) -> Invalid | None`: what makes a `Measurement` mean nothing; the run then ends with an
-      error that names time and robot.
-    - `sides(task, robots) -> (n,)`: on which side of a singular configuration robots are; a run ends where
-      one of them has changed within a step. None where it may.
     - `miss(robot, target, q) -> error, Jacobian`: by how much a robot at q misses a target, (m,), and J,
       (m, nv), with e' = -J v. With it a run begins only if joint positions exist for what is desired.
     - `displacement(start, end)`: the way from one position to another, (..., m), if its velocities are no
@@ -168,21 +175,35 @@ class TipSpace:
         limit = positive_number("max_condition", max_condition)
         self.max_condition = limit if self.damping is None else np.inf
 
-    def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Error e, (m,), of one robot against a target, (m,), and the J, (m, nv), with e' = -J v."""
+    @property
+    def limits(self) -> Mapping[str, float]:
+        """Names and limits of what the guard of a run watches, see `BoundSpace`."""
+        return {"condition": self.max_condition} if self.damping is None else {}
+
+    def bind(self, robots: Sequence[Robot]) -> BoundTipSpace:
+        """This space for certain robots.
+
+        Raises:
+            InputError: a robot has fewer joints than there are task coordinates, or a redundancy that does
+                not fit.
+        """
+        return self.over(Tips(robots), self.inverse_map(robots), [[robot.nv == self.m] for robot in robots])
+
+    def over(self, tips: Kinematics, inverse: InverseMap, square: ArrayLike) -> BoundTipSpace:
+        """This space over any tips, be they of numbers or of symbols.
+
+        Args:
+            tips: where the tips are.
+            inverse: the way to the joints.
+            square: which robots have as many joints as there are task coordinates, (..., 1).
+        """
         raise NotImplementedError
 
-    def invalid(self, task: Measurement) -> Invalid | None:
-        """The first robot whose Jacobian is singular; none with damping."""
-        if task.J is None or task.J_inv is None or self.max_condition == np.inf:
-            return None
-        return too_singular(task.J, task.J_inv, self.max_condition)
-
-    def sides(self, task: Measurement, robots: Sequence[Robot]) -> np.ndarray | None:
-        """Signs of the determinants of square Jacobians, (n,), and 0 for others; None with damping."""
-        if task.J is None or self.max_condition == np.inf:
-            return None
-        return determinant_sides(task.J, np.array([robot.nv == self.m for robot in robots]))
+    def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Error e, (m,), of one robot against a target, (m,), and the J, (m, nv), with e' = -J v."""
+        tip = self.over(Tip(robot), Inverse(), [False])
+        task = tip.place(np.stack((q, np.zeros_like(q))), np.stack((target, *np.zeros((2, self.m)))))
+        return task.e, task.J  # type: ignore[return-value]
 
     def inverse_map(self, robots: Sequence[Robot]) -> InverseMap:
         """The way to the joints of these robots.
@@ -232,51 +253,71 @@ class CartesianSpace(TipSpace):
         """The axes."""
         return tuple(self.axes)
 
-    def bind(self, robots: Sequence[Robot]) -> BoundCartesianSpace:
-        """Cartesian space of these robots.
-
-        Raises:
-            InputError: a robot has fewer joints than there are axes, or a redundancy that does not fit.
-        """
-        return BoundCartesianSpace(Tips(robots), self.inverse_map(robots), self.rows)
-
-    def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        pose, J, _ = robot.tip_kinematics(q, np.zeros(robot.nv))
-        return target - pose.translation[self.rows], J[self.rows]
+    def over(self, tips: Kinematics, inverse: InverseMap, square: ArrayLike) -> BoundCartesianSpace:
+        return BoundCartesianSpace(tips, inverse, square, self.limits, self.rows)
 
     def __repr__(self) -> str:
         return f"CartesianSpace('{self.axes}')"
 
 
 class BoundTipSpace:
-    """Task coordinates that move with x' = J v; an inverse of J leads from the task to the joints."""
+    """Task coordinates that move with x' = J v; an inverse of J leads from the task to the joints.
 
-    def __init__(self, tips: Tips, inverse: InverseMap):
-        self._tips, self._inverse = tips, inverse
+    Args:
+        tips, inverse, square: see `TipSpace.over`.
+        limits: of what is watched, by the names in `WATCHED`.
+    """
+
+    def __init__(self, tips: Kinematics, inverse: InverseMap, square: ArrayLike, limits: Mapping[str, float]):
+        self._tips, self._inverse, self._square, self.limits = tips, inverse, np.array(square), limits
+
+    def place(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+        """As `measure`, without the way back to the joints."""
+        raise NotImplementedError
+
+    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+        task = self.place(motion, desired)
+        task.inversion = self._inverse.invert(task.J, task.J_dot, *motion)  # type: ignore[arg-type]
+        task.J_inv = task.inversion.J_inv
+        return task
 
     def to_joints(self, task: Measurement, xref_dot: np.ndarray, xref_ddot: np.ndarray) -> Joints:
         return self._inverse.to_joints(task.J, task.J_dot, task.inversion, xref_dot, xref_ddot)  # type: ignore[arg-type]
 
     def to_torque(self, task: Measurement, force: np.ndarray) -> np.ndarray:
-        return np.vecmat(force, task.J)  # type: ignore[arg-type]
+        return np.matvec(task.J.mT, force)  # type: ignore[union-attr]
+
+    def watched(self, task: Measurement) -> np.ndarray:
+        """What the guard compares with the limits, (..., number of limits)."""
+        return np.concatenate([WATCHED[name](task) for name in self.limits], axis=-1)
+
+    def sides(self, task: Measurement) -> np.ndarray:
+        """Determinants of square Jacobians, (..., 1); 0 for others, and where they may be singular."""
+        if "condition" not in self.limits or not self._square.any():
+            return 0.0 * self._square
+        J: np.ndarray = task.J  # type: ignore[assignment]
+        return self._square * self._inverse.algebra.determinant(J[..., : J.shape[-2]])
 
 
 class BoundCartesianSpace(BoundTipSpace):
     """Tip positions along some axes."""
 
-    def __init__(self, tips: Tips, inverse: InverseMap, rows: list[int]):
-        super().__init__(tips, inverse)
+    def __init__(
+        self,
+        tips: Kinematics,
+        inverse: InverseMap,
+        square: ArrayLike,
+        limits: Mapping[str, float],
+        rows: list[int],
+    ):
+        super().__init__(tips, inverse, square, limits)
         first, last = rows[0], rows[-1]
         self._rows = slice(first, last + 1) if rows == list(range(first, last + 1)) else rows
 
-    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
-        q, v = motion
-        rows = self._rows
-        moved, J, J_dot = self._tips.positions(q, v)
-        moved, J, J_dot = moved[:, :, rows], J[:, rows], J_dot[:, rows]
-        inversion = self._inverse.invert(J, J_dot, q, v)
-        error, rates = desired[:2] - moved, desired[1:]
-        return Measurement(moved, error, rates, J, inversion.J_inv, J_dot, inversion)
+    def place(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+        moved, J, J_dot = self._tips.positions(*motion)
+        moved, J, J_dot = moved[..., self._rows], J[..., self._rows, :], J_dot[..., self._rows, :]
+        return Measurement(moved, desired[:2] - moved, desired[1:], J, J_dot=J_dot)
 
 
 def _damping(singularity: str | Damping) -> Damping | None:

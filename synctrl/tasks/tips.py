@@ -4,12 +4,41 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
 from ..robots.blocks import Rows
 from ..robots.forest import Forest, forests
 from ..robots.robot import Robot
+
+Positions = tuple[np.ndarray, np.ndarray, np.ndarray]
+Poses = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+class Kinematics(Protocol):
+    """Where tips are and how they move with the joints, in world axes: of all robots of a cell, or of one."""
+
+    def positions(self, q: np.ndarray, v: np.ndarray) -> Positions:
+        """Positions and velocities, (2, ..., 3), J of the velocities and its derivative, (..., 3, nv)."""
+
+    def poses(self, q: np.ndarray, v: np.ndarray) -> Poses:
+        """Positions and velocities, (2, ..., 3); rotation matrices, (..., 3, 3); then (..., 6, nv), twice."""
+
+
+class Tip:
+    """The tip of one robot: `Kinematics` without a leading axis."""
+
+    def __init__(self, robot: Robot):
+        self._robot = robot
+
+    def positions(self, q: np.ndarray, v: np.ndarray) -> Positions:
+        moved, _, J, J_dot = self.poses(q, v)
+        return moved, J[:3], J_dot[:3]
+
+    def poses(self, q: np.ndarray, v: np.ndarray) -> Poses:
+        pose, J, J_dot = self._robot.tip_kinematics(q, v)
+        return np.stack((pose.translation, J[:3] @ v)), pose.rotation, J, J_dot
 
 
 class Tips:
@@ -27,7 +56,7 @@ class Tips:
         """The forest, if there is only one."""
         return self._forests[0][1] if len(self._forests) == 1 else None
 
-    def positions(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def positions(self, q: np.ndarray, v: np.ndarray) -> Positions:
         """Positions and velocities of the tips, the velocities' Jacobians, and the Jacobians' derivatives.
 
         Columns of joints that a robot does not have are zero.
@@ -47,7 +76,7 @@ class Tips:
             motion[:, rows], J[rows, :, :k], J_dot[rows, :, :k] = forest.tips(q[rows, :k], v[rows, :k])
         return motion, J, J_dot
 
-    def poses(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def poses(self, q: np.ndarray, v: np.ndarray) -> Poses:
         """The same with rotation matrices, (n, 3, 3), and with Jacobians of linear and angular velocities.
 
         Args:
