@@ -689,7 +689,7 @@ def test_the_key_covers_every_module_behind_generated_code():
     "name",
     [
         *("control/commands.py", "control/law.py", "robots/mechanism.py", "tasks/rotations.py"),
-        *("simulation/plant.py", "compiled/structs.py", "compiled/driver.c"),
+        *("simulation/plant.py", "compiled/quantities.py", "compiled/driver.c"),
     ],
 )
 def test_another_source_gives_another_key(tmp_path, name):

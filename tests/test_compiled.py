@@ -11,6 +11,7 @@ import pytest
 from synctrl import CartesianSpace, Cell, Circle, Coupling, Disturbance, Gains, Member, load_robot
 from synctrl.compiled import build, engine
 from synctrl.compiled.program import Program
+from synctrl.compiled.quantities import DESIRED
 from synctrl.errors import (
     CompilationError,
     InputError,
@@ -184,7 +185,7 @@ def test_code_that_differs_from_pinocchio_is_refused(monkeypatch, tmp_path):
 
     def tampered(sources, folder):
         *functions, driver = sources
-        broken = driver.replace("c->Gamma + (size_t)i * c->P;", "c->pi;")
+        broken = driver.replace("X(Gamma, n, P) X(W_inv", "X(pi, n, P) X(W_inv")
         assert broken != driver
         return compile_sources([*functions, broken], folder)
 
@@ -218,13 +219,12 @@ def test_what_goes_wrong_while_code_is_written_comes_through(monkeypatch, tmp_pa
 def test_tables_hold_what_the_cell_desires(coupling):
     cell = planar_cell(2, coupling).cell
     instants = np.array([[0.0, 0.1], [0.05, 0.15], [0.1, 0.2]])
-    desired, c = engine._tables(cell, instants)
-    c = np.broadcast_to(c.reshape(-1, *c.shape[-4:]), (6, *c.shape[-4:])).reshape(3, 2, *c.shape[-4:])
+    tables = engine._tables(cell, instants)
+    desired = np.stack([tables[name] for name in DESIRED], axis=2).reshape(3, 2, 2, 3, 2)
+    c = np.broadcast_to(tables["weights"].reshape(-1, 2, 4, 2, 2), (6, 2, 4, 2, 2)).reshape(3, 2, 2, 4, 2, 2)
     for stage, times in enumerate(instants):
         for step, reference in enumerate(cell.references(times)):
-            np.testing.assert_allclose(
-                desired.reshape(3, 2, 2, 3, 2)[stage, step].swapaxes(0, 1), reference.desired
-            )
+            np.testing.assert_allclose(desired[stage, step].swapaxes(0, 1), reference.desired)
             np.testing.assert_allclose(c[stage, step].swapaxes(0, 1), reference.weights)
 
 

@@ -196,24 +196,25 @@ def test_robots_that_nobody_chose_pass_the_check(seed):
 
 # -- what the check finds ---------------------------------------------------------------------------------
 
-#: faults of the driver: a text, and what stands in its place
+#: how Gamma is handed to the law
+GAMMA = "X(Gamma, n, P) X(W_inv"
+#: faults of the driver and of the lists before it: a text, and what stands in its place
 FAULTS = {
     "a sign of S is lost": ("epsilon[j] += c->sign[t] * w[j]", "epsilon[j] += w[j]"),
-    "a share takes another pair": ("integral + (size_t)c->incident[t] * m", "integral"),
-    "the integral's sign is lost": ("share[j] += c->incident_sign[t] * sum[j]", "share[j] += sum[j]"),
-    "the place of the base": ("*a++ = c->base + 12 * i;\n        *a++ = desired_of", "*a++ = c->base;\n"
-                              "        *a++ = desired_of"),
-    "the posture's gain": ("*a++ = c->gain + (size_t)i * nv;", "*a++ = c->posture + (size_t)i * nv;"),
-    "the weights of W": ("*a++ = c->W_inv + (size_t)i * nv;\n        for",
-                         "*a++ = c->gain + (size_t)i * nv;\n        for"),
-    "another robot's damping": ("c->K_r + (size_t)i * c->K", "c->K_r"),
-    "another robot's true parameters": ("k->pi + (size_t)i * c->bodies", "k->pi"),
-    "Coulomb friction": ("* tanh(v[j] / c->smoothing[i])", "* (v[j] / c->smoothing[i])"),
-    "the disturbance": ("+ disturbance[i * nv + j]", ""),
-    "what adapts": ("c->Gamma + (size_t)i * c->P", "c->Gamma"),
-    "which kind a robot is": ("&kinds[c->kind[i]]", "&kinds[c->kind[0]]"),
-    "the integral's rate": ("k->compared + (size_t)pair * 2 * m,\n               sizeof",
-                            "k->compared + (size_t)pair * 2 * m + m,\n               sizeof"),
+    "a share takes another pair": ("sign * a->integral[pair + j]", "sign * a->integral[j]"),
+    "the integral's sign is lost": ("sign * a->integral[pair + j]", "a->integral[pair + j]"),
+    "the place of the base": ("X(base, n, 12) X(desired", "X(base, one, 12) X(desired"),
+    "the posture's gain": ("X(gain, n, nv) X(base", "X(posture, n, nv) X(base"),
+    "the weights of W": ("X(weights, n, 4*m*m) X(W_inv, n, nv)", "X(weights, n, 4*m*m) X(gain, n, nv)"),
+    "another robot's damping": ("X(K_eps, one, m) X(K_r, n, K)", "X(K_eps, one, m) X(K_r, one, K)"),
+    "another robot's true parameters": ("X(pi, n, bodies) X(base", "X(pi, one, bodies) X(base"),
+    "Coulomb friction": ("* tanh(a->v[j] / a->smoothing[j])", "* (a->v[j] / a->smoothing[j])"),
+    "the disturbance": ("+ a->disturbance[j]", ""),
+    "what adapts": (GAMMA, GAMMA.replace("Gamma, n", "Gamma, one")),
+    "which kind a robot is": ("kinds[c->kind[i]].function(", "kinds[c->kind[0]].function("),
+    "the integral's rate": ("a->integral_dot, a->epsilon,", "a->integral_dot, a->epsilon_dot,"),
+    "the order of what is desired": ("X(desired_dot, n, m) X(desired_ddot, n, m) X(weights",
+                                     "X(desired_ddot, n, m) X(desired_dot, n, m) X(weights"),
 }  # fmt: skip
 
 
@@ -250,7 +251,7 @@ def test_code_that_was_made_from_a_wrong_line_of_the_law_is_found(monkeypatch):
 
 def test_a_wrong_library_in_the_cache_is_built_again(sources, monkeypatch, tmp_path):
     *functions, driver = sources
-    broken = [*functions, driver.replace("c->Gamma + (size_t)i * c->P", "c->Gamma")]
+    broken = [*functions, driver.replace(GAMMA, GAMMA.replace("Gamma, n", "Gamma, one"))]
     with monkeypatch.context() as patch:
         patch.setattr(program, "generate", lambda kinds: iter(broken))
         patch.setattr(program, "_compare", lambda *arguments: None)

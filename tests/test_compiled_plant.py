@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_saturation import pair as saturating
 
-from synctrl import Experiment, Payload, Result
+from synctrl import Disturbance, Experiment, Payload, Result
 from synctrl.compiled.known import check_known
 from synctrl.compiled.program import Program
 from synctrl.errors import InputError, SaturationWarning
@@ -93,8 +93,13 @@ def test_the_edge_of_a_payload_acts_from_its_instant_on_in_both_engines(edge):
     assert (run.v[~before][0, 0] != free.v[~before][0, 0]).any()
 
 
-def test_payloads_saturation_and_disturbances_act_together_in_both_engines():
-    both(replace(carrying(planar_four(disturbance="torque")), saturate=True), duration=0.1, dt=1e-3)
+@pytest.mark.parametrize("options", WAYS.values(), ids=WAYS)
+def test_payloads_saturation_and_disturbances_act_together_in_both_engines(options):
+    """With edges on steps and samples, and between them."""
+    pushes = Disturbance(2, 0.4, 0.02, 0.06), Disturbance(0, 0.3, 0.0303, 0.0507)
+    experiment = replace(carrying(planar_four(disturbance=pushes)), saturate=True)
+    run, _ = both(experiment, duration=0.1, dt=1e-3, **options)
+    assert (run.disturbance[:, 2] != 0).any()
 
 
 def test_payloads_need_no_new_code():

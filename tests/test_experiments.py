@@ -7,8 +7,11 @@ import inspect
 import numpy as np
 import paper_model as paper
 import pytest
+from seams.lagging_network import Lagging
+from seams.leaky_adaptation import Leaky
+from seams.pulling_law import Pulling
 
-from synctrl import Disturbance, Experiment, Gains
+from synctrl import Disturbance, Experiment, Gains, experiments
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, planar_four
 
@@ -52,6 +55,38 @@ def test_results_have_the_shapes_that_others_rely_on(make, sizes):
 def test_the_arguments_others_rely_on_are_there_in_their_order(make, face):
     parameters = {k: v.default for k, v in inspect.signature(make).parameters.items() if k != "self"}
     assert dict(list(parameters.items())[: len(face)]) == face
+
+
+# -- parts of the controller, in every ready cell ---------------------------------------------------------
+
+READY = [
+    make
+    for make in (getattr(experiments, name) for name in experiments.__all__)
+    if inspect.signature(make).return_annotation == "Experiment"
+]
+PARTS = {"adaptation": Leaky(0.01, 0.1), "law": Pulling(0.1), "network": Lagging(0.01)}
+
+
+@pytest.mark.parametrize("make", READY, ids=lambda make: make.__name__)
+def test_every_ready_cell_takes_parts_of_ones_own_and_runs_with_them(make):
+    experiment = make(**PARTS)
+    info = experiment.simulate(0.001, dt=5e-4).info
+    for name, part in PARTS.items():
+        assert getattr(experiment, name) is part
+        assert info[name] == part.as_dict()
+
+
+@pytest.mark.parametrize("make", READY, ids=lambda make: make.__name__)
+@pytest.mark.parametrize("name", PARTS)
+def test_every_ready_cell_takes_one_part_and_keeps_the_others(make, name):
+    experiment = make(**{name: PARTS[name]})
+    assert {part: getattr(experiment, part) for part in PARTS} == {**dict.fromkeys(PARTS), name: PARTS[name]}
+    expected = make().gains.replace(Gamma=None) if name == "adaptation" else make().gains
+    assert experiment.gains == expected
+
+
+def test_there_are_eight_ready_cells():
+    assert len(READY) == 8
 
 
 # -- four planar arms -------------------------------------------------------------------------------------

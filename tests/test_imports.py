@@ -21,6 +21,7 @@ PACKAGE = ROOT / "synctrl"
 # From the ground up: a room may import from itself and from the rooms before it.
 ROOMS = (
     "errors",
+    "renamed",
     "checks",
     "files",
     "moved",

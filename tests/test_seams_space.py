@@ -52,6 +52,32 @@ def test_joints_move_alike_in_degrees_and_in_radians(options):
     assert mine.unit("tracking_error") == "deg" and mine.unit("q") == "rad"
 
 
+class DegreesFromTheirPath(Degrees):
+    """Degrees that say where a robot begins."""
+
+    def start(self, robot, x):
+        return x / DEGREES
+
+
+def test_a_space_may_say_where_a_robot_begins_and_is_asked_only_without_a_start():
+    way = Cubic(DEGREES * START, DEGREES * (START + 0.1), 0.5)
+    members = [Member(ARM, way), Member(ARM, way, q0=START + 0.2)]
+    cell = Cell(members, Coupling.pair(), DegreesFromTheirPath())
+    np.testing.assert_allclose(cell.q0, [START, START + 0.2])
+    with pytest.raises(InputError, match="robot 1, q0: expected joint positions to start from"):
+        Cell(members, Coupling.pair(), Degrees())
+
+
+def test_a_start_that_a_space_gives_has_to_be_one_of_the_robot():
+    class Short(DegreesFromTheirPath):
+        def start(self, robot, x):
+            return x[:1]
+
+    way = Cubic(DEGREES * START, DEGREES * (START + 0.1), 0.5)
+    with pytest.raises(InputError, match="robot 1, q0: expected shape"):
+        Cell([Member(ARM, way)] * 2, Coupling.pair(), Short())
+
+
 def test_a_run_in_degrees_is_certified():
     certificate = certify(experiment(Degrees()).simulate())
     assert certificate.certified and certificate.closes

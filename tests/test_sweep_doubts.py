@@ -5,13 +5,14 @@ from __future__ import annotations
 import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 from sweeps import DT, base
 from test_saturation import pair
 
 from synctrl import Experiment
 from synctrl.errors import SaturationWarning, StepWarning
-from synctrl.sweep import Factor, Grid, LogUniform, Sweep, gain
+from synctrl.sweep import Factor, Grid, LogUniform, Sweep, gain, load
 from synctrl.tune import tune
 
 KINDS = (StepWarning, SaturationWarning)
@@ -61,6 +62,25 @@ def test_a_sweep_counts_the_runs_to_be_doubted_and_names_the_worst(serial):
     cut = sum(share > 0 for share in shares.values())
     assert f"{cut} of the 4 runs" in serial[SaturationWarning] and 0 < cut < 4
     assert f"most in run {max(shares, key=shares.get)}," in serial[SaturationWarning]
+
+
+def test_the_table_says_of_each_run_how_far_it_is_to_be_doubted(tmp_path):
+    pytest.importorskip("pandas", reason="tables are read with pandas: pip install 'synctrl[sweep]'")
+    sweep = hasty_sweep()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        sweep.run(tmp_path, backend="serial", progress=False)
+        infos = [sweep.simulate(run).info for run in range(4)]
+    table = load(tmp_path)
+    estimates = [info["step_error"]["estimate"] for info in infos]
+    assert estimates[0] is None, "the first run does not move"
+    np.testing.assert_array_equal(table["step_error"][:4], np.array(estimates, dtype=float))
+    shares = [max((e["share"] for e in info["saturation"]), default=0.0) for info in infos]
+    assert list(table["saturation"][:4]) == shares
+    assert len(set(shares)) > 1
+    assert table.loc[4, ["step_error", "saturation"]].isna().all(), "a run that stops has no measures"
+    for name in ("step_error", "saturation"):
+        assert table.attrs["measures"][name]["definition"]
 
 
 @pytest.mark.parametrize("workers", [1, 2])

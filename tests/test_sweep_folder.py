@@ -135,6 +135,23 @@ def test_a_line_that_cannot_be_of_this_sweep_is_refused_with_file_and_line(name,
     assert (tmp_path / "runs.jsonl").read_bytes() == before
 
 
+def older(made: Path, folder: Path) -> None:
+    """A copy of the folder in format 1, which has no columns for steps and saturation."""
+    about = json.loads((made / "sweep.json").read_text())
+    rewritten(made, folder, lambda rows: [row[: len(about["columns"]) - 2] for row in rows])
+    about |= {"format": "synctrl sweep 1", "columns": about["columns"][:-2]}
+    (folder / "sweep.json").write_text(json.dumps(about))
+
+
+def test_a_folder_of_format_1_is_read_and_not_mixed_with_new_rows(made, tmp_path):
+    older(made, tmp_path)
+    new, old = load(made), load(tmp_path)
+    assert list(new.columns) == [*old.columns, "saturation", "step_error"]
+    assert new[old.columns].equals(old)
+    with pytest.raises(ResultError, match=r"format is .*1.* there and .*2.* here"):
+        quiet(mixed_sweep(), tmp_path, backend="serial")
+
+
 def test_a_stopped_run_stops_within_its_duration(tmp_path):
     sweep = Sweep(base(), [gain("K_r", Grid([1e6]))], dt=DT, engine="pinocchio", bands=BANDS, duration=0.1)
     quiet(sweep, tmp_path, backend="serial")

@@ -13,7 +13,7 @@ from synctrl import Disturbance
 from synctrl.analysis import Certificate, certify
 from synctrl.errors import ResultError
 from synctrl.paper.baselines import Comparison, compare
-from synctrl.paper.report import Table, Text, write_page
+from synctrl.paper.report import Row, Table, Text, write_page
 from synctrl.paper.reproduction import JOBS
 from synctrl.paper.theory import CERTIFIED, examine
 from synctrl.paper.theory_sections import baseline_section, certificate_section, draw_certificate
@@ -43,6 +43,12 @@ def test_the_section_has_a_figure_and_a_verdict_for_every_run(certificates, tmp_
     table = next(block for block in section.blocks if isinstance(block, Table))
     assert [row[1] for row in table.rows] == ["certified", "outside the theorem"]
     assert "V first grows at t = 0.01" in page
+
+
+def test_an_odd_number_of_figures_stands_in_one_grid_and_none_alone(certificates, tmp_path: Path) -> None:
+    three = {**certificates, "third": certificates["free"]}
+    rows = [block for block in certificate_section(three, tmp_path).blocks if isinstance(block, Row)]
+    assert [len(row.blocks) for row in rows] == [3]
 
 
 def test_the_figure_shows_the_terms_that_act_and_marks_the_growth(certificates) -> None:

@@ -13,6 +13,7 @@ from ..simulation.simulate import Experiment
 from .convergence import Convergence, convergence_of
 from .gain_condition import GainCondition, gain_condition_of
 from .lyapunov import OUTSIDE, Growth, Lyapunov, first_growth, lyapunov_of
+from .metrics import finite_or_none
 from .proofs import unproven_parts
 from .replay import Replay, replay
 
@@ -202,7 +203,7 @@ def _ends(record: Lyapunov) -> dict[str, dict[str, float]]:
 
 def _finite(values: dict[str, Any]) -> dict[str, Any]:
     """None for what is infinite, so that strict JSON can hold it."""
-    return {k: None if isinstance(v, float) and not np.isfinite(v) else v for k, v in values.items()}
+    return {k: finite_or_none(v) if isinstance(v, float) else v for k, v in values.items()}
 
 
 def _lines(c: Certificate) -> list[str]:

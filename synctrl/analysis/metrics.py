@@ -163,7 +163,7 @@ def _error_data(result: Result, kind: str, computed: ErrorMetrics) -> dict[str, 
     names = ("peak", "rms", "ise", "settling_time", "final")
     values = {
         row: {
-            axis: {name: _finite(getattr(computed, name)[k, a]) for name in names}
+            axis: {name: finite_or_none(getattr(computed, name)[k, a]) for name in names}
             for a, axis in enumerate(result.info["axes"])
         }
         for k, row in enumerate(row_names(result, kind))
@@ -210,5 +210,6 @@ def write_metrics(path: str | Path, runs: Mapping[str, Mapping], claims: list[Ma
     return path
 
 
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+def finite_or_none(value: float | None) -> float | None:
+    """A number as files can hold it: None in place of what is not finite."""
+    return float(value) if value is not None and np.isfinite(value) else None

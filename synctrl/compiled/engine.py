@@ -15,10 +15,12 @@ from ..simulation.clock import Clock, Stretch
 from ..simulation.disturbances import DisturbanceSchedule
 from ..simulation.guard import CHECKS, Finding, stopped
 from ..simulation.handover import tell, up_to_a_failure
-from ..simulation.recorder import ADAPTATION_STATE, Recorder
+from ..simulation.recorder import Recorder
 from ..simulation.step_error import StepError
-from .program import Program
-from .structs import LogStruct, ReferenceStruct, ReportStruct, StepErrorStruct
+from . import structs
+from .program import Program, one_after_another
+from .quantities import DESIRED, LOGS
+from .structs import Mark
 
 #: bytes of references that one block of steps may need
 BLOCK_BYTES = 32_000_000
@@ -29,11 +31,10 @@ AWAY = 0.05
 
 
 class Block(NamedTuple):
-    """Consecutive steps with what is desired at their start, middle and end."""
+    """Consecutive steps with what is desired at their start, middle and end, by the names of quantities."""
 
     steps: Stretch
-    desired: np.ndarray
-    weights: np.ndarray
+    desired: dict[str, np.ndarray]
 
 
 def blocks(program: Program, clock: Clock) -> Iterator[Block]:
@@ -42,7 +43,7 @@ def blocks(program: Program, clock: Clock) -> Iterator[Block]:
 
     def make(first: int, last: int) -> Block:
         stretch = clock.stretch(first, last)
-        return Block(stretch, *_tables(cell, stretch.stages))
+        return Block(stretch, _tables(cell, stretch.stages))
 
     for first, last in clock.stretches(_length(cell)):
         yield from up_to_a_failure(make, first, last)
@@ -168,20 +169,21 @@ class _Steps:
     ):
         self._program, self._clock, self._every = program, clock, every
         self._schedule, self._recorder, self._step_error = schedule, recorder, step_error
-        v0 = program.loop.cell.v0
+        v0, work = program.loop.cell.v0, program.work
         self._before = np.zeros((2, 2, v0.size))
         buffers = (part.ctypes.data for part in self._before)
-        self._worst = StepErrorStruct(0, np.abs(v0).max(), 0, 0, 0, *buffers)
-        program.work.step_error = ctypes.addressof(self._worst)
-        self._torques = np.ascontiguousarray(schedule.torques)
-        ctypes.memset(program.work.sign, 0, 8 * program.loop.cell.n)
+        work.step_error = structs.StepError(0, np.abs(v0).max(), 0, 0, 0, *buffers)
+        self._steps = structs.Steps(holds=every is not None)
+        self._block: Block | None = None
+        program.tell(self._steps, {"disturbance": schedule.torques, "pi": program.carried})
+        ctypes.memset(work.orientation, 0, 8 * program.loop.cell.n)
 
     def advance(self, block: Block, first: int, last: int, y: np.ndarray) -> None:
         """Move y through some steps of a block, in place."""
         steps = block.steps
         part = slice(first, last)
         joined = self._clock.joined(steps.first + first, steps.starts[part])
-        marks = _marks(steps.checked[part], steps.logged[part], self._due(steps.number[part]), joined)
+        marks = _marks(steps.checked[part], steps.logged[part], self._sampled(steps, part), joined)
         windows = self._windows(steps.middles[part])
         self._call(block, first, steps.times[first : last + 1], marks, windows, y)
 
@@ -190,8 +192,8 @@ class _Steps:
         end, clock = np.array([self._clock.end]), self._clock
         at = np.array([clock.count])
         nothing = Stretch(clock.steps, np.repeat(end, 2), at > 0, at > 0, at)
-        block = Block(nothing, *_tables(self._program.loop.cell, np.array([end] * 3)))
-        due = np.array([self._every is not None and clock.sampled_at_end(self._every)])
+        block = Block(nothing, _tables(self._program.loop.cell, np.array([end] * 3)))
+        due = np.array([self._every is None or clock.sampled_at_end(self._every)])
         windows = self._windows(clock.stretch(clock.steps - 1, clock.steps).middles)
         self._call(block, 0, nothing.times, _marks(at > 0, at > 0, due, at < 0), windows, y)
 
@@ -200,8 +202,18 @@ class _Steps:
         schedules = self._schedule, self._program.loop.plant.schedule
         return [schedule.windows(middles).astype(np.intc) for schedule in schedules]
 
-    def _due(self, number: np.ndarray) -> np.ndarray:
-        return number % (self._every or 1) == 0
+    def _sampled(self, steps: Stretch, part: slice) -> np.ndarray:
+        """Whether each step begins with a sample: on multiples of dt, or always if control is continuous."""
+        if self._every is None:
+            return np.ones(len(steps.starts[part]), dtype=bool)
+        return steps.checked[part] & (steps.number[part] % self._every == 0)
+
+    def _of(self, block: Block) -> structs.Steps:
+        """The steps of a block."""
+        if block is not self._block:
+            self._program.tell(self._steps, block.desired)
+            self._steps.length, self._block = len(block.steps.starts), block
+        return self._steps
 
     def _call(
         self,
@@ -212,53 +224,42 @@ class _Steps:
         windows: list[np.ndarray],
         y: np.ndarray,
     ) -> None:
-        program, library, recorder = self._program, self._program.library, self._recorder
-        constant = program.loop.cell.coupling.is_constant
-        table = ReferenceStruct(
-            block.desired.ctypes.data, block.weights.ctypes.data, len(block.steps.starts), int(constant),
-            first, len(marks),
-        )  # fmt: skip
-        rows = recorder.rows_ahead()
-        log, report = LogStruct(*(row.ctypes.data for row in rows[1:])), ReportStruct()
-        log.z = recorder.address_ahead(ADAPTATION_STATE)
-        arrays = [np.ascontiguousarray(times), marks, *windows, self._torques, y]
-        call = library.advance if self._every is None else library.advance_sampled
-        call.restype = None
+        program, recorder, report = self._program, self._recorder, structs.Report()
+        steps, times, (disturbed, loaded) = self._of(block), np.ascontiguousarray(times), windows
+        steps.first, steps.count, steps.t, steps.marks = (
+            first,
+            len(marks),
+            times.ctypes.data,
+            marks.ctypes.data,
+        )
+        steps.disturbed, steps.loaded = disturbed.ctypes.data, loaded.ctypes.data
+        log = structs.Log(**{name: recorder.address_ahead(name) for name in LOGS})
         try:
-            call(
-                ctypes.byref(program.cell),
-                ctypes.byref(table),
-                *(array.ctypes.data_as(ctypes.c_void_p) for array in arrays),
-                *(ctypes.byref(struct) for struct in (log, program.work, report)),
-            )
+            program.call("advance", steps, y, log, report)
         finally:  # an interrupt that came meanwhile is raised before the call has returned
-            recorder.advance(times[:-1][marks & LOGGED > 0][: report.rows])
-            worst = self._worst
+            recorder.advance(times[:-1][marks & Mark.LOGGED > 0][: report.rows])
+            worst = program.work.step_error
             self._step_error.note(worst.largest, worst.speed, worst.at, worst.time)
         if report.status:
             found = Finding(CHECKS[report.status - 1], report.robot, report.value)
             raise stopped(program.loop, float(times[report.step]), y, recorder.last("v"), found)
 
 
-#: what happens at the start of a step, as in driver.c
-CHECKED, LOGGED, SAMPLED, JOINED = 1, 2, 4, 8
-
-
-def _marks(checked: np.ndarray, logged: np.ndarray, due: np.ndarray, joined: np.ndarray) -> np.ndarray:
-    """What happens at the start of each step, as one number; samples fall on multiples of dt."""
-    marks = CHECKED * checked + LOGGED * logged + SAMPLED * (checked & due) + JOINED * joined
+def _marks(checked: np.ndarray, logged: np.ndarray, sampled: np.ndarray, joined: np.ndarray) -> np.ndarray:
+    """What happens at the start of each step, as one number."""
+    marks = Mark.CHECKED * checked + Mark.LOGGED * logged + Mark.SAMPLED * sampled + Mark.JOINED * joined
     return marks.astype(np.int8)
 
 
-def _tables(cell: Cell, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Desired motion, (3, T, n, 3, m), and weights at the instants of three stages, (3, T).
+def _tables(cell: Cell, instants: np.ndarray) -> dict[str, np.ndarray]:
+    """Desired motion and weights at the instants of three stages, (3, T), one stage after another.
 
     Every motion is asked once and goes straight to its place: what a step costs does not grow with n.
     """
     flat = instants.ravel()
-    desired = np.empty((flat.size, cell.n, 3, cell.m))
+    desired = {name: np.empty((flat.size, cell.n, cell.m)) for name in DESIRED}
     for i in range(cell.n):
-        for k, part in enumerate(cell.motion(i, flat)):
-            desired[:, i, k] = part
-    parts = cell.weights(flat[:1] if cell.coupling.is_constant else flat)
-    return desired, np.stack(parts, axis=2)  # as one row of instants after the other
+        for name, part in zip(DESIRED, cell.motion(i, flat), strict=True):
+            desired[name][:, i] = part
+    weights = cell.weights(flat[:1] if cell.coupling.is_constant else flat)
+    return {**desired, "weights": one_after_another(weights)}

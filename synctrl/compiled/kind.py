@@ -81,6 +81,20 @@ class Kind:
         """Whether there are more joints than task coordinates."""
         return self.nv > self.m
 
+    @property
+    def sizes(self) -> dict[str, int]:
+        """What the lengths of its rows are made of, see `SIZES`."""
+        return {
+            "m": self.m,
+            "nv": self.nv,
+            "P": self.parameters,
+            "Z": self.learned,
+            "K": self.nv if self.k_r_space == "joint" else self.m,
+            "bodies": 10 * self.nv,
+            "tip": int(self.space != "joint"),
+            "spare": int(self.redundant),
+        }
+
     def key(self) -> list[Any]:
         """Plain data that is equal for robots of one kind."""
         shared = None if self.base_rotation is None else self.base_rotation.tolist()

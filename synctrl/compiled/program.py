@@ -5,7 +5,8 @@ from __future__ import annotations
 import ctypes
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,13 @@ from ..robots.mechanism import mechanism
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.plant import Plant
 from ..tasks.pose import MAX_ANGLE
+from . import structs
 from .build import cached_library, content_key, require_casadi
+from .header import header, largest
 from .kind import Classified, Kind, classify
 from .known import check_known, check_untouched
+from .quantities import DESIRED, checked, owned_by, shape
 from .specimen import Specimen
-from .structs import CellStruct, ReferenceStruct, WorkStruct
 from .trace import Trace
 
 #: relative difference between generated code and the reference engine above which the code is refused
@@ -35,14 +38,11 @@ def generate(kinds: list[Kind]) -> Iterator[str]:
     import casadi as ca
 
     for k, kind in enumerate(kinds):
-        trace = Trace(kind, f"kind{k}")
-        makers = [trace.control, trace.plant, trace.measure]  # those that take long to compile first
-        for make in makers if kind.learning is None else [*makers, trace.estimate]:
-            function = make()
+        for function in Trace(kind, f"kind{k}").functions():
             generator = ca.CodeGenerator(f"{function.name()}.c")
             generator.add(function)
             yield _unchecked(generator.dump())
-    yield _table(kinds) + (Path(__file__).parent / "driver.c").read_text(encoding="utf-8")
+    yield header(kinds) + (Path(__file__).parent / "driver.c").read_text(encoding="utf-8")
 
 
 def _unchecked(source: str) -> str:
@@ -51,63 +51,74 @@ def _unchecked(source: str) -> str:
     return re.sub(r"if \(res\[\d+\]!=0\) res", "res", source)
 
 
-def _table(kinds: list[Kind]) -> str:
-    """Declarations of the generated functions, and the array `kinds`."""
-    lines = [
-        "typedef int (*Function)(const double **, double **, long long *, double *, int);",
-        "typedef int (*Sizes)(long long *, long long *, long long *, long long *);",
-        "typedef struct { Function measure, control, plant, estimate; Sizes sizes[4];",
-        "                 int nv, cartesian, pose; } Kind;",
-    ]
-    rows = []
-    for k, kind in enumerate(kinds):
-        functions = ["measure", "control", "plant", *([] if kind.learning is None else ["estimate"])]
-        names = [f"kind{k}_{function}" for function in functions]
-        for name in names:
-            lines.append(f"int {name}(const double **, double **, long long *, double *, int);")
-            lines.append(f"int {name}_work(long long *, long long *, long long *, long long *);")
-        works = ", ".join(f"{name}_work" for name in names)
-        none = ", 0" if kind.learning is None else ""  # an adaptation whose state is theta_hat itself
-        flags = f"{kind.nv}, {int(kind.space != 'joint')}, {int(kind.space == 'pose')}"
-        rows.append(f"    {{{', '.join(names)}{none}, {{{works}{none}}}, {flags}}},")
-    return "\n".join(
-        [*lines, "static const Kind kinds[] = {", *rows, "};", f"enum {{ KINDS = {len(kinds)} }};\n"]
-    )
-
-
 class CompiledLoop:
     """A closed loop as a loaded library with its arrays.
 
     Args:
         loop: controller and plant of a cell of known parts.
-        index: which kind each robot is.
-        bases: placement of the first joint of each robot.
+        classified: what kinds of robots there are, and which one each robot of the cell is.
         library: made for these kinds.
 
     Attributes:
+        sizes: lengths of rows, see `SIZES`, and the numbers of robots and pairs, n and p.
+        cell, quantities, work: what the driver is given; see `structs.py`.
+        carried: true inertial parameters with every load, (loads, n, bodies).
         scratch: sizes of the scratch arrays arg, res, iw and w that the generated functions ask for.
+
+    Raises:
+        CompilationError: an array of another shape than generated code reads.
     """
 
-    def __init__(self, loop: ClosedLoop, index: list[int], bases: list[Any], library: ctypes.CDLL):
+    def __init__(self, loop: ClosedLoop, classified: Classified, library: ctypes.CDLL):
         self.loop, self.library = loop, library
+        cell = loop.cell
+        self.sizes = {**largest(classified.kinds), "n": cell.n, "p": cell.coupling.pairs}
         self._keep: list[np.ndarray] = []
-        self.cell = self._cell(index, bases)
+        self.cell = self._cell(classified.kind_of)
+        self.quantities = structs.Quantities()
+        arrays = {name: np.zeros(shape(name, self.sizes)) for name in owned_by("work")}
+        for name, array in {**arrays, **_constants(loop, classified.bases)}.items():
+            setattr(self.quantities, name, self.address(checked(name, array, self.sizes)))
         self.scratch = _work_sizes(library)
-        self.work = self._work(library)
+        self.work = self._work()
+        self.carried = _carried(loop.plant, self.sizes["bodies"])
 
     def state_dot(self, reference: Reference, y: np.ndarray, disturbance: np.ndarray) -> np.ndarray:
         """y' at one instant, for comparison with `ClosedLoop.evaluate`."""
-        y_dot = np.zeros(self.loop.size)
-        desired = np.ascontiguousarray(reference.desired.swapaxes(0, 1))
-        weights = np.ascontiguousarray(np.stack(reference.weights, axis=1))
-        table = ReferenceStruct(desired.ctypes.data, weights.ctypes.data, 1, 1)
-        pointers = (np.ascontiguousarray(part).ctypes for part in (y, disturbance))
-        y_data, disturbance_data = (pointer.data_as(ctypes.c_void_p) for pointer in pointers)
-        self.library.state_dot(
-            ctypes.byref(self.cell), ctypes.byref(table), y_data, disturbance_data,
-            y_dot.ctypes.data_as(ctypes.c_void_p), ctypes.byref(self.work),
-        )  # fmt: skip
+        y, y_dot, first = np.ascontiguousarray(y), np.zeros(self.loop.size), np.zeros(1, dtype=np.intc)
+        desired = dict(zip(DESIRED, reference.desired, strict=True))
+        weights = one_after_another(reference.weights)
+        steps = structs.Steps(disturbed=first.ctypes.data, loaded=first.ctypes.data)
+        self.tell(steps, {**desired, "weights": weights, "disturbance": disturbance, "pi": self.carried})
+        self.call("state_dot", steps, y, y_dot)
         return y_dot
+
+    def tell(self, steps: structs.Steps, arrays: Mapping[str, np.ndarray]) -> None:
+        """Say what is desired and acts in steps, instead of what was said before.
+
+        Args:
+            steps: they keep the arrays.
+            arrays: of quantities that change from step to step, by name; one, or several one after another.
+
+        Raises:
+            CompilationError: an array of another shape than generated code reads.
+        """
+        for name, array in arrays.items():
+            kept = checked(name, array, self.sizes)
+            size = prod(shape(name, self.sizes))
+            setattr(steps, name, structs.Table(kept.ctypes.data, size if kept.size > size else 0))
+            steps.kept[name] = kept
+
+    def call(self, function: str, steps: structs.Steps, y: np.ndarray, *others: Any) -> None:
+        """Call a function of the driver with its structures, a state, and further arrays or structures."""
+        given = [ctypes.byref(part) for part in (self.cell, self.quantities, self.work, steps)]
+        rest = [
+            part.ctypes.data_as(ctypes.c_void_p) if isinstance(part, np.ndarray) else ctypes.byref(part)
+            for part in (y, *others)
+        ]
+        called = getattr(self.library, function)
+        called.restype = None
+        called(*given, *rest)
 
     def address(self, array: np.ndarray) -> int:
         """Address of an array that lives as long as the loop."""
@@ -116,41 +127,33 @@ class CompiledLoop:
 
     # -- internals ----------------------------------------------------------------------------------------
 
-    def _cell(self, index: list[int], bases: list[Any]) -> CellStruct:
-        controller, cell, plant = self.loop.controller, self.loop.cell, self.loop.plant
+    def _cell(self, kind_of: list[int]) -> structs.Cell:
+        cell, plant = self.loop.cell, self.loop.plant
         coupling = cell.coupling
-        bodies = 10 * max(robot.body_count for robot in cell.robots)
-        base = np.array([np.append(b.rotation.ravel(), b.translation) for b in bases])
         first, incident, incident_sign = coupling.incidence
-        W_inv, posture, gain = _posture(controller)
-        arrays = (
-            np.array(index, dtype=np.intc), coupling.edges.astype(np.intc), coupling.signs.copy(),
-            first.astype(np.intc), incident.astype(np.intc), incident_sign.copy(),
-            controller.Lambda, controller.beta, controller.K_eps, controller.K_r, gamma_of(controller),
-            W_inv, posture, gain, base, _carried(plant, bodies), plant.viscous, plant.coulomb,
-            plant.smoothing[:, 0], plant.torque_limits,
-        )  # fmt: skip
-        learned = controller.adaptation.start().shape[1]
-        sizes = (cell.n, cell.m, cell.nv, cell.theta.shape[1], learned, coupling.pairs, bodies)
-        limit = float(getattr(cell.space, "max_condition", np.inf))
-        addresses = [self.address(np.ascontiguousarray(array)) for array in arrays]
-        columns = controller.K_r.shape[1], coupling.edges.shape[1]
-        rubs = int(plant.viscous.any() or plant.coulomb.any())
-        flags = rubs, int(plant.saturate)
-        return CellStruct(*sizes, *addresses, *flags, *columns, limit, MAX_ANGLE)
+        lists = {"kind": kind_of, "edge": coupling.edges, "first": first, "incident": incident}
+        found = {name: self.address(np.array(part, dtype=np.intc)) for name, part in lists.items()}
+        signs = {"sign": coupling.signs, "incident_sign": incident_sign}
+        found |= {name: self.address(np.array(part, dtype=float)) for name, part in signs.items()}
+        return structs.Cell(
+            n=cell.n,
+            p=coupling.pairs,
+            arity=coupling.edges.shape[1],
+            rubs=int(plant.viscous.any() or plant.coulomb.any()),
+            saturates=int(plant.saturate),
+            max_condition=float(getattr(cell.space, "max_condition", np.inf)),
+            max_angle=MAX_ANGLE,
+            **found,
+        )
 
-    def _work(self, library: ctypes.CDLL) -> WorkStruct:
-        cell, size = self.loop.cell, self.loop.size
-        n, m, nv, p = cell.n, cell.m, cell.nv, cell.coupling.pairs
-        arg, res, iw, w = _work_sizes(library)
-        scratch = [max(w, m * m), iw, arg, res]
-        lengths = [*scratch, n * 7 * m, n * 2 * nv, n * (3 * m * nv + m * m), p * 2 * m, n * 3 * m]
-        lengths += [n * nv, n * nv, n * m, n * nv]
-        buffers = [self.address(np.zeros(length + 1)) for length in lengths]
-        k = (ctypes.c_void_p * 4)(*(self.address(np.zeros(size)) for _ in range(4)))
-        rest = [self.address(np.zeros(length)) for length in (size, n, size, n * nv)]
-        carried = None  # what is carried in a step is told before it
-        return WorkStruct(*buffers, carried, k, *rest)
+    def _work(self) -> structs.Work:
+        arg, res, iw, w = self.scratch
+        size, n, m = self.loop.size, self.sizes["n"], self.sizes["m"]
+        lengths = {"arg": arg, "res": res, "iw": iw, "w": max(w, m * m), "stage": size, "held": size}
+        lengths["orientation"] = n
+        found = {name: self.address(np.zeros(length + 1)) for name, length in lengths.items()}
+        rates = (structs.Doubles * 4)(*(self.address(np.zeros(size)) for _ in range(4)))
+        return structs.Work(k=rates, **found)
 
 
 class Program(CompiledLoop):
@@ -174,7 +177,7 @@ class Program(CompiledLoop):
         classified = classify(loop.controller)
         self.kinds = len(classified.kinds)
         library = _library(loop, classified, {} if libraries is None else libraries)
-        super().__init__(loop, classified.kind_of, classified.bases, library)
+        super().__init__(loop, classified, library)
 
 
 def _library(loop: ClosedLoop, classified: Classified, libraries: dict[str, ctypes.CDLL]) -> ctypes.CDLL:
@@ -200,7 +203,7 @@ def _compare(library: ctypes.CDLL, loop: ClosedLoop, classified: Classified) -> 
     specimen = Specimen(loop, classified)
     small = specimen.loop
     bases = [mechanism(robot)[1] for robot in small.cell.robots]
-    found = CompiledLoop(small, specimen.index, bases, library)
+    found = CompiledLoop(small, Classified(classified.kinds, specimen.index, bases), library)
     for case in specimen.cases():
         expected = small.evaluate(*case)[0]
         _agree(small.split(expected), small.split(found.state_dot(*case)))
@@ -222,6 +225,31 @@ def gamma_of(controller: Controller) -> np.ndarray:
     if isinstance(adaptation, BoundGradient):
         return adaptation.Gamma
     return np.zeros(controller.cell.theta.shape)
+
+
+def one_after_another(weights: Sequence[np.ndarray]) -> np.ndarray:
+    """c, c', c'' and c^-1, (..., n, m, m) each, as rows of numbers, (..., n, 4 m m)."""
+    together = np.stack(weights, axis=-3)
+    return together.reshape(*together.shape[:-3], -1)
+
+
+def _constants(loop: ClosedLoop, bases: list[Any]) -> dict[str, np.ndarray]:
+    """Arrays of the quantities that do not change in a run, by name."""
+    controller, plant = loop.controller, loop.plant
+    found = {name: np.atleast_2d(getattr(controller, name)) for name in ("Lambda", "beta", "K_eps", "K_r")}
+    W_inv, posture, gain = _posture(controller)
+    return {
+        **found,
+        "Gamma": gamma_of(controller),
+        "base": np.array([np.append(base.rotation.ravel(), base.translation) for base in bases]),
+        "W_inv": W_inv,
+        "posture": posture,
+        "gain": gain,
+        "viscous": plant.viscous,
+        "coulomb": plant.coulomb,
+        "smoothing": plant.smoothing,
+        "limits": plant.torque_limits,
+    }
 
 
 def _carried(plant: Plant, bodies: int) -> np.ndarray:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance
 from ..coupling.cell import Cell, Reference
+from ..renamed import argument, names_elsewhere, tell
 from ..robots.regressors import RegressorBlocks, regressors
 from ..tasks.spaces import Measurement
 from . import law, laws
@@ -48,6 +49,12 @@ class Signals:
     def Y(self) -> np.ndarray:  # noqa: N802
         """The regressors, (n, nv, P)."""
         return self.regressor.matrices()
+
+    @property
+    def theta_hat_dot(self) -> np.ndarray:
+        """z', which is theta_hat' with the paper's adaptation; deprecated, see `z_dot`."""
+        tell("Signals.theta_hat_dot", "Signals.z_dot")
+        return self.z_dot
 
     memory_dot = property(lambda self: self.command.memory_dot)
     e = property(lambda self: self.task.error[0])
@@ -106,10 +113,10 @@ class Controller:
         joints = [robot.nv if self.k_r_space == "joint" else m for robot in cell.robots]
         self.K_r = spread_rows("K_r", gains.K_r, joints)
         learning = chosen(gains.Gamma, adaptation)
-        self.adaptation, self.adaptation_settings = learning.bind(cell), _settings(learning)
-        self.law, self.law_settings = options.law.bind(cell, gains), _settings(options.law)
+        self.adaptation, self.adaptation_settings = learning.bind(cell), settings_of(learning)
+        self.law, self.law_settings = options.law.bind(cell, gains), settings_of(options.law)
         connection = connected(network)
-        self.network, self.network_settings = connection.bind(cell), _settings(connection)
+        self.network, self.network_settings = connection.bind(cell), settings_of(connection)
         self._damping = self._joint_damping if self.k_r_space == "joint" else self._task_damping
         self._command = self._commander()
 
@@ -124,12 +131,26 @@ class Controller:
             composed.check(cell.n, cell.coupling.pairs, cell.m)
         return composed
 
+    @property
+    def Gamma(self) -> np.ndarray:  # noqa: N802
+        """Gamma of the paper's adaptation, (n, P); deprecated, see `adaptation`."""
+        tell("Controller.Gamma", "Controller.adaptation.Gamma")
+        return self.adaptation.Gamma  # type: ignore[attr-defined]
+
     @cached_property
     def _regressor(self) -> Callable[..., RegressorBlocks]:
         """q, v, v_ref and a_ref, (n, nv), -> the regressors."""
         return regressors(self.cell.parameters, [robot.nv for robot in self.cell.robots])
 
-    def evaluate(self, reference: Reference, motion: ArrayLike, z: ArrayLike, integral: ArrayLike) -> Signals:
+    def evaluate(
+        self,
+        reference: Reference,
+        motion: ArrayLike,
+        z: ArrayLike | None = None,
+        integral: ArrayLike | None = None,
+        *,
+        theta_hat: ArrayLike | None = None,
+    ) -> Signals:
         """The law at one instant.
 
         Args:
@@ -138,17 +159,20 @@ class Controller:
             z: state of the adaptation, (n, Z).
             integral: integrals of the synchronization errors, (p, m); with another network than `Ideal`
                 its memory.
+            theta_hat: deprecated name of z.
 
         Raises:
             InputError: another size, or numbers that are not finite.
         """
         cell = self.cell
         check_reference(reference, cell.n, cell.m)
+        state: Any = argument("Controller.evaluate", "theta_hat", theta_hat, "z", z)
+        memory: Any = integral
         return self.signals(
             reference,
             finite_array("motion", motion, (2, cell.n, cell.nv)),
-            finite_array("z", z, self.adaptation.start().shape),
-            finite_array("integral", integral, np.shape(self.network.start())),
+            finite_array("z", state, self.adaptation.start().shape),
+            finite_array("integral", memory, np.shape(self.network.start())),
         )
 
     @property
@@ -186,7 +210,7 @@ class Controller:
         return self.cell.task.to_torque(task, self.K_r * law.times(reference.c_inv, r))
 
 
-def _settings(part: Adaptation | Law | Network) -> dict[str, Any]:
+def settings_of(part: Adaptation | Law | Network) -> dict[str, Any]:
     """Name and settings of a part, by default the name of its type."""
     return {"name": type(part).__name__, **part.as_dict()}
 
@@ -201,3 +225,6 @@ def check_reference(reference: Reference, n: int, m: int) -> None:
     finite_array("reference: xd, xd' and xd''", reference.desired, (3, n, m))
     for name, weight in zip(("c", "c'", "c''", "c^-1"), reference.weights, strict=True):
         finite_array(f"reference: {name}", weight, (n, m, m))
+
+
+__getattr__ = names_elsewhere(__name__, ".laws.sun_mills", "REFERENCE_ACCELERATIONS")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array, finite_number
+from ..tasks.padding import padded
 
 
 class Rows:
@@ -53,10 +54,7 @@ class Rows:
 
     def padded(self) -> np.ndarray:
         """One array, (n, longest), with zeros where a row ends before."""
-        array = np.zeros((len(self.rows), max(self.lengths)))
-        for target, row in zip(array, self.rows, strict=True):
-            target[: row.size] = row
-        return array
+        return padded(self.rows)
 
     def __len__(self) -> int:
         return len(self.rows)

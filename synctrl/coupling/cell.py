@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..robots.friction import Friction
 from ..robots.parameters import Parameters
 from ..robots.robot import Robot
+from ..tasks.padding import padded
 from ..tasks.spaces import JointSpace, Space
 from ..tasks.trajectories import Motion, Trajectory
 from .coupling import Coupling
@@ -31,7 +32,8 @@ class Member:
     Args:
         robot: the robot, placed in the world.
         trajectory: its desired motion in the cell's space.
-        q0: joint positions at t = 0, (nv,), rad. In joint space, by default, on the path.
+        q0: joint positions at t = 0, (nv,), rad; by default on the path, in a space that says where that is,
+            as joint space does.
         v0: joint velocities at t = 0, (nv,), rad/s; by default at rest.
         parameters: what is adapted, or its name: "full", all inertial parameters, by default; "base", the
             fewest that give the same torques. Their true values have to be those of this robot, as it is
@@ -191,7 +193,7 @@ class Cell:
             member_parameters(name, member.robot, member.friction, member.parameters)
             for name, member in zip(self.names, self.members, strict=True)
         )
-        self.theta = _pad([p.theta for p in self.parameters])
+        self.theta = padded([p.theta for p in self.parameters])
 
     def _set_initial_state(self) -> None:
         q0, v0, theta_hat0 = [], [], []
@@ -202,13 +204,13 @@ class Cell:
             size = len(parameters.theta)
             guess = np.zeros(size) if member.theta_hat0 is None else member.theta_hat0
             theta_hat0.append(finite_array(f"{name}, theta_hat0", guess, (size,)))
-        self.q0, self.v0, self.theta_hat0 = _pad(q0), _pad(v0), _pad(theta_hat0)
+        self.q0, self.v0, self.theta_hat0 = padded(q0), padded(v0), padded(theta_hat0)
 
     def _start(self, name: str, member: Member) -> ArrayLike:
         if member.q0 is not None:
             return member.q0
-        if isinstance(self.space, JointSpace):
-            return member.trajectory(0.0).x
+        if hasattr(self.space, "start"):
+            return self.space.start(member.robot, member.trajectory(0.0).x)
         raise InputError(f"{name}, q0: expected joint positions to start from, found none")
 
     def _check_members(self) -> None:
@@ -222,11 +224,3 @@ class Cell:
 
     def __repr__(self) -> str:
         return f"Cell('{self.name}', {self.n} robots, {self.space!r}, {self.coupling!r})"
-
-
-def _pad(rows: Sequence[np.ndarray]) -> np.ndarray:
-    """Rows of different lengths as one array, filled up with zeros."""
-    padded = np.zeros((len(rows), max(len(row) for row in rows)))
-    for target, row in zip(padded, rows, strict=True):
-        target[: len(row)] = row
-    return padded

@@ -6,15 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import NonFiniteError
-from ..tasks.asked import asked, finite_weights
-from ..tasks.trajectories import Motion, Trajectory
+from ..tasks.asked import asked, finite_weights, not_finite
+from ..tasks.trajectories import MOTION_PARTS, Motion, Trajectory
 
 if TYPE_CHECKING:
     from .coupling import Coupling
     from .weights import Weights
-
-PARTS = ("position", "velocity", "acceleration")
 
 
 def desired_motion(name: str, robot: int, trajectory: Trajectory, times: np.ndarray) -> Motion:
@@ -37,16 +34,11 @@ def desired_motion(name: str, robot: int, trajectory: Trajectory, times: np.ndar
         return Motion(x, x_dot, x_ddot)
 
     motion = asked(call, times, f"the desired motion of {name}", robot)
-    for part, value in zip(PARTS, motion, strict=True):
+    for part, value in zip(MOTION_PARTS, motion, strict=True):
         if not np.isfinite(value).all():
             k = int(np.argwhere(~np.isfinite(value))[0][0])
-            raise NonFiniteError(
-                f"the desired motion of {name} is not finite at t = {times[k]:g} s: its {part} is "
-                f"{np.asarray(value)[k].tolist()}; expected finite numbers at all times of the run",
-                time=float(times[k]),
-                robot=robot,
-                cause="motion",
-            )
+            found = f"its {part} is {np.asarray(value)[k].tolist()}"
+            raise not_finite(f"the desired motion of {name}", found, float(times[k]), robot, "motion")
     return motion
 
 

@@ -11,10 +11,8 @@ from ..checks import finite_array
 from ..errors import InputError, SimulationError, TrajectoryError
 from ..tasks.derivatives import Displacement, Misfit, difference, find_misfit, look_at
 from ..tasks.spaces import units_of
-from ..tasks.trajectories import Motion
+from ..tasks.trajectories import MOTION_PARTS, Motion
 from .cell import Cell
-
-PARTS = ("position", "velocity", "acceleration")
 
 
 def check_motions(cell: Cell, times: np.ndarray) -> None:
@@ -65,7 +63,7 @@ def _groups(units: tuple[str, ...]) -> list[slice]:
 def _motion(cell: Cell, robot: int, times: np.ndarray) -> Motion:
     """The motion at some times, known to be numbers."""
     try:
-        parts = zip(PARTS, cell.motion(robot, times), strict=True)
+        parts = zip(MOTION_PARTS, cell.motion(robot, times), strict=True)
         return Motion(*(finite_array(part, value, (len(times), cell.m)) for part, value in parts))
     except InputError as error:
         name, end = cell.names[robot], times.max()
@@ -76,7 +74,7 @@ def _error(cell: Cell, name: str, order: int, misfit: Misfit) -> TrajectoryError
     label = cell.labels[misfit.coordinate]
     unit = units_of(cell.space, cell.m)[misfit.coordinate]
     per = ("/s", "/s^2")[order]
-    function, derivative = PARTS[order : order + 2]
+    function, derivative = MOTION_PARTS[order : order + 2]
     return TrajectoryError(
         f"{name}, trajectory: its {derivative} along {label} does not fit its {function}: near "
         f"t = {misfit.time:.6g} s found {misfit.found:.6g} {unit}{per}, but the {function} changes by "

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, positive_number
 from ..errors import CouplingError, InputError
+from ..renamed import names_elsewhere
 from ..tasks.chebyshev import ACCURACY, NotSmoothError, SmoothFunction, certify
 
 #: A condition number above this counts as "no inverse".
@@ -235,3 +236,6 @@ def _singular(c: np.ndarray, times: np.ndarray) -> CouplingError:
         f"the weight c of the robot at index {i} has no inverse at t = {times[k]:g} s "
         f"(condition number {condition[k, i]:.2g}): {c[k, i].tolist()}"
     )
+
+
+__getattr__ = names_elsewhere(__name__, ".weight_checks", "check_weights")

@@ -24,7 +24,7 @@ def a460_full_pair(wrist: Pid = WRIST, **options: Any) -> Experiment:
 
     Args:
         wrist: the controllers of joints 4 to 6.
-        options: of `a460_pair`.
+        options: of `a460_pair`, its `adaptation`, `law` and `network` too.
     """
     known = a460_pair(**options)
     robot = load_robot("a460_full")

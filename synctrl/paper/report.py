@@ -16,6 +16,7 @@ from typing import Protocol
 
 from ..errors import InputError, ResultError
 from ..files import write_whole
+from ..show.panels import ten_to
 from ..show.style import display
 from .claims import Claim, Quantity
 from .formulas import formula_svg
@@ -185,7 +186,7 @@ def number(value: float, digits: int = 3) -> str:
     if "e" not in text:
         return text
     mantissa, exponent = text.split("e")
-    return f"{mantissa}·10{str(int(exponent)).translate(_SUPERSCRIPT)}"
+    return f"{mantissa}·{ten_to(int(exponent))}"
 
 
 def words(text: str) -> str:
@@ -193,7 +194,6 @@ def words(text: str) -> str:
     return _INDEXED.sub(r"\1<sub>\2</sub>", escape(text))
 
 
-_SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 #: one letter, perhaps starred or hatted, and an index of up to three characters
 _INDEXED = re.compile(r"(?<![\w&#])([^\W\d_][*\u0302\u0303]?)_(\w{1,3})(?!\w)")
 

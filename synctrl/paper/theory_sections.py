@@ -27,8 +27,7 @@ def certificate_section(certificates: Mapping[str, Certificate], folder: Path) -
         certificates: by name of the run; the name is also that of its figure's file.
         folder: where `draw_certificate` has drawn each.
     """
-    pictures = [_picture(name, c, folder) for name, c in certificates.items()]
-    rows = [Row(tuple(pictures[k : k + 2])) for k in range(0, len(pictures), 2)]
+    pictures = tuple(_picture(name, c, folder) for name, c in certificates.items())
     texts = tuple(f"{_words(name)}\n{c}" for name, c in certificates.items())
     return Section(
         "The proof, watched",
@@ -36,7 +35,7 @@ def certificate_section(certificates: Mapping[str, Certificate], folder: Path) -
             Text((_INTRODUCTION,)),
             Text((PROOF,), "formula"),
             _verdicts(certificates),
-            *rows,
+            Row(pictures),
             Text(texts, "formula"),
         ),
     )

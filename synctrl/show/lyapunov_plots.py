@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from ..analysis.lyapunov import Growth, Lyapunov
+from ..renamed import names_elsewhere
 from .panels import GAP, LEGEND, power_of_ten, stacked_panels
 from .plots import style
 from .style import ACCENT, DESIRED, PALETTE
@@ -88,3 +89,6 @@ def _visible(terms: Mapping[str, np.ndarray], names: tuple[str, ...]) -> Terms:
     sizes = {name: float(np.abs(terms[name]).max()) for name in names}
     floor = VISIBLE * max(sizes.values())
     return [(name, PALETTE[k % len(PALETTE)]) for k, name in enumerate(names) if sizes[name] > floor]
+
+
+__getattr__ = names_elsewhere(__name__, "..analysis.lyapunov", "ENERGIES", "POWERS", "THEOREM")

@@ -56,7 +56,12 @@ def power_of_ten(value: float, _: object = None) -> str:
     mantissa, exponent = f"{abs(value):.6e}".split("e")
     if float(mantissa) != 1:
         return f"{value:g}"
-    return f"{'−' if value < 0 else ''}10{str(int(exponent)).translate(_SUPERSCRIPT)}"
+    return f"{'−' if value < 0 else ''}{ten_to(int(exponent))}"
+
+
+def ten_to(exponent: int) -> str:
+    """A power of ten in plain text: 10⁻³."""
+    return f"10{str(exponent).translate(_SUPERSCRIPT)}"
 
 
 def _place_labels(panel: Axes, height: float) -> None:

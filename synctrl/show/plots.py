@@ -18,6 +18,7 @@ from ..analysis.metrics import ERRORS
 from ..checks import choice, finite_array
 from ..errors import InputError, ResultError
 from ..files import whole_file
+from ..renamed import names_elsewhere
 from ..simulation.result import Result
 from .legends import axis_handles, legend, line_widths, plain, row_color, row_handles
 from .panels import DPI, GAP, LEGEND, TITLE, WIDTH, stacked_panels
@@ -250,3 +251,6 @@ def _needed(result: Result, kind: str) -> tuple[float, float]:
     low, high = min(float(e.min()), 0.0), max(float(e.max()), 0.0)
     room = 0.06 * (high - low) or 1.0
     return low - room, high + room
+
+
+__getattr__ = names_elsewhere(__name__, ".legends", "WIDE", "NARROW")

@@ -15,6 +15,7 @@ from ..control.laws import Law
 from ..control.network import Network
 from ..coupling.cell import Cell
 from ..errors import InputError
+from ..renamed import names_elsewhere
 from .clock import make_clock
 from .closed_loop import ClosedLoop
 from .disturbances import Disturbance, DisturbanceSchedule
@@ -282,3 +283,6 @@ def _describe(disturbance: Disturbance) -> dict[str, Any]:
         "start": float(disturbance.start),
         "stop": float(disturbance.stop),
     }
+
+
+__getattr__ = names_elsewhere(__name__, ".run", "run_reference")

@@ -3,6 +3,7 @@
 from .distributions import Choice, Grid, LogUniform, Normal, Uniform
 from .factors import (
     Factor,
+    adaptation,
     control_period,
     disturbance_scale,
     disturbance_start,
@@ -11,7 +12,9 @@ from .factors import (
     initial_estimates,
     initial_positions,
     initial_velocities,
+    law,
     model_error,
+    network,
     true_parameters,
     weights,
 )
@@ -26,6 +29,7 @@ __all__ = [
     "Normal",
     "Sweep",
     "Uniform",
+    "adaptation",
     "control_period",
     "disturbance_scale",
     "disturbance_start",
@@ -34,8 +38,10 @@ __all__ = [
     "initial_estimates",
     "initial_positions",
     "initial_velocities",
+    "law",
     "load",
     "model_error",
+    "network",
     "trajectories",
     "true_parameters",
     "weights",

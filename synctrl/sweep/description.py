@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from ..analysis.metrics import ERRORS
@@ -13,9 +14,15 @@ from ..errors import InputError, ResultError
 from ..files import read_regular
 from .distributions import Values, described
 from .draws import Draws, Generations
+from .measures import MEASURES, TRUST
 from .rows import Format, columns
 
-FORMAT = "synctrl sweep 1"
+#: what is written
+FORMAT = "synctrl sweep 2"
+#: what is read: the measures of each format
+FORMATS: Mapping[str, Sequence[str]] = MappingProxyType(
+    {"synctrl sweep 1": [name for name in MEASURES if name not in TRUST], FORMAT: MEASURES}
+)
 ABOUT = "sweep.json"
 
 
@@ -32,7 +39,7 @@ def read_about(folder: str | Path) -> dict[str, Any]:
         raise ResultError(f"no sweep in '{folder}': it has no {ABOUT}") from None
     except (OSError, ValueError, RecursionError) as error:
         raise ResultError(f"'{path}' cannot be read: {error}") from error
-    if not isinstance(about, dict) or about.get("format") != FORMAT:
+    if not isinstance(about, dict) or about.get("format") not in list(FORMATS):
         found = about.get("format") if isinstance(about, dict) else type(about).__name__
         raise ResultError(f"'{path}': expected the format '{FORMAT}', found {found!r}")
     try:
@@ -50,18 +57,19 @@ def row_format(about: Mapping[str, Any]) -> Format:
         InputError: a part that is missing or wrong, or parts that contradict each other.
     """
     factors = _described_factors(about.get("factors"))
-    expected = columns(factors)
+    measures = FORMATS[about["format"]]
+    expected = columns(factors, measures)
     if about.get("columns") != expected:
         raise InputError(f"columns: expected {expected}, found {about.get('columns')!r}")
     duration = positive_number("duration", about.get("duration"))
     if "search" in about:
         instance("search", about["search"], Mapping, "a description of the search")
         population = count("population", about["search"].get("population"))
-        return Format(expected, Generations(factors, population), duration)
+        return Format(expected, Generations(factors, population), duration, measures)
     draws = Draws(factors, count("samples", about.get("samples")), count("seed", about.get("seed"), least=0))
     if about.get("runs") != draws.count:
         raise InputError(f"runs: expected {draws.count}, as the factors say, found {about.get('runs')!r}")
-    return Format(expected, draws, duration)
+    return Format(expected, draws, duration, measures)
 
 
 def checked_bands(bands: Any) -> dict[str, float]:

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from reprlib import Repr
 from types import MappingProxyType
 from typing import Any, Protocol
 
 import numpy as np
 
 from ..checks import finite_number, positive_number
+from ..control.controller import settings_of
 from ..errors import InputError
 
 Value = float | str
-#: how many listed values are shown one by one
-SHOWN = 8
+#: how many listed values are shown one by one, and of how many letters each
+SHOWN, LETTERS = 8, 40
+_SHORT = Repr()
+_SHORT.maxstring = LETTERS
 
 
 class Values(Protocol):
@@ -117,31 +122,38 @@ class Normal:
 
 
 class _Listed:
-    """Values that were listed: numbers or words."""
+    """Values that were listed: numbers, words, or parts of a controller, known by their labels.
 
-    def __init__(self, values: Sequence[Value]):
+    Attributes:
+        values: numbers and words, as tables have them.
+        meant: what was listed, by its entry in `values`.
+    """
+
+    def __init__(self, values: Sequence[Any]):
         kind = type(self).__name__
         if isinstance(values, str) or not len(values):
-            raise InputError(f"{kind}: expected a list of numbers or words, found {values!r}")
-        self.values = tuple(_plain(kind, value) for value in values)
+            raise InputError(f"{kind}: expected a list of numbers, words or parts, found {values!r}")
+        self.values = tuple(_plain(kind, part_label(value) if is_part(value) else value) for value in values)
         if len(set(self.values)) != len(self.values):
             raise InputError(f"{kind}: expected different values, found {list(self.values)}")
+        self.meant: Mapping[Value, Any] = dict(zip(self.values, values, strict=True))
 
     def describe(self) -> dict[str, Any]:
         return {"kind": type(self).__name__, "values": list(self.values)}
 
     def __repr__(self) -> str:
         kind, count = type(self).__name__, len(self.values)
+        shown = [_SHORT.repr(value) for value in self.values[: SHOWN + 1]]
         if count <= SHOWN:
-            return f"{kind}({list(self.values)})"
-        return f"{kind}({count} values from {self.values[0]!r} to {self.values[-1]!r})"
+            return f"{kind}([{', '.join(shown)}])"
+        return f"{kind}({count} values from {shown[0]} to {_SHORT.repr(self.values[-1])})"
 
 
 class Choice(_Listed):
     """One of some values, each as likely as every other.
 
     Args:
-        values: numbers or words.
+        values: numbers or words, or parts for `adaptation`, `law` and `network`.
 
     Raises:
         InputError: none, two equal ones, or something else.
@@ -155,7 +167,7 @@ class Grid(_Listed):
     """Every one of some values, together with every combination of the other factors' grids.
 
     Args:
-        values: numbers or words.
+        values: numbers or words, or parts for `adaptation`, `law` and `network`.
 
     Raises:
         InputError: none, two equal ones, or something else.
@@ -196,6 +208,27 @@ def drawn(name: str, values: Any, rng: np.random.Generator) -> Value:
     if type(plain) is int:
         return plain
     return _plain(f"factor '{name}', a value that {type(values).__name__} has drawn", plain)
+
+
+def is_part(value: object) -> bool:
+    """Whether this is an adaptation, a law or a network, and not its type."""
+    return hasattr(value, "as_dict") and hasattr(value, "bind") and not isinstance(value, type)
+
+
+def part_label(part: Any) -> str:
+    """Name and settings of a part in one line: `Natural(gamma=0.1, gamma_friction=0.0)`.
+
+    Raises:
+        InputError: its settings are no plain data.
+    """
+    settings = settings_of(part)
+    try:
+        text = {name: json.dumps(x, ensure_ascii=False, allow_nan=False) for name, x in settings.items()}
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"{type(part).__name__}: expected settings that are plain data from as_dict, found {settings!r}"
+        ) from error
+    return f"{settings['name']}({', '.join(f'{key}={text[key]}' for key in settings if key != 'name')})"
 
 
 def is_text(value: object) -> bool:

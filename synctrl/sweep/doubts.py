@@ -7,6 +7,7 @@ from typing import NamedTuple
 from ..errors import SaturationWarning, StepWarning, warn
 from ..simulation.result import Result
 from ..simulation.step_error import LIMIT
+from .measures import cut_off
 
 
 class Doubt(NamedTuple):
@@ -26,9 +27,8 @@ class Doubt(NamedTuple):
 def doubt_of(result: Result) -> Doubt:
     """What is to be doubted of a run, by its `info`."""
     step = result.info["step_error"] or {}
-    share = max((entry["share"] for entry in result.info["saturation"]), default=0.0)
     advised = step.get("advised_step")
-    return Doubt(None if advised is None else step["estimate"], advised, share)
+    return Doubt(None if advised is None else step["estimate"], advised, cut_off(result))
 
 
 class Doubts:

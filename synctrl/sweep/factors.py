@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from . import variations
-from .distributions import Grid, Value, Values
+from .distributions import Choice, Grid, Value, Values, is_part
 
 Change = Callable[[Experiment, Any], Experiment]
 GAINS = tuple(field.name for field in fields(Gains))
@@ -117,6 +117,21 @@ def gain_scale(name: str, values: Values) -> Factor:
     return Factor(f"{name}_scale", values, partial(variations.with_scaled_gain, gain=name))
 
 
+def adaptation(values: Grid | Choice) -> Factor:
+    """How the controller learns: listed adaptations, each of which takes the place of the gain Gamma."""
+    return _part("adaptation", values)
+
+
+def law(values: Grid | Choice) -> Factor:
+    """Listed laws."""
+    return _part("law", values)
+
+
+def network(values: Grid | Choice) -> Factor:
+    """Listed networks between the robots."""
+    return _part("network", values)
+
+
 def true_parameters(values: Values, robot: int | None = None, body: int | None = None) -> Factor:
     """Factor by which true masses and inertias are multiplied; the initial estimates stay what they are.
 
@@ -175,6 +190,19 @@ def weights(values: Values, robot: int | None = None) -> Factor:
 def control_period(values: Values) -> Factor:
     """Period of sampled control, multiples of the step, s."""
     return _PeriodFactor("control_period", values, _keep)
+
+
+def _part(name: str, values: Grid | Choice) -> Factor:
+    """A factor whose values are parts of the controller; the table has their labels.
+
+    Raises:
+        InputError: no list of parts.
+    """
+    instance(name, values, (Grid, Choice), f"a Grid or a Choice of kinds of {name}")
+    for value in values.meant.values():
+        if not is_part(value):
+            raise InputError(f"{name}: expected parts with bind and as_dict, found {value!r}")
+    return Factor(name, values, partial(variations.with_part, part=name, meant=values.meant))
 
 
 def _keep(experiment: Experiment, value: Value) -> Experiment:

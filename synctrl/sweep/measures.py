@@ -4,14 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..analysis.metrics import DEFINITIONS, ERRORS, SETTLING_FRACTION, ErrorMetrics, Metrics, metrics
+from ..analysis.metrics import (
+    DEFINITIONS,
+    ERRORS,
+    SETTLING_FRACTION,
+    ErrorMetrics,
+    Metrics,
+    finite_or_none,
+    metrics,
+)
 from ..analysis.metrics import squared as squared_unit
 from ..coupling.cell import Cell
 from ..simulation.result import Result
+from ..simulation.step_error import LIMIT
 
 
 class Measure(NamedTuple):
@@ -35,8 +44,21 @@ _OVER_ALL: Mapping[str, str] = MappingProxyType(
 _SHORT = {"tracking_error": "tracking", "sync_error": "sync"}
 _ROWS = {"tracking_error": "robots", "sync_error": "pairs"}
 
+#: what a run says of itself: how far its other measures can be trusted
+TRUST: Mapping[str, Measure] = MappingProxyType(
+    {
+        "saturation": Measure(
+            "share of the logged instants at which torque was cut off, the largest over all joints", "1"
+        ),
+        "step_error": Measure(
+            "error in velocity of the worst step, as a share of the largest velocity; above "
+            f"{LIMIT:g} the step is too long; empty if no step could be looked at",
+            "1",
+        ),
+    }
+)
 #: names of the measures, in the order of the table
-MEASURES = (*(f"{_SHORT[kind]}_{name}" for kind in ERRORS for name in _OVER_ALL), "peak_torque")
+MEASURES = (*(f"{_SHORT[kind]}_{name}" for kind in ERRORS for name in _OVER_ALL), "peak_torque", *TRUST)
 
 
 def definitions(cell: Cell) -> dict[str, Measure]:
@@ -49,7 +71,7 @@ def definitions(cell: Cell) -> dict[str, Measure]:
             text = f"{DEFINITIONS[name].split(';')[0]}; {how.format(rows=_ROWS[kind])}"
             found[f"{_SHORT[kind]}_{name}"] = Measure(text, special.get(name, unit))
     text = f"{DEFINITIONS['peak_torque']}; the largest over all robots and joints"
-    return {**found, "peak_torque": Measure(text, "N·m")}
+    return {**found, "peak_torque": Measure(text, "N·m"), **TRUST}
 
 
 def measures(result: Result, bands: Mapping[str, float]) -> list[float | None]:
@@ -61,8 +83,14 @@ def measures(result: Result, bands: Mapping[str, float]) -> list[float | None]:
     """
     with np.errstate(over="ignore", invalid="ignore"):
         computed: Metrics = metrics(result, bands)
-        values = [value for kind in ERRORS for value in _over_all(getattr(computed, kind))]
-    return [_finite(value) for value in (*values, computed.peak_torque.max())]
+        values: list[Any] = [value for kind in ERRORS for value in _over_all(getattr(computed, kind))]
+    values += [computed.peak_torque.max(), cut_off(result), (result.info["step_error"] or {}).get("estimate")]
+    return [finite_or_none(value) for value in values]
+
+
+def cut_off(result: Result) -> float:
+    """Share of the logged instants at which torque was cut off, of the joint where that was most."""
+    return max((entry["share"] for entry in result.info["saturation"]), default=0.0)
 
 
 def _over_all(error: ErrorMetrics) -> list[float]:
@@ -74,7 +102,3 @@ def _over_all(error: ErrorMetrics) -> list[float]:
         np.abs(error.final).max(),
         error.settling_time.max(),
     ]
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -15,16 +15,15 @@ from .measures import MEASURES
 Row = list[Any]
 
 COMPLETED, STOPPED, REFUSED = "completed", "stopped", "refused"
-#: where the last entries begin, counted from the end: how the run ended, and its measures
-_MEASURED = -len(MEASURES)
-_ENDING = _MEASURED - 3
+#: how the run ended
+ENDING = "status", "cause", "stop_time"
 #: how far a value may be off: less than two draws ever are, more than the last digits of other machines
 CLOSE = 1e-9
 
 
-def columns(factors: Iterable[str]) -> list[str]:
-    """Names of the entries of a row, for factors of these names."""
-    return ["run", *factors, "status", "cause", "stop_time", *MEASURES]
+def columns(factors: Iterable[str], measures: Sequence[str] = MEASURES) -> list[str]:
+    """Names of the entries of a row, for factors and measures of these names."""
+    return ["run", *factors, *ENDING, *measures]
 
 
 class Runs(Protocol):
@@ -41,11 +40,13 @@ class Format(NamedTuple):
         columns: names of a row's entries.
         runs: which runs there are.
         duration: of every run, s.
+        measures: names of the last entries.
     """
 
     columns: Sequence[str]
     runs: Runs
     duration: float
+    measures: Sequence[str] = MEASURES
 
     def read(self, path: Path, content: bytes) -> dict[int, Row]:
         """Rows of a file's complete lines by number of the run, in the order of the lines.
@@ -67,7 +68,9 @@ class Format(NamedTuple):
         """Why something is no row that can follow others; "" if it is one."""
         if not isinstance(row, list) or len(row) != len(self.columns):
             return f"expected a run's {len(self.columns)} values"
-        run, values, (status, cause, stop_time) = row[0], row[1:_ENDING], row[_ENDING:_MEASURED]
+        measured = len(row) - len(self.measures)
+        ended = measured - len(ENDING)
+        run, values, (status, cause, stop_time) = row[0], row[1:ended], row[ended:measured]
         if type(run) is not int or run < 0:
             return f"expected the number of a run, found {_short(run)}"
         if run in rows:
@@ -76,7 +79,7 @@ class Format(NamedTuple):
         return (
             self.runs.fault(run, values, rows)
             or _fault_of_ending(status, cause, stop_time, self.duration)
-            or _fault_of_measures(status, row[_MEASURED:])
+            or _fault_of_measures(status, self.measures, row[measured:])
         )
 
 
@@ -114,8 +117,8 @@ def _fault_of_ending(status: Any, cause: Any, stop_time: Any, duration: float) -
     return ""
 
 
-def _fault_of_measures(status: str, measured: Sequence[Any]) -> str:
-    for name, value in zip(MEASURES, measured, strict=True):
+def _fault_of_measures(status: str, names: Sequence[str], measured: Sequence[Any]) -> str:
+    for name, value in zip(names, measured, strict=True):
         if value is None:
             continue
         if status != COMPLETED:

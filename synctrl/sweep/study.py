@@ -35,7 +35,7 @@ class Study:
             experiment's run, which then has to run to its end.
 
     Raises:
-        InputError: a value of the wrong kind, no factor, or two factors of one name.
+        InputError: a value of the wrong kind, no factor, two factors of one name, or an adaptation and Gamma.
     """
 
     def __init__(
@@ -113,4 +113,10 @@ def _checked_factors(factors: Sequence[Factor]) -> tuple[Factor, ...]:
         raise InputError(f"factors: the name '{taken[0]}' is taken; give each column a name of its own")
     if not names:
         raise InputError("factors: expected at least one, found none")
+    varied = {"Gamma", "Gamma_scale"} & {*names}
+    if "adaptation" in names and varied:
+        raise InputError(
+            f"factors: an adaptation takes the place of the gain Gamma, so expected one of the two, found "
+            f"'adaptation' and '{min(varied)}'"
+        )
     return tuple(factors)

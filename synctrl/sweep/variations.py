@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -17,6 +17,7 @@ from ..robots.parameters import FullParameters, LinearParameters, Parameters
 from ..robots.robot import Robot
 from ..simulation.disturbances import Disturbance
 from ..simulation.simulate import Experiment
+from .distributions import Value
 
 
 def with_gain(experiment: Experiment, value: float, gain: str) -> Experiment:
@@ -25,8 +26,21 @@ def with_gain(experiment: Experiment, value: float, gain: str) -> Experiment:
 
 
 def with_scaled_gain(experiment: Experiment, value: float, gain: str) -> Experiment:
-    """All entries of a gain times a number."""
-    return with_gain(experiment, value * getattr(experiment.gains, gain), gain)
+    """All entries of a gain times a number.
+
+    Raises:
+        InputError: a Gamma that an adaptation has taken the place of.
+    """
+    entries = getattr(experiment.gains, gain)
+    if entries is None:
+        raise InputError(f"{gain}_scale: expected gains with {gain}, found none beside an adaptation")
+    return with_gain(experiment, value * entries, gain)
+
+
+def with_part(experiment: Experiment, value: Value, part: str, meant: Mapping[Value, Any]) -> Experiment:
+    """Another adaptation, law or network, by its label; an adaptation takes the place of the gain Gamma."""
+    gains = experiment.gains.replace(Gamma=None) if part == "adaptation" else experiment.gains
+    return replace(experiment, gains=gains, **{part: meant[value]})
 
 
 def with_scaled_bodies(

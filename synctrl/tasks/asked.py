@@ -50,14 +50,27 @@ def finite_weights(call: Callable[[np.ndarray], Parts], times: np.ndarray) -> Pa
     for name, value in zip(("c", "c'", "c''"), weights, strict=False):
         if not np.isfinite(value).all():
             k, i = (int(index) for index in np.argwhere(~np.isfinite(value))[0][:2])
-            raise NonFiniteError(
-                f"{name} of the robot at index {i} is not finite at t = {times[k]:g} s: "
-                f"{value[k, i].tolist()}; expected finite numbers at all times of the run",
-                time=float(times[k]),
-                robot=i,
-                cause="weights",
-            )
+            what, found = f"{name} of the robot at index {i}", str(value[k, i].tolist())
+            raise not_finite(what, found, float(times[k]), i, "weights")
     return weights
+
+
+def not_finite(what: str, found: str, time: float, robot: int, cause: str) -> NonFiniteError:
+    """The error about numbers of a function of the user's that are infinite or no numbers.
+
+    Args:
+        what: they belong to.
+        found: the numbers, in words.
+        time: s.
+        robot: index of the robot concerned.
+        cause: as in `NonFiniteError`.
+    """
+    return NonFiniteError(
+        f"{what} is not finite at t = {time:g} s: {found}; expected finite numbers at all times of the run",
+        time=time,
+        robot=robot,
+        cause=cause,
+    )
 
 
 def _first_failure(call: Callable[[np.ndarray], Any], times: np.ndarray) -> float:

@@ -22,6 +22,7 @@ from ..checks import finite_array, non_negative_number, positive_number
 from ..errors import InputError
 from ..robots.robot import Robot
 from .algebra import LAPACK, Algebra
+from .padding import padded
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +65,8 @@ class Redundancy:
             raise InputError(f"redundancy, weights: expected numbers above 0, found {min(map(min, weights))}")
         gain = 0.0 if self.posture is None else self.gain
         posture = _rows("posture", self.posture, robots, 0.0)
-        return _pad([1 / row for row in weights]), _pad(posture), _pad([np.full(r.nv, gain) for r in robots])
+        gains = [np.full(robot.nv, gain) for robot in robots]
+        return padded([1 / row for row in weights]), padded(posture), padded(gains)
 
 
 @dataclass(frozen=True)
@@ -263,10 +265,3 @@ def _rows(name: str, value: ArrayLike | None, robots: Sequence[Robot], default: 
         finite_array(f"redundancy, {name} of '{robot.name}'", row, (robot.nv,))
         for robot, row in zip(robots, rows, strict=True)
     ]
-
-
-def _pad(rows: Sequence[np.ndarray]) -> np.ndarray:
-    padded = np.zeros((len(rows), max(len(row) for row in rows)))
-    for target, row in zip(padded, rows, strict=True):
-        target[: len(row)] = row
-    return padded

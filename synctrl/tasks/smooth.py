@@ -16,9 +16,7 @@ from ..errors import InputError, TrajectoryError
 from . import rotations
 from .chebyshev import ACCURACY, Function, NotSmoothError, SmoothFunction, certify
 from .poses import Turning
-from .trajectories import Motion
-
-PARTS = ("position", "velocity", "acceleration")
+from .trajectories import MOTION_PARTS, Motion
 
 
 class SmoothTrajectory:
@@ -132,7 +130,7 @@ def _certified(function: Function, start: float, end: float) -> SmoothFunction:
         return certify(lambda s: function(min(start + s, end)), end - start)
     except NotSmoothError as error:
         raise TrajectoryError(
-            f"the {PARTS[error.order]} cannot be found with a relative error below {ACCURACY:g}: near "
+            f"the {MOTION_PARTS[error.order]} cannot be found with a relative error below {ACCURACY:g}: near "
             f"t = {start + error.time:g} s it is off by {ACCURACY * error.error:.2g}; expected a smooth "
             "function of time that is not noisy, with `breaks` where a derivative jumps"
         ) from None

@@ -90,6 +90,7 @@ class Space(Protocol):
     - `units`: unit of each of the m coordinates, where they differ.
     - `miss(robot, target, q) -> error, Jacobian`: by how much a robot at q misses a target, (m,), and J,
       (m, nv), with e' = -J v. With it a run begins only if joint positions exist for what is desired.
+    - `start(robot, x) -> q`: joint positions, (nv,), of a robot that begins at x, (m,), and has no `q0`.
     - `displacement(start, end)`: the way from one position to another, (..., m), if its velocities are no
       derivatives of its coordinates.
     """
@@ -133,6 +134,10 @@ class JointSpace:
                 "synchronize such robots in Cartesian space"
             )
         return BoundJointSpace()
+
+    def start(self, robot: Robot, x: np.ndarray) -> np.ndarray:
+        """Joint positions at x, which are x itself."""
+        return x
 
     def __repr__(self) -> str:
         return "JointSpace()"

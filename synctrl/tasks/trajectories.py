@@ -15,6 +15,9 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, finite_number, instance, positive_number
 from ..errors import InputError, TrajectoryError
 
+#: what a `Motion` has, in words
+MOTION_PARTS = ("position", "velocity", "acceleration")
+
 
 class Motion(NamedTuple):
     """Desired position, velocity and acceleration, each (m,), or (T, m) for T times."""

@@ -1,0 +1,194 @@
+"""What generated functions read and write, by name: the one table that everything about them follows from.
+
+The symbols of `trace.py`, the text that stands before `driver.c` (see `header.py`), the structures of
+`structs.py` and the arrays of `program.py` and `engine.py` are all made from the tables below. Every quantity
+is one array with a row per robot or pair; rows are as long as the largest robot needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import prod
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import CompilationError
+
+
+class Quantity(NamedTuple):
+    """An array.
+
+    Attributes:
+        owner: where it is: "state" and "rate" in y and y', "cell" for constants, "instant" for what is
+            desired at a stage of a step, "load" and "disturbance" for what is constant between edges of
+            these, "work" for what generated functions and the driver hand on.
+        rows: "n" for one per robot, "p" for one per pair, "one" for one that all robots share.
+        columns: length of a row, a product of numbers and of the names in `SIZES`.
+        meaning: what it is.
+    """
+
+    owner: str
+    rows: str
+    columns: str
+    meaning: str
+
+
+#: what lengths of rows are made of; a robot has its own, a cell the largest of its robots
+SIZES: Mapping[str, str] = MappingProxyType(
+    {
+        "m": "coordinates of the task",
+        "nv": "joints",
+        "P": "adapted parameters",
+        "Z": "entries of the state of the adaptation",
+        "K": "columns of K_r",
+        "bodies": "inertial parameters of all bodies",
+        "tip": "1 for tasks of the tip, 0 for tasks of the joints",
+        "spare": "1 if there are more joints than coordinates of the task, else 0",
+    }
+)
+
+QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
+    {
+        "q": Quantity("state", "n", "nv", "positions of the joints"),
+        "v": Quantity("state", "n", "nv", "velocities of the joints"),
+        "z": Quantity("state", "n", "Z", "state of the adaptation; with (14) it is theta_hat"),
+        "integral": Quantity("state", "p", "m", "integrals of epsilon"),
+        "q_dot": Quantity("rate", "n", "nv", "q'"),
+        "v_dot": Quantity("rate", "n", "nv", "v'"),
+        "z_dot": Quantity("rate", "n", "Z", "z'"),
+        "integral_dot": Quantity("rate", "p", "m", "epsilon"),
+        "base": Quantity("cell", "n", "12", "placement of the first joint: rotation by rows, translation"),
+        "Lambda": Quantity("cell", "one", "m", "gain"),
+        "beta": Quantity("cell", "one", "m", "gain"),
+        "K_eps": Quantity("cell", "one", "m", "gain"),
+        "K_r": Quantity("cell", "n", "K", "gain"),
+        "Gamma": Quantity("cell", "n", "P", "gain of (14)"),
+        "W_inv": Quantity("cell", "n", "nv", "inverse of the weights of the joints"),
+        "posture": Quantity("cell", "n", "nv", "preferred positions of the joints"),
+        "gain": Quantity("cell", "n", "nv", "rate at which they are sought"),
+        "viscous": Quantity("cell", "n", "nv", "coefficients of friction"),
+        "coulomb": Quantity("cell", "n", "nv", "coefficients of friction"),
+        "smoothing": Quantity("cell", "n", "nv", "velocity at which Coulomb friction reaches tanh(1)"),
+        "limits": Quantity("cell", "n", "nv", "at which torque is cut off"),
+        "pi": Quantity("load", "n", "bodies", "true inertial parameters, with what is carried"),
+        "disturbance": Quantity("disturbance", "n", "nv", "torque from outside"),
+        "desired": Quantity("instant", "n", "m", "desired coordinates"),
+        "desired_dot": Quantity("instant", "n", "m", "their velocity"),
+        "desired_ddot": Quantity("instant", "n", "m", "their acceleration"),
+        "weights": Quantity("instant", "n", "4*m*m", "c, c', c'' and c^-1"),
+        "x": Quantity("work", "n", "m", "coordinates of the task"),
+        "e": Quantity("work", "n", "m", "error"),
+        "x_dot": Quantity("work", "n", "m", "velocity of the task"),
+        "xd_dot": Quantity("work", "n", "m", "desired velocity, as errors are counted"),
+        "xd_ddot": Quantity("work", "n", "m", "desired acceleration, as errors are counted"),
+        "w": Quantity("work", "n", "m", "c e"),
+        "w_dot": Quantity("work", "n", "m", "its rate"),
+        "sine": Quantity("work", "n", "nv", "sin q"),
+        "cosine": Quantity("work", "n", "nv", "cos q"),
+        "J": Quantity("work", "n", "tip*m*nv", "Jacobian"),
+        "J_dot": Quantity("work", "n", "tip*m*nv", "its rate"),
+        "J_inv": Quantity("work", "n", "tip*m*nv", "its inverse, or W^-1 J^T G"),
+        "G": Quantity("work", "n", "spare*m*m", "(J W^-1 J^T)^-1"),
+        "epsilon": Quantity("work", "p", "m", "synchronization errors"),
+        "epsilon_dot": Quantity("work", "p", "m", "their rates"),
+        "E": Quantity("work", "n", "m", "a robot's share of the integrals of epsilon"),
+        "sigma": Quantity("work", "n", "m", "its share of epsilon"),
+        "sigma_dot": Quantity("work", "n", "m", "its share of the rates of epsilon"),
+        "tau": Quantity("work", "n", "nv", "torque that the controller asks for"),
+        "acting": Quantity("work", "n", "nv", "torque that it asked for when it was last sampled"),
+        "moving": Quantity("work", "n", "nv", "torque that moves the rigid bodies"),
+        "e_star": Quantity("work", "n", "m", "coupled error"),
+        "s_q": Quantity("work", "n", "nv", "error in velocity of the joints"),
+        "theta_hat": Quantity("work", "n", "P", "estimates"),
+    }
+)
+
+
+class Signature(NamedTuple):
+    """Names of what a generated function reads and writes, in the order of its arguments and results."""
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+
+FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
+    {
+        "measure": Signature(
+            ("q", "v", "base", "desired", "desired_dot", "desired_ddot", "weights", "W_inv"),
+            (
+                "x", "e", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot", "sine", "cosine", "J", "J_dot", "J_inv",
+                "G",
+            ),
+        ),
+        "control": Signature(
+            (
+                "q", "v", "sine", "cosine", "z", "E", "sigma", "sigma_dot", "e", "x_dot", "xd_dot", "xd_ddot",
+                "w", "w_dot", "J", "J_dot", "J_inv", "G", "weights", "Lambda", "beta", "K_eps", "K_r",
+                "Gamma", "W_inv", "posture", "gain", "base",
+            ),
+            ("tau", "z_dot", "e_star", "s_q"),
+        ),
+        "plant": Signature(("q", "v", "sine", "cosine", "moving", "pi", "base"), ("v_dot",)),
+        "estimate": Signature(("z",), ("theta_hat",)),
+    }
+)  # fmt: skip
+
+#: what is desired at an instant: position, velocity and acceleration
+DESIRED = "desired", "desired_dot", "desired_ddot"
+
+#: logged arrays, all of `LAYOUT` but t and those that a result may have beside, and what each is a copy of
+LOGS: Mapping[str, str] = MappingProxyType(
+    {
+        "x": "x",
+        "x_desired": "desired",
+        "tracking_error": "e",
+        "sync_error": "epsilon",
+        "sync_integral": "integral",
+        "coupled_error": "e_star",
+        "q": "q",
+        "v": "v",
+        "v_error": "s_q",
+        "tau": "acting",
+        "disturbance": "disturbance",
+        "theta_hat": "theta_hat",
+        "adaptation_state": "z",
+    }
+)
+
+
+def owned_by(*owners: str) -> list[str]:
+    """Names of the quantities that are in one of these places, in the order of the table."""
+    return [name for name, quantity in QUANTITIES.items() if quantity.owner in owners]
+
+
+def columns(name: str, sizes: Mapping[str, int]) -> int:
+    """Length of a row of a quantity."""
+    factors = QUANTITIES[name].columns.split("*")
+    return prod(int(factor) if factor.isdigit() else sizes[factor] for factor in factors)
+
+
+def shape(name: str, sizes: Mapping[str, int]) -> tuple[int, int]:
+    """Shape of the array of a quantity; `sizes` has the numbers of robots and pairs, n and p, too."""
+    return {"one": 1, **sizes}[QUANTITIES[name].rows], columns(name, sizes)
+
+
+def checked(name: str, array: np.ndarray, sizes: Mapping[str, int]) -> np.ndarray:
+    """An array as generated code reads it: numbers one after another, of the shape that the table says.
+
+    Args:
+        name: of the quantity.
+        array: (rows, columns), or several of these, one after another.
+        sizes: of the cell.
+
+    Raises:
+        CompilationError: it has another shape.
+    """
+    expected = shape(name, sizes)
+    if np.shape(array)[-2:] != expected:
+        raise CompilationError(
+            f"compiled engine, {name} ({QUANTITIES[name].meaning}): expected rows and columns {expected}, "
+            f"found an array of shape {np.shape(array)}"
+        )
+    return np.ascontiguousarray(array, dtype=float)

@@ -1,0 +1,144 @@
+"""What had another name in version 0.1 still works, and warns with the name of today."""
+
+from __future__ import annotations
+
+import warnings
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from synctrl import Controller
+from synctrl.control.adaptation import Natural
+from synctrl.errors import InputError
+from synctrl.experiments import a460_pair
+from synctrl.renamed import names_elsewhere
+
+#: names by the module that had them, and the module that has them now
+MOVED = {
+    "synctrl.control.controller": ("synctrl.control.laws.sun_mills", ["REFERENCE_ACCELERATIONS"]),
+    "synctrl.show.lyapunov_plots": ("synctrl.analysis.lyapunov", ["ENERGIES", "POWERS", "THEOREM"]),
+    "synctrl.show.plots": ("synctrl.show.legends", ["WIDE", "NARROW"]),
+    "synctrl.simulation.simulate": ("synctrl.simulation.run", ["run_reference"]),
+    "synctrl.coupling.weights": ("synctrl.coupling.weight_checks", ["check_weights"]),
+}
+#: what version 0.1 exported
+EXPORTED = {
+    "synctrl": (
+        "Attached AxisRotation BaseParameters CartesianSpace Cell Circle "
+        "Controller Coupling Cubic Damping Disturbance Experiment "
+        "ExponentialApproach Friction FrictionParameters FullParameters "
+        "FunctionOrientation FunctionTrajectory Gains Hold JointSpace "
+        "LinearParameters Member Payload PoseSpace PoseTrajectory Redundancy "
+        "Result Robot SynchronizationFunction SynctrlError inverse_kinematics "
+        "load_robot simulate"
+    ),
+    "synctrl.analysis": "Certificate certify",
+    "synctrl.experiments": (
+        "a460_full_pair a460_pair mixed_four mobile_robot panda_four planar_four "
+        "quadratic_analysis rigid_object ur5_payload"
+    ),
+    "synctrl.show.animation": "payload_pair_scene planar_scene",
+    "synctrl.show.plots": (
+        "common_limits joint_trajectories new_figure plain save style sync_errors tracking_errors"
+    ),
+    "synctrl.sweep": (
+        "Choice Factor Grid LogUniform Normal Sweep Uniform control_period "
+        "disturbance_scale disturbance_start gain gain_scale initial_estimates "
+        "initial_positions initial_velocities load model_error trajectories "
+        "true_parameters weights"
+    ),
+    "synctrl.tune": "Tuned tune",
+}
+
+
+@pytest.mark.parametrize("module", EXPORTED)
+def test_what_version_0_1_exported_is_there_and_warns_of_nothing(module):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        missing = [name for name in EXPORTED[module].split() if not hasattr(import_module(module), name)]
+    assert not missing
+
+
+@pytest.mark.parametrize(("old", "name"), [(old, name) for old in MOVED for name in MOVED[old][1]])
+def test_a_name_that_has_moved_is_the_same_thing_and_says_where_it_is(old, name):
+    with pytest.warns(DeprecationWarning, match=f"{old}.{name} is deprecated: use {MOVED[old][0]}.{name}"):
+        found = getattr(import_module(old), name)
+    assert found is getattr(import_module(MOVED[old][0]), name)
+
+
+@pytest.mark.parametrize("old", MOVED)
+def test_other_names_are_as_unknown_as_before(old):
+    with pytest.raises(AttributeError, match=f"module '{old}' has no attribute 'nothing'"):
+        import_module(old).nothing  # noqa: B018
+
+
+@pytest.fixture(scope="module")
+def seen():
+    """A controller and what it is asked."""
+    experiment = a460_pair()
+    state = experiment.closed_loop().controller
+    cell = experiment.cell
+    asked = {
+        "reference": cell.references(np.array([0.5]))[0],
+        "motion": np.stack((cell.q0, cell.v0)),
+        "integral": state.network.start(),
+    }
+    return Controller(cell, experiment.gains), asked
+
+
+def test_arguments_and_results_of_the_controller_have_their_old_names(seen):
+    controller, asked = seen
+    z = controller.adaptation.start()
+    new = controller.evaluate(z=z, **asked)
+    with pytest.warns(DeprecationWarning, match=r"evaluate\(z=\.\.\.\)"):
+        old = controller.evaluate(theta_hat=z, **asked)
+    np.testing.assert_array_equal(old.tau, new.tau)
+    with pytest.warns(DeprecationWarning, match="z_dot"):
+        np.testing.assert_array_equal(old.theta_hat_dot, new.z_dot)
+    with pytest.warns(DeprecationWarning, match="adaptation.Gamma"):
+        assert controller.Gamma is controller.adaptation.Gamma
+
+
+def test_another_adaptation_has_no_gamma():
+    experiment = a460_pair(adaptation=Natural(0.1))
+    controller = Controller(experiment.cell, experiment.gains, adaptation=experiment.adaptation)
+    with pytest.warns(DeprecationWarning), pytest.raises(AttributeError):
+        controller.Gamma  # noqa: B018
+
+
+def test_names_of_today_warn_of_nothing(seen):
+    controller, asked = seen
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        signals = controller.evaluate(z=controller.adaptation.start(), **asked)
+        assert signals.z_dot.shape == signals.theta_hat.shape
+
+
+def test_the_warning_has_the_line_of_whoever_asks():
+    with pytest.warns(DeprecationWarning) as caught:
+        from synctrl.show.plots import WIDE  # noqa: F401
+    assert {Path(each.filename) for each in caught} == {Path(__file__)}
+
+
+def test_an_argument_under_both_of_its_names_is_refused(seen):
+    controller, asked = seen
+    z = controller.adaptation.start()
+    with pytest.raises(TypeError, match="under two names, 'theta_hat' and 'z'"):
+        controller.evaluate(z=z, theta_hat=z, **asked)
+
+
+@pytest.mark.parametrize("missing", ["z", "integral"])
+def test_an_argument_that_is_missing_is_named(missing, seen):
+    controller, asked = seen
+    given = {**asked, "z": controller.adaptation.start()}
+    given.pop(missing)
+    with pytest.raises(InputError, match=f"^{missing}: expected numbers, found None"):
+        controller.evaluate(**given)
+
+
+def test_a_home_is_looked_up_only_when_it_is_asked_for():
+    find = names_elsewhere("synctrl.old", ".nowhere", "thing")
+    with pytest.raises(ModuleNotFoundError):
+        find("thing")
