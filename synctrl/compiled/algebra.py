@@ -1,4 +1,7 @@
-"""Arrays of symbols, and the linear algebra of one robot's matrices of them."""
+"""Arrays of symbols, and the linear algebra of one robot's matrices of them.
+
+Only what traces imports this module: it needs CasADi.
+"""
 
 from __future__ import annotations
 
@@ -14,23 +17,23 @@ from ..tasks.algebra import Algebra, two_by_two
 SWEEPS = 6
 
 
-def array_of(symbols: Any) -> np.ndarray:
-    """The entries of a CasADi matrix as an array; a column becomes a vector."""
-    rows, columns = symbols.shape
-    array = np.empty((rows, columns), dtype=object)
-    for place in np.ndindex(rows, columns):
+def array_of(symbols: Any, *shape: int) -> np.ndarray:
+    """The entries of a CasADi matrix, row by row, as an array of another shape or of its own."""
+    array = np.empty(symbols.shape, dtype=object)
+    for place in np.ndindex(symbols.shape):
         array[place] = symbols[place]
-    return array[:, 0] if columns == 1 else array
+    return array.reshape(shape or symbols.shape)
 
 
-def array_from(*entries: Any) -> np.ndarray:
-    """Symbols as a vector."""
-    return array_of(ca.vertcat(*entries, ca.SX(0)))[:-1]
+def column_of(array: Any) -> Any:
+    """The entries of an array, row by row, as a dense CasADi column."""
+    entries = np.ravel(array)
+    return ca.densify(ca.vertcat(*entries)) if entries.size else ca.SX.zeros(0, 1)
 
 
-def symbols_of(array: np.ndarray) -> Any:
-    """The CasADi matrix of an array."""
-    return ca.vertcat(*(ca.horzcat(*row) for row in array.reshape(len(array), -1)))
+def symbols(name: str, *shape: int) -> np.ndarray:
+    """An array of new symbols."""
+    return array_of(ca.SX.sym(name, int(np.prod(shape))), *shape)
 
 
 def _inverse(A: np.ndarray) -> np.ndarray:
@@ -40,37 +43,38 @@ def _inverse(A: np.ndarray) -> np.ndarray:
         return two_by_two(A)
     given = ca.SX.sym("A", rows, rows)
     inverse = ca.inv_minor(given) if rows <= 3 else ca.solve(given, ca.SX.eye(rows))
-    found = ca.Function("inverse", [given], [inverse])(symbols_of(A))
-    return array_of(found).reshape(rows, rows)
+    function = ca.Function("inverse", [given], [inverse])
+    return array_of(function(ca.reshape(column_of(A.T), rows, rows)))
 
 
 def _determinant(A: np.ndarray) -> np.ndarray:
     """By Laplace's expansion, row after row; every minor is computed once."""
     minors: dict[tuple[int, ...], Any] = {(): ca.SX(1)}
-    for row, entries in enumerate(A, start=1):
+    for row, entries in enumerate(A):
         minors = {
             columns: sum(
-                (-1) ** (row - 1 - k) * entries[j] * minors[columns[:k] + columns[k + 1 :]]
+                (-1) ** (row - k) * entries[j] * minors[columns[:k] + columns[k + 1 :]]
                 for k, j in enumerate(columns)
             )
-            for columns in combinations(range(len(A)), row)
+            for columns in combinations(range(len(A)), row + 1)
         }
-    return array_from(*minors.values())
+    return array_of(*minors.values(), 1)
 
 
 def _smallest(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """By Jacobi's method: A is turned in one plane after another until it is diagonal."""
     rows = len(A)
-    A, V = A.copy(), array_of(ca.SX(ca.DM.eye(rows))).reshape(rows, rows)
+    A, V, below = A.copy(), array_of(ca.SX(ca.DM.eye(rows))), np.tril_indices(rows, -1)
     for _ in range(1 if rows <= 2 else SWEEPS):
         for plane in combinations(range(rows), 2):
             turn = _turn(A, *plane)
             A[:, plane] = A[:, plane] @ turn
             A[plane, :] = turn.T @ A[plane, :]
+            A[below] = A.T[below]
             V[:, plane] = V[:, plane] @ turn
     found, *others = np.vstack((A.diagonal(), V)).T
     for other in others:
-        less = array_from(other[0] < found[0])
+        less = np.less(other[:1], found[:1], dtype=object)
         found = less * other + (1 - less) * found
     return found[:1], found[1:]
 
@@ -80,7 +84,8 @@ def _turn(A: np.ndarray, p: int, q: int) -> np.ndarray:
     gap, off = A[q, q] - A[p, p], 2 * A[p, q]
     tangent = (1 - 2 * (gap < 0)) * off / (abs(gap) + ca.sqrt(gap**2 + off**2 + 1e-300))
     cosine = 1 / ca.sqrt(1 + tangent**2)
-    return array_from(cosine, tangent * cosine, -tangent * cosine, cosine).reshape(2, 2)
+    sine = tangent * cosine
+    return array_of(ca.vertcat(cosine, sine, -sine, cosine), 2, 2)
 
 
 #: of symbols, of one robot

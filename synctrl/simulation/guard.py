@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from math import isfinite
 from typing import Any, NamedTuple, cast
 
@@ -17,10 +17,6 @@ from .integrators import Sample
 
 #: parts of the state, in order
 PARTS = ("position", "velocity", "parameter estimate", "integral of the synchronization error")
-
-
-#: what driver.c may find, as it counts from 1
-CHECKS = ("state", "orientation", "condition", "side", "torque")
 
 
 class Finding(NamedTuple):
@@ -42,9 +38,9 @@ def limits_of(space: BoundSpace) -> Mapping[str, float]:
     return getattr(space, "limits", {})
 
 
-def checks(space: BoundSpace) -> tuple[str, ...]:
+def checks(watched: Iterable[str]) -> tuple[str, ...]:
     """What a guard may find, in the order in which it looks; driver.c counts them from 1."""
-    return ("state", *limits_of(space), "side", "torque")
+    return ("state", *watched, "side", "torque")
 
 
 class Guard:

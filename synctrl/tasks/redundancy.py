@@ -24,6 +24,8 @@ from ..robots.robot import Robot
 from .algebra import LAPACK, Algebra
 from .padding import padded
 
+Posture = tuple[np.ndarray, np.ndarray, np.ndarray]
+
 
 @dataclass(frozen=True, eq=False)
 class Redundancy:
@@ -54,7 +56,7 @@ class Redundancy:
     def __post_init__(self) -> None:
         non_negative_number("redundancy, gain", self.gain)
 
-    def spread(self, robots: Sequence[Robot]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def spread(self, robots: Sequence[Robot]) -> Posture:
         """W^-1, posture and its gain, each (n, nv): rows padded with zeros for joints a robot does not have.
 
         Raises:
@@ -240,14 +242,19 @@ class DampedInverse(Pseudoinverse):
 
 
 def inverse_map(
-    robots: Sequence[Robot], m: int, redundancy: Redundancy, damping: Damping | None
+    square: bool, damping: Damping | None, posture: Posture, algebra: Algebra = LAPACK
 ) -> InverseMap:
-    """The way from m task coordinates to the joints of these robots."""
+    """The way to the joints of robots.
+
+    Args:
+        square: whether all have as many joints as there are task coordinates.
+        damping: of singular configurations, if any.
+        posture: W^-1, posture and its gain, see `Redundancy.spread`.
+        algebra: of the numbers.
+    """
     if damping is not None:
-        return DampedInverse(*redundancy.spread(robots), damping)
-    if all(robot.nv == m for robot in robots):
-        return Inverse()
-    return Pseudoinverse(*redundancy.spread(robots))
+        return DampedInverse(*posture, damping, algebra)
+    return Inverse(algebra) if square else Pseudoinverse(*posture, algebra)
 
 
 def _rows(name: str, value: ArrayLike | None, robots: Sequence[Robot], default: float) -> list[np.ndarray]:

@@ -222,7 +222,8 @@ class TipSpace:
                     f"{self!r}: expected robots with at least {self.m} joints, "
                     f"found robot '{robot.name}' with {robot.nv}"
                 )
-        return inverse_map(robots, self.m, self.redundancy, self.damping)
+        square = all(robot.nv == self.m for robot in robots)
+        return inverse_map(square, self.damping, self.redundancy.spread(robots))
 
 
 class CartesianSpace(TipSpace):
