@@ -98,6 +98,7 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "zeta_dot": Quantity("work", "n", "spare*nv", "its rate"),
         "damping": Quantity("work", "n", "damped", "lambda"),
         "damping_rate": Quantity("work", "n", "damped", "rate of lambda^2"),
+        "velocity_lost": Quantity("work", "n", "damped", "|xref' - J v_ref|"),
         "watched": Quantity("work", "n", "watches", "what may make a run end"),
         "side": Quantity("work", "n", "tip", "of which the sign says the side of a singular configuration"),
         "epsilon": Quantity("work", "p", "m", "synchronization errors"),
@@ -140,7 +141,7 @@ FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
                 "w", "w_dot", "J", "J_dot", "J_inv", "G", "zeta", "zeta_dot", "damping_rate", "weights",
                 "Lambda", "beta", "K_eps", "K_r", "Gamma", "W_inv", "base",
             ),
-            ("tau", "z_dot", "e_star", "s_q"),
+            ("tau", "z_dot", "e_star", "s_q", "velocity_lost"),
         ),
         "plant": Signature(("q", "v", "sine", "cosine", "moving", "pi", "base"), ("v_dot",)),
         "guard": Signature(("e", "J", "J_inv"), ("watched", "side")),
@@ -164,6 +165,8 @@ LOGS: Mapping[str, str] = MappingProxyType(
         "disturbance": "disturbance",
         "theta_hat": "theta_hat",
         "adaptation_state": "z",
+        "damping": "damping",
+        "velocity_lost": "velocity_lost",
     }
 )
 

@@ -17,7 +17,7 @@ import numpy as np
 from ..control import law
 from ..control.commands import REFERENCE_ACCELERATIONS
 from ..robots.symbolic import Symbols
-from ..tasks.redundancy import Inversion
+from ..tasks.redundancy import Inversion, velocity_lost
 from ..tasks.spaces import Measurement
 from ..tasks.tips import Poses, Tip
 from .algebra import SYMBOLS, array_of, column_of
@@ -118,7 +118,8 @@ class Trace:
         s_q = v_ref - self._row("v")
         model_torque, z_dot = self._adaptive(v_ref, a_ref, s_q)
         tau = model_torque + self._damping(task, s_q, r) + self.space.to_torque(task, force)
-        return self._function("control", tau=tau, z_dot=z_dot, e_star=e_star, s_q=s_q)
+        lost = velocity_lost(self._jacobians()[0], v_ref, xref_dot) if self.kind.damped else None
+        return self._function("control", tau=tau, z_dot=z_dot, e_star=e_star, s_q=s_q, velocity_lost=lost)
 
     def _law(self, task: Measurement) -> tuple:
         """The same lines as `Controller.evaluate`, for one robot."""

@@ -241,6 +241,12 @@ class DampedInverse(Pseudoinverse):
         return inversion.damping_rate * mu
 
 
+def velocity_lost(J: np.ndarray, v_ref: np.ndarray, xref_dot: np.ndarray) -> np.ndarray:
+    """|xref' - J v_ref|, (..., 1): how much of a reference velocity damping leaves out, task unit per s."""
+    lost = xref_dot - np.matvec(J, v_ref)
+    return np.sqrt((lost * lost).sum(-1, keepdims=True))
+
+
 def inverse_map(
     square: bool, damping: Damping | None, posture: Posture, algebra: Algebra = LAPACK
 ) -> InverseMap:
