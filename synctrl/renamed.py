@@ -16,7 +16,7 @@ def names_elsewhere(module: str, new_home: str, *names: str) -> Callable[[str], 
 
     Args:
         module: its `__name__`.
-        new_home: the other module, seen from this one, `.law` or `..tasks.cell`.
+        new_home: the other module, seen from this one, `.law` or `..coupling.cell`.
         names: what has moved.
     """
 

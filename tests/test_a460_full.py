@@ -17,10 +17,10 @@ from synctrl.experiments.a460_full import WRIST
 from synctrl.robots.documents import lock
 from synctrl.robots.limits import joint_limits
 from synctrl.robots.urdf import describe
+from synctrl.simulation.advance import Sample
 from synctrl.simulation.guard import Guard
 from synctrl.simulation.held_joints import HELD as OUTPUTS
 from synctrl.simulation.held_joints import HeldJointsPlant, Pid
-from synctrl.simulation.integrators import Sample
 
 HELD = {"joint4": 0.0, "joint5": 0.0, "joint6": 0.0}
 

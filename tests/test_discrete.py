@@ -14,6 +14,7 @@ from cells import SMALL_GAINS, random_experiment, small_cell
 from hypothesis import given
 from hypothesis import strategies as st
 from seams.leaky_adaptation import BoundLeaky, Leaky
+from seams.posted_network import Posted
 
 from synctrl import (
     CartesianSpace,
@@ -82,6 +83,7 @@ CELLS: dict[str, Callable[[], Experiment]] = {
     "two A460, natural adaptation": lambda: learning(a460_pair(), Natural(0.1)),
     "two A460, an adaptation of one's own": lambda: learning(a460_pair(), Leaky(0.3, 0.1)),
     "two A460, bounded estimates": lambda: learning(a460_pair(), Bounded(0.3, 0.1)),
+    "two A460 that post messages": lambda: replace(a460_pair(), network=Posted(6e-3)),
     "two arms, saturated": weak,
     "two A460 with a payload": lambda: replace(a460_pair(), payloads=[Payload(0, 3.0, start=0.013)]),
     "two six-joint A460": a460_full_pair,
@@ -94,6 +96,7 @@ CELLS: dict[str, Callable[[], Experiment]] = {
 }
 #: of which the compiled engine has some not
 INTERPRETED = {
+    "two A460 that post messages",
     "two A460, bounded estimates",
     "two six-joint A460",
     "two arms, saturated",
@@ -322,6 +325,23 @@ def test_where_faults_are_held_every_call_has_a_torque_and_the_next_sample_is_ta
     assert (controller.state["z"] != known["z"]).any() and controller.held == known["held"]
 
 
+def test_a_message_is_heard_at_its_sample_and_one_of_a_missed_period_is_lost():
+    controller, q, v = started("hold", small(network=Posted(2.5 * PERIOD)))
+    q = q + 0.1
+
+    def heard() -> np.ndarray:
+        return controller.heard(0.0, np.stack((q, v)))[: len(q)]
+
+    assert heard().any()  # those of the first instant are there at once
+    for k, due in enumerate([True, False, False, True, False, True]):  # at 0, 2.5 and 5 periods
+        assert ((heard() != controller.memory[: len(q)]).any()) == due
+        q = q + 0.01
+        controller.step(k * PERIOD, q, v)
+    then = controller.memory[: len(q)].copy()
+    controller.step(9 * PERIOD, q + 1.0, v)  # after the period of the message at 7.5
+    np.testing.assert_array_equal(controller.memory[: len(q)], then)
+
+
 def test_before_the_first_sample_there_is_nothing_to_hold():
     controller, q, v = started("hold")
     for t, position in ((0.0, np.nan), (2 * PERIOD, 1.0)):
@@ -430,7 +450,12 @@ def drive(
     return seen
 
 
-CONTINUED = {"gradient": small, "natural": lambda: learning(a460_pair(), Natural(0.1)), "poses": ur5_payload}
+CONTINUED = {
+    "gradient": small,
+    "natural": lambda: learning(a460_pair(), Natural(0.1)),
+    "poses": ur5_payload,
+    "messages": lambda: small(network=Posted(2.5 * PERIOD)),
+}
 
 
 @pytest.mark.parametrize("name", CONTINUED)
@@ -583,8 +608,8 @@ def test_a_step_keeps_nothing():
 
     tracemalloc.start()
     try:
-        before = run(0, 100)
-        after = run(100, 1100)
+        before = run(0, 3000)  # until Python has as many tuples in stock as it ever keeps
+        after = run(3000, 4000)
     finally:
         tracemalloc.stop()
     assert after - before < 2000  # two bytes per step: less than any array

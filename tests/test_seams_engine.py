@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from seams.heun_engine import Heun
@@ -38,3 +40,8 @@ def test_it_refuses_what_it_does_not_have_by_name():
 def test_what_is_no_engine_is_refused(wrong):
     with pytest.raises(InputError, match="engine"):
         planar_four().simulate(0.05, engine=wrong)
+
+
+@pytest.mark.parametrize("file", sorted(Path(__file__).with_name("seams").glob("*.py")), ids=lambda f: f.stem)
+def test_a_part_of_ones_own_takes_at_most_forty_lines(file):
+    assert len(file.read_text("utf-8").splitlines()) <= 40

@@ -117,6 +117,7 @@ def _outside(run: Replay, record: Lyapunov, condition: GainCondition) -> list[st
     period = run.result.info.get("control_period")
     if period is not None:
         found.append(f"torque and adaptation are held for {period:g} s at a time")
+    found += _events(run)
     for name in (name for name in record.power if name not in record.inside):
         power = record.power[name]
         if name in run.learning and name not in _WORDS and not (power > record.rounding).any():
@@ -127,6 +128,18 @@ def _outside(run: Replay, record: Lyapunov, condition: GainCondition) -> list[st
     if condition.needed and not condition.holds:
         found.append(f"the gain condition fails: {_condition_in_words(run, condition)}")
     return found
+
+
+def _events(run: Replay) -> list[str]:
+    """What plant and network do to the state at once, in words."""
+    if not run.events:
+        return []
+    loop, t = run.loop, run.result.t[run.events[0] + 1]
+    parts = {f"the plant {type(loop.plant).__qualname__}": loop.events.size > 0}
+    parts[f"the network {loop.controller.network_settings['name']}"] = loop.messages.sent
+    names = " and ".join(name for name, has_events in parts.items() if has_events)
+    count = len(run.events)
+    return [f"events of {names} move the state, {count} times, first until t = {t:g} s: V jumps there"]
 
 
 def _in_words(run: Replay, name: str) -> str:

@@ -1,4 +1,9 @@
-"""Where something jumps in the log of a run, and the parts in between in which nothing does."""
+"""Where something jumps in the log of a run, and the parts in between in which nothing does.
+
+At edges and breaks the right-hand side jumps: a logged instant there has a value from the left and one from
+the right. At events the state itself jumps, and the log has it afterwards only: like an edge between two
+instants, an event parts the log. What V does there is no part of V', and nothing is said of it.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..control.discrete import GRID
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.disturbances import DisturbanceSchedule
 
@@ -31,6 +37,21 @@ def jumps_in(t: np.ndarray, loop: ClosedLoop, schedule: DisturbanceSchedule) -> 
             else:
                 between.add(int(np.searchsorted(t, jump)) - 1)
     return sorted(on_log - {0, len(t) - 1}), sorted(between)
+
+
+def events_in(t: np.ndarray, loop: ClosedLoop, period: float | None) -> list[int]:
+    """Logged instants between which and the next one the state jumps.
+
+    Args:
+        t: logged instants, (T,), s.
+        loop: the closed loop.
+        period: of sampled control, with which messages arrive at samples, s, or None.
+    """
+    events, messages = np.sort(loop.events), np.array(loop.messages.between(0.0, float(t[-1])))
+    if period is not None:
+        messages = period * np.ceil(messages / period - GRID)
+    after = np.searchsorted(t, np.concatenate((events, messages)) - tolerance(t))
+    return sorted({int(k) - 1 for k in after if 0 < k < len(t)})
 
 
 def tolerance(t: np.ndarray) -> float:

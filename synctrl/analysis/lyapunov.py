@@ -57,10 +57,12 @@ class Lyapunov:
             adaptation. A law without a proof has the power of its force here, as "law"; what a network does
             that is not ideal is "network".
         rounding: bound of the rounding error of V', (T,).
-        drift: V(t) - V(0) - integral of V', (T,); 0 but for the error of the run and of the quadrature.
+        drift: V(t) - V(0) - integral of V', (T,), without jumps at events; 0 but for the error of the run and
+            of the quadrature.
         drift_bound: what these two errors and rounding may amount to.
         supplied: integral of every power over the run, by name; together the change of V.
         inside: names of the powers that the theorem knows.
+        events: instants between which and the next one V jumps, because plant or network move the state.
     """
 
     t: np.ndarray
@@ -71,6 +73,7 @@ class Lyapunov:
     drift_bound: float
     supplied: Mapping[str, float]
     inside: tuple[str, ...] = THEOREM
+    events: tuple[int, ...] = ()
 
     @property
     def V(self) -> np.ndarray:  # noqa: N802
@@ -143,14 +146,19 @@ def lyapunov_of(run: Replay) -> Lyapunov:
         bound + operations(run.loop) * EPS * float(np.max(V)),
         {name: _supplied(run, term) for name, term in power.items()},
         ("damping", *proof.powers, "friction in Y"),
+        run.events,
     )
 
 
 def first_growth(record: Lyapunov) -> Growth | None:
-    """The first instant at which V grows beyond rounding, and the term that did it; None if it never does."""
+    """The first instant at which V grows beyond rounding, and the term that did it; None if it never does.
+
+    Jumps of V at events of plant or network do not count: they are no matter of V'.
+    """
     V, V_dot = record.V, record.V_dot
     rising = V_dot > record.rounding
     gained = np.diff(V, append=V[-1])
+    gained[list(record.events)] = 0.0  # a jump at an event is no growth by V'
     rising |= gained > 8 * EPS * V + record.rounding * np.diff(record.t, append=record.t[-1])
     if not rising.any():
         return None

@@ -20,7 +20,7 @@ from ..simulation.disturbances import DisturbanceSchedule
 from ..simulation.recorder import ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE, own_states
 from ..simulation.result import LAYOUT, Result
 from ..simulation.simulate import Experiment
-from .jumps import Stretch, jumps_in, stretches, tolerance
+from .jumps import Stretch, events_in, jumps_in, stretches, tolerance
 
 #: instants whose references are evaluated together
 BLOCK = 256
@@ -98,6 +98,7 @@ class Replay:
         rows: states and signals, one row per instant, and two where something jumps: from the left and right.
         logged: row of every logged instant, (T,); at a jump the one from the right.
         stretches: parts of the log in which nothing jumps.
+        events: instants between which and the next one the state jumps, by events of plant or network.
         learning: names of the powers of the adaptation.
     """
 
@@ -107,6 +108,7 @@ class Replay:
     rows: Row
     logged: np.ndarray
     stretches: tuple[Stretch, ...]
+    events: tuple[int, ...]
     learning: tuple[str, ...]
 
 
@@ -127,13 +129,16 @@ def replay(result: Result, experiment: Experiment | None = None) -> Replay:
     _check_sizes(result, loop)
     _check_numbers(result)
     schedule = DisturbanceSchedule(loop.cell, experiment.disturbances)
+    events = events_in(result.t, loop, result.info.get("control_period"))
     jumps, crossed = jumps_in(result.t, loop, schedule)
+    jumps, crossed = sorted({*jumps} - {k + 1 for k in events}), sorted({*crossed, *events})
     rows = Row(*(np.array(column) for column in zip(*_rows(result, loop, schedule, jumps), strict=True)))
     instants = np.arange(len(result.t))
     logged = instants + np.searchsorted(jumps, instants, side="right")
     _check_same(result, Row(*(column[logged] for column in rows)))
     learning = _learning(loop, result)
-    return Replay(result, experiment, loop, rows, logged, stretches(logged, jumps, crossed), learning)
+    parts = stretches(logged, jumps, crossed)
+    return Replay(result, experiment, loop, rows, logged, parts, tuple(events), learning)
 
 
 def experiment_of(result: Result, experiment: Experiment | None) -> Experiment:

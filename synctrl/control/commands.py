@@ -123,8 +123,8 @@ class Composed:
     def __call__(self, task: Measurement, reference: Reference, memory: np.ndarray) -> Lines:
         c, c_dot, c_ddot, c_inv = reference.weights
         (e, e_dot), (xd_dot, xd_ddot) = task.error, task.rates
-        w, w_dot = law.weighted_error(c, e), law.weighted_error_dot(c, c_dot, e, e_dot)
-        heard = self.network.exchange(reference.t, np.stack((w, w_dot)), memory)
+        w, w_dot = sent = weighted(task, reference)
+        heard = self.network.exchange(reference.t, sent, memory)
         E, sigma, sigma_dot = heard.shares
         errors = Errors(
             reference.t, e, e_dot, task.x_dot, xd_dot, xd_ddot, w, w_dot, E, sigma, sigma_dot,
@@ -159,6 +159,12 @@ class Composed:
             "xref_dot": (asked.xref_dot, (n, m)), "xref_ddot": (asked.xref_ddot, (n, m)),
             "force": (asked.force, (n, m)),
         })  # fmt: skip
+
+
+def weighted(task: Measurement, reference: Reference) -> np.ndarray:
+    """What robots know of themselves and send: weighted errors c e and their rates, (2, n, m)."""
+    (c, c_dot, _, _), (e, e_dot) = reference.weights, task.error
+    return np.stack((law.weighted_error(c, e), law.weighted_error_dot(c, c_dot, e, e_dot)))
 
 
 def no_errors(n: int, m: int) -> Errors:

@@ -18,10 +18,13 @@ from ..coupling.cell import Reference
 from ..errors import InputError, ResultError
 from .controller import Controller, Signals
 from .measured import check_limits, check_signals, measurement, not_finite
+from .messages import Messages
 from .state_file import read_state, write_state
 
 #: how far from its place on the grid of samples a call may come, as a share of the period
 LATE = 0.1
+#: how far from a sample a message may be that comes with it, as a share of the period
+GRID = 1e-9
 #: periods up to which samples can be told from each other
 LONGEST = 2.0**50
 FAULTS = "error", "hold"
@@ -50,7 +53,8 @@ class DiscreteController:
 
     Attributes:
         z: state of the adaptation for the next sample, (n, Z).
-        memory: of the network for the next sample; with `Ideal` it is `sync_integral`, (p, m).
+        memory: of the network for the next sample, before its messages; with `Ideal` it is `sync_integral`,
+            (p, m).
         held: how many calls and periods were held until now.
         signals: what the last sample computed, or None before the first.
 
@@ -73,6 +77,7 @@ class DiscreteController:
         self.include_gravity = boolean("include_gravity", include_gravity)
         self.faults = choice("faults", faults, FAULTS)
         self._shape = self.cell.n, self.cell.nv
+        self._messages = Messages(self.cell, controller.network)
         self._limits = check_limits(torque_limits, self._shape)
         self.held: int
         self.signals: Signals | None
@@ -117,10 +122,12 @@ class DiscreteController:
         if fault is not None:
             return self._hold(time, missed, fault)
         with np.errstate(all="ignore"):  # what is not finite is named
-            signals = self._evaluate(time, motion, wanted)
+            reference = self._reference(time, wanted)
+            memory = self._heard(reference, motion, self._samples + missed)
+            signals = self.controller.unchecked(reference, motion, self.z, memory)
         check_signals(self.cell, time, signals)
         self._samples, self.held = self._samples + missed, self.held + missed
-        self._advance(motion[0], signals)
+        self._advance(motion[0], memory, signals)
         return self._tau.copy()
 
     def sample(self, t: float, motion: np.ndarray) -> Signals:
@@ -133,9 +140,22 @@ class DiscreteController:
         Returns:
             What the law computed, its torque neither cut off nor without gravity.
         """
-        signals = self._evaluate(t, motion, None)
-        self._advance(motion[0], signals)
+        reference = self._reference(t)
+        memory = self._heard(reference, motion, self._samples)
+        signals = self.controller.unchecked(reference, motion, self.z, memory)
+        self._advance(motion[0], memory, signals)
         return signals
+
+    def heard(self, t: float, motion: np.ndarray) -> np.ndarray:
+        """Memory of the network for the next sample, with the messages that are due; nothing is kept.
+
+        Args:
+            t: time of the sample, s.
+            motion: joint positions and velocities, (2, n, nv).
+        """
+        if not self._due(self._samples):
+            return self.memory
+        return self._heard(self._reference(t), motion, self._samples)
 
     # -- memory -------------------------------------------------------------------------------------------
 
@@ -148,14 +168,9 @@ class DiscreteController:
         (n, nv), N·m, the torque that is held; `start`, s, `period`, s, and `samples`, the place on the grid;
         `held`. What is set has to be of the same cell and period.
         """
-        numbers = {
-            "start": self._t0,
-            "period": self.period,
-            "samples": float(self._samples),
-            "held": float(self.held),
-        }
+        numbers = {"start": self._t0, "period": self.period, "samples": self._samples, "held": self.held}
         arrays = {"z": self.z, self._memory_name: self.memory, "tau": self._tau}
-        return {name: np.array(value) for name, value in {**arrays, **numbers}.items()}
+        return {name: np.array(value, dtype=float) for name, value in {**arrays, **numbers}.items()}
 
     @state.setter
     def state(self, state: Mapping[str, ArrayLike]) -> None:
@@ -247,18 +262,28 @@ class DiscreteController:
         self._samples, self.held = sample + int(due), self.held + missed + 1
         return self._tau.copy()
 
-    def _evaluate(self, t: float, motion: np.ndarray, desired: np.ndarray | None) -> Signals:
+    def _reference(self, t: float, desired: np.ndarray | None = None) -> Reference:
         reference = self.cell.references(np.array([t]))[0]
-        if desired is not None:
-            reference = Reference(desired, reference.weights, reference.t)
-        return self.controller.unchecked(reference, motion, self.z, self.memory)
+        return reference if desired is None else Reference(desired, reference.weights, reference.t)
 
-    def _advance(self, q: np.ndarray, signals: Signals) -> None:
+    def _heard(self, reference: Reference, motion: np.ndarray, sample: int) -> np.ndarray:
+        return self._messages.received(self._due(sample), reference, motion, self.memory)
+
+    def _due(self, sample: int) -> list[float]:
+        """Messages of the period that ends with a sample; with the first, those at it."""
+        start = self._end(sample - 1) if sample else self._t0
+        return self._messages.between(start, self._end(sample))
+
+    def _end(self, sample: int) -> float:
+        """Before this time a message is due with a sample or with one before; roundings do not matter."""
+        return self._t0 + (sample + GRID) * self.period
+
+    def _advance(self, q: np.ndarray, memory: np.ndarray, signals: Signals) -> None:
         """Keep what is commanded, and what will be known at the next sample."""
         tau = np.clip(signals.tau, -self._limits, self._limits)
         self._tau = tau if self.include_gravity else tau - self._gravity(q)
         self.z = self.controller.adaptation.settle(self.z + self.period * signals.z_dot)
-        self.memory = self.memory + self.period * signals.memory_dot
+        self.memory = memory + self.period * signals.memory_dot
         self._samples, self.signals = self._samples + 1, signals
 
     def _gravity(self, q: np.ndarray) -> np.ndarray:

@@ -34,8 +34,14 @@ class Received(NamedTuple):
 class BoundNetwork(Protocol):
     """A network between the robots of one cell.
 
-    It may also have a method `outside`, without arguments: what the theorem does not know of it, in words, or
-    None if the theorem holds with it. Without one its runs are outside the theorem, and certificates say so.
+    It may also have
+
+    - `outside`, without arguments: what the theorem does not know of it, in words, or None if the theorem
+      holds with it. Without one its runs are outside the theorem, and certificates say so.
+    - `messages(start, end)` and `meet(t, w, memory)`: the instants of its messages with start <= t < end, in
+      order, s, and its memory after the one at instant t, with w as in `exchange`; without side effects. With
+      continuous control a message arrives at its instant, with sampled control at the first sample that is
+      not before it. Messages of periods that a `DiscreteController` holds are lost.
     """
 
     def start(self) -> np.ndarray:

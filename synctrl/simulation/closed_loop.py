@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..checks import finite_array
 from ..control.controller import Controller, Signals
+from ..control.messages import Messages
 from ..coupling.cell import Reference
 from ..errors import InputError, NonFiniteError
 from .plant import Plant
@@ -17,6 +19,13 @@ class ClosedLoop:
     Args:
         controller: the controller of a cell.
         plant: the true cell.
+
+    Attributes:
+        events: instants at which the plant moves its state, s.
+        messages: those of the network.
+
+    Raises:
+        InputError: events that are no instants.
     """
 
     def __init__(self, controller: Controller, plant: Plant):
@@ -25,6 +34,9 @@ class ClosedLoop:
         self._z0, self._memory0 = controller.adaptation.start(), np.asarray(controller.network.start())
         self._layout = Layout(self.cell, self._z0.shape, self._memory0.shape, plant.hidden0.size)
         self.size = self._layout.size
+        self.events = finite_array(f"events of the plant {type(plant).__qualname__}", plant.events, (None,))
+        self.messages = Messages(self.cell, controller.network)
+        self._last = self
         seams = controller.adaptation, controller.law, controller.network
         parts = (controller, *seams, plant, self.cell.space, *self.cell.parameters)
         self._foreign = [type(part) for part in parts if not _is_ours(type(part))]
@@ -48,11 +60,14 @@ class ClosedLoop:
             return
         shapes = {"acceleration": q.shape, "rate of its own state": hidden.shape}
         for (what, expected), rate in zip(shapes.items(), rates, strict=True):
-            if np.shape(rate) != expected:
-                raise InputError(
-                    f"plant, {type(self.plant).__qualname__}: expected {expected} numbers as its {what}, "
-                    f"found {np.shape(rate)}"
-                )
+            self._check_shape(f"its {what}", expected, rate)
+
+    def _check_shape(self, what: str, expected: tuple[int, ...], found: np.ndarray) -> None:
+        if np.shape(found) != expected:
+            raise InputError(
+                f"plant, {type(self.plant).__qualname__}: expected {expected} numbers as {what}, "
+                f"found {np.shape(found)}"
+            )
 
     def state(self, y: np.ndarray | None = None) -> State:
         """The parts of y, or of a new y that holds nothing yet."""
@@ -60,8 +75,12 @@ class ClosedLoop:
 
     def at(self, t: float) -> ClosedLoop:
         """The loop with the plant as it is at time t; at an edge from the right."""
-        plant = self.plant.at(t)
-        return self if plant is self.plant else ClosedLoop(self.controller, plant)
+        plant, last = self.plant.at(t), self._last
+        if plant is self.plant:
+            return self
+        if plant is not last.plant:
+            self._last = last = ClosedLoop(self.controller, plant)
+        return last
 
     def split(self, y: np.ndarray) -> list[np.ndarray]:
         """Views of q, v, z and the memory of the network in y."""
@@ -86,9 +105,7 @@ class ClosedLoop:
         signals = self.derive(reference, self.state(y), disturbance, rate)
         return rate.flat, signals
 
-    def derive(
-        self, reference: Reference, state: State, disturbance: np.ndarray | None, rate: State
-    ) -> Signals:
+    def derive(self, reference: Reference, state: State, disturbance: np.ndarray, rate: State) -> Signals:
         """`evaluate` for states whose views are at hand: y' is written into `rate`."""
         signals = self.look(reference, state)
         self.respond(state, signals.tau, disturbance, rate)
@@ -96,33 +113,54 @@ class ClosedLoop:
         rate.z[...], rate.memory[...] = signals.z_dot, signals.command.memory_dot
         return signals
 
+    def final(self, t: float, state: State) -> Signals:
+        """`derive` at time t, s, for what the controller computes."""
+        nothing = np.zeros((self.cell.n, self.cell.nv))
+        return self.derive(self.cell.references(np.array([t]))[0], state, nothing, self.state())
+
     def look(self, reference: Reference, state: State) -> Signals:
         """What the controller computes in a state, of which it may keep views."""
         return self._law(reference, state.motion, state.z, state.memory)
 
-    def respond(self, state: State, tau: np.ndarray, disturbance: np.ndarray | None, rate: State) -> None:
+    def respond(self, state: State, tau: np.ndarray, disturbance: np.ndarray, rate: State) -> None:
         """Write how the plant moves into `rate`, and leave the rates of the controller's state as they are.
 
         Args:
             state: where it is.
             tau: torque that the controller asks for, (n, nv), N·m.
-            disturbance: torque from outside, (n, nv), N·m, or None.
+            disturbance: torque from outside, (n, nv), N·m.
             rate: where the rates go.
         """
-        tau = self.plant.applied(tau)
-        if disturbance is not None:
-            tau = tau + disturbance
+        tau = self.plant.applied(tau) + disturbance
         v_dot, hidden_dot = self.plant.move(state.q, state.v, tau, state.hidden)
         rate.q[...], rate.v[...] = state.v, v_dot
         if hidden_dot.size:
             rate.hidden[...] = hidden_dot
 
-    def settled(self, state: State) -> State:
-        """The state after a step, with what the adaptation makes of its own, for example projected."""
+    def settle(self, state: State) -> None:
+        """Let the adaptation make of its own state what it does after a step, for example project it."""
         z = self.controller.adaptation.settle(state.z)
         if z is not state.z:
             state.z[...] = z
-        return state
+
+    def meet(self, t: float, state: State) -> None:
+        """Make the state before the plant's event at time t the one after it.
+
+        Raises:
+            InputError: the plant gives something of another shape.
+            NonFiniteError: it makes a finite state infinite.
+        """
+        parts = {"positions": state.q, "velocities": state.v, "state of its own": state.hidden}
+        sound = np.isfinite(state.flat).all()
+        found = [np.array(part, float) for part in self.plant.meet(t, state.q, state.v, state.hidden)]
+        for (name, part), after in zip(parts.items(), found, strict=True):
+            what = f"its {name} after the event at {t:g} s"
+            self._check_shape(what, part.shape, after)
+            if sound and not np.isfinite(after).all():
+                kind = type(self.plant).__qualname__
+                text = f"{kind} gives {after.tolist()} as {what}; expected finite numbers"
+                raise NonFiniteError(text, time=t, cause="part")
+            part[...] = after
 
     def watch(self, state: State, signals: Signals, v_dot: np.ndarray) -> None:
         """Name parts that users wrote when a finite state becomes numbers that mean nothing.

@@ -1,7 +1,9 @@
 """Engines: what takes a planned run through time, by name in one table, or a user's own.
 
-An engine of one's own is an object with `refuses` and `run`. It finds the closed loop in `run.loop`,
-instants in `run.clock` and pushes in `run.schedule`; `collect` of run.py watches and logs what it yields.
+An engine of one's own is an object with `refuses` and `run`. If it makes steps of its own, a `Solver` is all
+that it needs: `run.samples(solver)` carries it through time and events, and `collect` of run.py watches and
+logs. Others find the closed loop in `run.loop`, instants in `run.clock` and pushes in `run.schedule`, and
+give `collect` samples of their own making.
 """
 
 from __future__ import annotations

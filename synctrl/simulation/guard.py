@@ -12,8 +12,8 @@ from ..coupling.cell import Cell
 from ..errors import NonFiniteError, OrientationError, SimulationError, SingularJacobianError
 from ..tasks.pose import MAX_ANGLE
 from ..tasks.spaces import BoundSpace, Measurement
+from .advance import Sample
 from .closed_loop import ClosedLoop
-from .integrators import Sample
 
 #: parts of the state, in order
 PARTS = ("position", "velocity", "parameter estimate", "integral of the synchronization error")

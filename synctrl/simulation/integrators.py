@@ -1,124 +1,103 @@
-"""Ways through time: a fixed-step fourth-order method, and SciPy's adaptive ones.
+"""Solvers: a fixed-step fourth-order method, and SciPy's adaptive ones.
 
-Each is a generator of `Sample`, one per logged instant, so that the caller has everything up to the moment in
-which something fails. Disturbances and breaks of desired motions are only met at the ends of steps: within a
-step everything is smooth.
+Events are only met at the ends of steps: within a step everything is smooth.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from itertools import pairwise
+from collections.abc import Callable
 from math import isfinite
 from threading import current_thread, main_thread
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ..control.controller import Signals
-from ..coupling.cell import Reference
 from ..errors import InputError, NonFiniteError, SynctrlError
-from .clock import Clock, Stretch, before
+from .advance import Control
+from .clock import Clock, before
 from .closed_loop import ClosedLoop
-from .disturbances import DisturbanceSchedule
-from .handover import up_to_a_failure, user_failure
-from .step_error import StepError
+from .handover import user_failure
+from .state import State
+from .steps import Step
 
 ADAPTIVE = ("RK45", "RK23", "DOP853", "Radau", "BDF", "LSODA")
 #: weights of the four stages, times 6
 _SIMPSON = np.array([1.0, 2.0, 2.0, 1.0])
-#: steps whose references are evaluated together
-BLOCK = 256
-#: steps of an adaptive method between two logged instants, after which it is taken to be stuck
+#: steps of an adaptive method from one joint of the clock to the next, after which it is taken to be stuck
 MAX_TRIES = 10_000
 
 
-class Sample(NamedTuple):
-    """State and signals at one instant, and whether it belongs into the log."""
+class RungeKutta:
+    """The classical Runge-Kutta method of fourth order, in one step.
 
-    t: float
-    y: np.ndarray
-    disturbance: np.ndarray
-    signals: Signals
-    logged: bool = True
-
-
-class Step(NamedTuple):
-    """One step of a run.
-
-    Attributes:
-        t, t_next: its start and end, s.
-        stages: what is desired at its start, in its middle, and just before its end.
-        window: which torque of the schedule acts.
-        number: which multiple of dt it begins at or after.
-        checked: whether it begins at that multiple.
-        logged: whether it begins at an instant that is logged.
-        joined: whether all goes on smoothly from the step before.
+    Args:
+        loop: the closed loop, for the size of its state.
     """
 
-    t: float
-    t_next: float
-    stages: tuple[Reference, Reference, Reference]
-    window: int
-    number: int
-    checked: bool
-    logged: bool
-    joined: bool
+    def __init__(self, loop: ClosedLoop):
+        self._rates = np.zeros((4, loop.size))
+        self._k = tuple(map(loop.state, self._rates))
+        self._stage, self._spare = loop.state(), loop.state()
+
+    def carry(self, control: Control, step: Step, y: State, rate: State) -> State:
+        h, (_, middle, end), stage = step.h, step.stages, self._stage
+        k1, k2, k3, k4 = self._k
+        k1.flat[...] = rate.flat
+        control.rate(step, middle, stage.ahead(y, 0.5 * h, k1.flat), k2)
+        control.rate(step, middle, stage.ahead(y, 0.5 * h, k2.flat), k3)
+        control.rate(step, end, stage.ahead(y, h, k3.flat), k4)
+        after, self._spare = self._spare.ahead(y, h / 6, _SIMPSON.dot(self._rates)), y
+        control.arrive(step, after, k4.v)
+        return after
 
 
-def rk4(
-    loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule, step_error: StepError
-) -> Iterator[Sample]:
-    """The classical Runge-Kutta method of fourth order, one step per instant of the clock."""
-    rates = np.zeros((4, loop.size))
-    k1, k2, k3, k4 = map(loop.state, rates)
-    y, following, stage = loop.state(loop.initial_state()), loop.state(), loop.state()
-    pushes, h = [tau if tau.any() else None for tau in schedule.torques], 0.0
-    for t, t_next, (start, middle, end), window, _, checked, logged, joined in steps(loop, clock, schedule):
-        push, now = pushes[window], loop.at(0.5 * (t + t_next))
-        signals = now.derive(start, y, push, k1)
-        step_error.add(t, y.v, h if joined else 0.0, k4.v - k1.v, k1.v)
-        h = t_next - t
-        if checked:
-            yield Sample(t, y.flat, schedule.torques[window], signals, logged)
-        now.derive(middle, stage.ahead(y, 0.5 * h, k1.flat), push, k2)
-        now.derive(middle, stage.ahead(y, 0.5 * h, k2.flat), push, k3)
-        now.derive(end, stage.ahead(y, h, k3.flat), push, k4)
-        y, following = now.settled(following.ahead(y, h / 6, _SIMPSON.dot(rates))), y
-    step_error.add(clock.end, y.v)
-    yield final(loop, clock, y.flat, schedule.torques[window])
+class Scipy:
+    """One of SciPy's methods with error control, restarted at every jump; its steps are its own.
 
-
-def adaptive(
-    loop: ClosedLoop,
-    clock: Clock,
-    schedule: DisturbanceSchedule,
-    method: str,
-    rtol: float,
-    atol: float,
-) -> Iterator[Sample]:
-    """One of SciPy's methods with error control, restarted at every jump.
+    Args:
+        loop: the closed loop.
+        clock: its instants.
+        method: one of `ADAPTIVE`.
+        rtol, atol: tolerances.
 
     Raises:
         InputError: LSODA outside the main thread, of a SciPy that has memory for one problem only.
     """
-    import scipy.integrate
 
-    _check_thread(method, scipy.__version__)
-    y = loop.initial_state()
-    logged = clock.logged
-    borders = np.concatenate(([0.0], clock.jumps, [clock.end]))
-    for t0, t1 in pairwise(borders):
-        disturbance = schedule.torque(0.5 * (t0 + t1))
-        rhs = _right_hand_side(loop.at(0.5 * (t0 + t1)), disturbance, t1)
-        instants = logged[(logged >= t0) & (logged < t1)]
-        solver = getattr(scipy.integrate, method)(rhs, t0, y, t1, rtol=rtol, atol=atol)
-        for t, state in _states(solver, instants):
-            yield _sample(loop, t, state, disturbance)
-        if solver.status == "failed":
-            raise _stuck(loop, method, solver.t, rhs(solver.t, solver.y))
-        y = solver.y.copy()
-    yield final(loop, clock, y, disturbance)
+    def __init__(self, loop: ClosedLoop, clock: Clock, method: str, rtol: float, atol: float):
+        import scipy
+
+        _check_thread(method, scipy.__version__)
+        self._loop, self._method, self._tolerances = loop, method, {"rtol": rtol, "atol": atol}
+        self._jumps = np.append(clock.jumps, clock.end)
+        self._solver: Any = None
+        self._output: Any = None
+
+    def carry(self, control: Control, step: Step, y: State, rate: State) -> State:
+        if not step.joined:
+            self._restart(control, step, y.flat)
+        return self._loop.state(self._at(step.t_next))
+
+    def _restart(self, control: Control, step: Step, y: np.ndarray) -> None:
+        import scipy.integrate
+
+        end = float(self._jumps[np.searchsorted(self._jumps, step.t, side="right")])
+        rhs, kind = _right_hand_side(control, step, end), getattr(scipy.integrate, self._method)
+        self._solver, self._output = kind(rhs, step.t, y.copy(), end, **self._tolerances), None
+
+    def _at(self, t: float) -> np.ndarray:
+        """The state at a time that has not been passed yet, or within the last step."""
+        solver, tries = self._solver, 0
+        while solver.t < t:
+            _step(solver)
+            self._output, tries = None, tries + 1
+            if solver.status == "failed" or tries > MAX_TRIES:
+                raise _stuck(self._loop, self._method, solver)
+        if solver.t == t:
+            return solver.y.copy()
+        if self._output is None:
+            self._output = solver.dense_output()
+        return self._output(t)
 
 
 def _check_thread(method: str, version: str) -> None:
@@ -131,22 +110,6 @@ def _check_thread(method: str, version: str) -> None:
         )
 
 
-def _states(solver: Any, instants: np.ndarray) -> Iterator[tuple[float, np.ndarray]]:
-    """The solver's state at every instant, as soon as it has got there; ends early if it fails."""
-    passed, tries = int(instants.size and instants[0] == solver.t), 0
-    if passed:
-        yield solver.t, solver.y
-    while solver.status == "running":
-        _step(solver)
-        tries += 1
-        count = int(np.searchsorted(instants, solver.t, side="right"))
-        if solver.status != "failed" and count > passed:
-            reached, passed, tries, output = instants[passed:count], count, 0, solver.dense_output()
-            yield from ((t, output(t)) for t in reached)  # one by one: bits do not depend on what is logged
-        if tries > MAX_TRIES:
-            solver.status = "failed"
-
-
 def _step(solver: Any) -> None:
     """One step; numbers that an implicit method cannot calculate with are a failure like others."""
     try:
@@ -157,74 +120,34 @@ def _step(solver: Any) -> None:
         solver.status = "failed"
 
 
-def _stuck(loop: ClosedLoop, method: str, t: float, y_dot: np.ndarray) -> NonFiniteError:
+def _stuck(loop: ClosedLoop, method: str, solver: Any) -> NonFiniteError:
     """The error of a method that cannot go on, with the robot whose state changes fastest."""
-    v_dot = np.nan_to_num(np.abs(loop.split(y_dot)[1]), nan=np.inf).max(axis=1)
+    rate = loop.state(solver.fun(solver.t, solver.y))
+    v_dot = np.nan_to_num(np.abs(rate.v), nan=np.inf).max(axis=1)
     i = int(v_dot.argmax())
     return NonFiniteError(
-        f"{method} got stuck at t = {t:g} s, where {loop.cell.names[i]} accelerates with "
+        f"{method} got stuck at t = {solver.t:g} s, where {loop.cell.names[i]} accelerates with "
         f"{v_dot[i]:.3g} rad/s²",
-        time=float(t),
+        time=float(solver.t),
         robot=i,
     )
 
 
-def steps(loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule) -> Iterator[Step]:
-    """Every step of the clock; all that come before an instant whose references cannot be had, and its error.
-
-    Raises:
-        SynctrlError: a desired motion or weight fails.
-    """
-
-    def make(first: int, last: int) -> list[Step]:
-        return list(_tabulated(loop, clock, clock.stretch(first, last), schedule))
-
-    for first, last in clock.stretches(BLOCK):
-        for made in up_to_a_failure(make, first, last):
-            yield from made
-
-
-def _tabulated(
-    loop: ClosedLoop, clock: Clock, stretch: Stretch, schedule: DisturbanceSchedule
-) -> Iterator[Step]:
-    """The steps of a stretch, their references evaluated together."""
-    table, n = loop.cell.reference_table(stretch.stages.ravel()), len(stretch.starts)
-    stages = (loop.cell.instants(table, slice(i * n, (i + 1) * n)) for i in range(3))
-    columns = stretch.number, stretch.checked, stretch.logged, clock.joined(stretch.first, stretch.starts)
-    return map(
-        Step,
-        stretch.starts.tolist(),
-        stretch.times[1:].tolist(),
-        zip(*stages, strict=True),
-        schedule.windows(stretch.middles).tolist(),
-        *(column.tolist() for column in columns),
-    )
-
-
-def _right_hand_side(
-    loop: ClosedLoop, disturbance: np.ndarray, end: float
-) -> Callable[[float, np.ndarray], np.ndarray]:
-    """t, y -> y' on a smooth interval, with values from the left at its end."""
+def _right_hand_side(control: Control, step: Step, end: float) -> Callable[[float, np.ndarray], np.ndarray]:
+    """t, y -> y' on a smooth interval that begins with a step, with values from the left at its end."""
+    loop = step.loop
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
         if not isfinite(t):  # the solver is lost, and nothing is desired then
             return np.full(loop.size, np.nan)
+        rate = loop.state(np.zeros(loop.size))
         reference = loop.cell.references(np.array([min(t, before(end))]))[0]
         try:
-            return loop.evaluate(reference, y, disturbance)[0]
+            control.rate(step, reference, loop.state(y), rate)
         except SynctrlError:
             raise
         except Exception as error:  # solvers have a meaning of their own for some
             raise user_failure(error, t) from error
+        return rate.flat
 
     return rhs
-
-
-def _sample(loop: ClosedLoop, t: float, y: np.ndarray, disturbance: np.ndarray) -> Sample:
-    reference = loop.cell.references(np.array([t]))[0]
-    return Sample(float(t), y, disturbance, loop.evaluate(reference, y, disturbance)[1])
-
-
-def final(loop: ClosedLoop, clock: Clock, y: np.ndarray, disturbance: np.ndarray) -> Sample:
-    """The sample at the end of the run."""
-    return _sample(loop, clock.end, y, disturbance)

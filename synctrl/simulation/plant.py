@@ -58,6 +58,7 @@ class Plant:
     time with the robots: of motors that lag, of joints that the controller does not know. It overrides
 
     - `hidden0`: that state at t = 0, (k,);
+    - `events` and `meet`: instants at which its state moves at once, by an impact or a catch, and how;
     - `move`: accelerations and the rate of that state, (k,), both finite and without side effects, for a
       method asks at states where the run never comes; what the package's plant does is `super().move(...)`;
     - `outputs`: arrays over time that the result gets beside those of every run, with units and axes;
@@ -89,6 +90,8 @@ class Plant:
 
     #: state of its own at t = 0, for instance of joints the controller does not know
     hidden0 = np.zeros(0)
+    #: instants at which `meet` is called, s; those before t = 0 and from the end of a run on do not come
+    events: Sequence[float] = ()
 
     def __init__(
         self,
@@ -143,6 +146,20 @@ class Plant:
         """
         at_rest = np.zeros_like(hidden) if hidden.size else hidden
         return self._dynamics(q, v, tau - self.friction(v) if self.rubs else tau), at_rest
+
+    def meet(
+        self, t: float, q: np.ndarray, v: np.ndarray, hidden: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The state after the event at time t, x+, of the one before it, x-; without side effects.
+
+        Runs ask the plant as it is from t on, `at(t)`, and go on from x+, which is what they log.
+
+        Args:
+            t: one of `events`, s.
+            q, v: joint positions and velocities, (n, nv), rad and rad/s.
+            hidden: the plant's own state, of the size of `hidden0`.
+        """
+        return q, v, hidden
 
     def friction(self, v: np.ndarray) -> np.ndarray:
         """Torque by which friction opposes the velocities v, (n, nv), N·m."""

@@ -1,23 +1,25 @@
-"""Collects samples of a run into the arrays of a Result."""
+"""Collects the instants of a run into the arrays of a Result."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..checks import printable
+from ..control.controller import Signals
+from .advance import Sample
 from .clock import Clock
 from .closed_loop import ClosedLoop
 from .damping import DampingLog
-from .integrators import Sample
 from .limits import limit_report, torque_limits
 from .memory import check_fits
 from .result import LAYOUT, Result, unit_of
 from .saturation import applied_output, saturation_report
+from .state import State
 
 
 class Recorder:
@@ -36,23 +38,26 @@ class Recorder:
         InputError: the log does not fit into memory.
     """
 
-    #: how often the numbers of an instant are in memory at the end of a run
-    copies = 1
-
     def __init__(self, loop: ClosedLoop, clock: Clock):
         self._loop, instants = loop, clock.rows
         lengths = {"time": instants, **sizes(loop)}
         shapes = {name: [lengths[d] for d in dimensions] for name, (dimensions, _) in LAYOUT.items()}
         shapes |= {name: [instants, *shape] for name, shape in own_states(loop).items()}
         numbers = sum(int(np.prod(shape[1:])) for shape in shapes.values())
-        check_fits(clock, 8 * self.copies * numbers)
-        self._arrays = self._allocate(shapes)
+        check_fits(clock, 8 * numbers)
+        self._arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
         self._rows = tuple(self._arrays[name] for name in LAYOUT)
         self._damping = DampingLog(instants, loop.cell.n)
         self.count, self.reached, self.state = 0, 0.0, loop.initial_state()
 
-    def _allocate(self, shapes: Mapping[str, list[int]]) -> dict[str, np.ndarray]:
-        return {name: np.zeros(shape) for name, shape in shapes.items()}
+    def add(self, sample: Sample) -> None:
+        """Log one instant."""
+        state = self._loop.state(sample.y)
+        at = Instant(sample, sample.signals, state, self._loop.controller.network.integral(state.memory))
+        for name, array in self._arrays.items():
+            array[self.count] = ROW[name](at)
+        self._damping.add(self.count, sample.signals)
+        self.count += 1
 
     def rows_ahead(self) -> list[np.ndarray]:
         """The part of every array not logged yet, in the order of `LAYOUT`, to be filled from outside."""
@@ -96,43 +101,36 @@ class Recorder:
         return Result(**arrays, info=described, outputs=outputs, experiment=experiment)
 
 
-class SampleRecorder(Recorder):
-    """A recorder that is told one sample at a time, and writes each as one row of numbers."""
+class Instant(NamedTuple):
+    """What a row of the log is read from: a sample, its signals, the parts of its state, and int epsilon."""
 
-    copies = 2  # the rows, and the arrays that are made of them at the end
-
-    def _allocate(self, shapes: Mapping[str, list[int]]) -> dict[str, np.ndarray]:
-        order = {name: shapes[name] for name in (*_SIGNALS, *_STATE, *own_states(self._loop))}
-        ends = np.cumsum([int(np.prod(shape[1:])) for shape in order.values()])
-        self._log = np.zeros((order["t"][0], ends[-1]))
-        self._logs_z, self._logs_memory = ADAPTATION_STATE in order, NETWORK_STATE in order
-        columns = np.split(self._log, ends[:-1], axis=1)
-        arrays = {name: part.reshape(order[name]) for name, part in zip(order, columns, strict=True)}
-        return {name: arrays[name] for name in shapes}
-
-    def add(self, sample: Sample) -> None:
-        """Log one instant."""
-        s, row, y = sample.signals, self._log[self.count], self._loop.state(sample.y)
-        integral = self._loop.controller.network.integral(y.memory)
-        task, command = s.task, s.command
-        row[0] = sample.t
-        values = (
-            task.motion[0], s.reference.desired[0], task.error[0], command.epsilon, command.e_star,
-            s.s_q, s.tau, sample.disturbance, y.motion, s.theta_hat, integral,
-            *([y.z] if self._logs_z else []), *([y.memory] if self._logs_memory else []), y.hidden,
-        )  # fmt: skip
-        np.concatenate([value.ravel() for value in values], out=row[1:])
-        self._damping.add(self.count, s)
-        self.count += 1
+    sample: Sample
+    signals: Signals
+    state: State
+    integral: np.ndarray
 
 
-#: what `SampleRecorder` writes, in order: first what the controller computed, then the parts of the state
-_SIGNALS = (
-    "t", "x", "x_desired", "tracking_error", "sync_error", "coupled_error", "v_error", "tau", "disturbance",
-)  # fmt: skip
-_STATE = "q", "v", "theta_hat", "sync_integral"
 #: outputs that have what an adaptation, a network and a plant have of their own in the state of the loop
 ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE = "adaptation_state", "network_state", "plant_state"
+#: how every array is read from an instant
+ROW: dict[str, Callable[[Instant], Any]] = {
+    "t": lambda at: at.sample.t,
+    "x": lambda at: at.signals.task.motion[0],
+    "x_desired": lambda at: at.signals.reference.desired[0],
+    "tracking_error": lambda at: at.signals.task.error[0],
+    "sync_error": lambda at: at.signals.command.epsilon,
+    "sync_integral": lambda at: at.integral,
+    "coupled_error": lambda at: at.signals.command.e_star,
+    "q": lambda at: at.state.q,
+    "v": lambda at: at.state.v,
+    "v_error": lambda at: at.signals.s_q,
+    "tau": lambda at: at.signals.tau,
+    "disturbance": lambda at: at.sample.disturbance,
+    "theta_hat": lambda at: at.signals.theta_hat,
+    ADAPTATION_STATE: lambda at: at.state.z,
+    NETWORK_STATE: lambda at: at.state.memory.ravel(),
+    PLANT_STATE: lambda at: at.state.hidden,
+}
 _STATE_AXES = {
     ADAPTATION_STATE: ("time", "robot", "state"),
     NETWORK_STATE: ("time", "network state"),

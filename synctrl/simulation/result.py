@@ -49,6 +49,9 @@ class Result:
     Raises:
         InputError: outputs that are not those that `info["outputs"]` speaks of, or of another shape.
 
+    A row is the state after whatever happens at its instant, with the torques that act from it on. At the end
+    nothing happens any more but a sample of sampled control, if one is due.
+
     Rows of robots with fewer joints or parameters than the largest are padded with zeros;
     `info["robots"]` has their numbers.
     """

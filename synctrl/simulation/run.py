@@ -1,4 +1,4 @@
-"""A planned run, and the three ways to make it; whatever ends it hands over what was computed."""
+"""A planned run, and the ways to make it; whatever ends it hands over what was computed."""
 
 from __future__ import annotations
 
@@ -11,16 +11,18 @@ import numpy as np
 from ..coupling.motion_checks import check_motions
 from ..coupling.reachability import SAMPLES, check_reachable
 from ..errors import RunInterrupted, SimulationError, SynctrlError
+from .advance import Sample, Solver, advance
 from .clock import Clock
 from .closed_loop import ClosedLoop
+from .continuous import Continuous
 from .diagnosis import diagnosed
 from .disturbances import DisturbanceSchedule
 from .guard import Guard
 from .handover import Progress, date, tell, user_failure
-from .integrators import Sample, adaptive, rk4
-from .recorder import Recorder, SampleRecorder
+from .integrators import RungeKutta, Scipy
+from .recorder import Recorder
 from .result import Result
-from .sampled import sampled_rk4
+from .sampled import Sampled
 from .step_error import StepError, step_report
 
 #: instants at which weights are looked at before a run, at most
@@ -61,20 +63,25 @@ class Run(NamedTuple):
             with suppress(SimulationError):  # weights that fail end the run, which hands over what it has
                 cell.coupling.check_weights(self.clock.spread(WEIGHT_SAMPLES), cell.m)
 
+    def samples(self, solver: Solver) -> Iterator[Sample]:
+        """What a solver makes of this run, see `advance`."""
+        loop, clock = self.loop, self.clock
+        if self.every is None:
+            return advance(loop, clock, self.schedule, Continuous(loop, clock, self.step_error), solver)
+        period = float(self.info["control_period"])
+        control = Sampled(loop, clock, self.every, period, self.step_error)
+        return advance(loop, clock, self.schedule, control, solver)
+
 
 def run_reference(run: Run, progress: Progress | None = None) -> Result:
     """A planned run by the reference engine and the fixed-step integrator."""
-    plan = run.loop, run.clock, run.schedule
-    if run.every is not None:
-        period = float(run.info["control_period"])
-        return collect(run, sampled_rk4(*plan, run.every, period, run.step_error), progress)
-    return collect(run, rk4(*plan, run.step_error), progress)
+    return collect(run, run.samples(RungeKutta(run.loop)), progress)
 
 
 def run_adaptive(run: Run, method: str, rtol: float, atol: float, progress: Progress | None = None) -> Result:
     """A planned run by one of SciPy's methods."""
     run.info.update(integrator=method, rtol=rtol, atol=atol)
-    return collect(run, adaptive(run.loop, run.clock, run.schedule, method, rtol, atol), progress)
+    return collect(run, run.samples(Scipy(run.loop, run.clock, method, rtol, atol)), progress)
 
 
 def collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> Result:
@@ -88,7 +95,7 @@ def collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> R
     Raises:
         SimulationError: the run had to stop; it carries what was logged.
     """
-    recorder, guard = SampleRecorder(run.loop, run.clock), Guard(run.loop)
+    recorder, guard = Recorder(run.loop, run.clock), Guard(run.loop)
 
     def log() -> None:
         for sample in samples:

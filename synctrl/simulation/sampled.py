@@ -7,8 +7,8 @@ robots: what it remembers is its own, and the plant is moved from one of its sam
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +17,9 @@ from ..control.discrete import DiscreteController
 from ..coupling.cell import Reference
 from .clock import Clock, multiple
 from .closed_loop import ClosedLoop
-from .disturbances import DisturbanceSchedule
-from .integrators import Sample, Step, steps
 from .state import State
 from .step_error import StepError
+from .steps import Step
 
 
 def steps_per_sample(period: float, dt: float) -> int:
@@ -32,92 +31,58 @@ def steps_per_sample(period: float, dt: float) -> int:
     return multiple("control_period", period, dt)
 
 
-def sampled_rk4(
-    loop: ClosedLoop,
-    clock: Clock,
-    schedule: DisturbanceSchedule,
-    every: int,
-    period: float,
-    step_error: StepError,
-) -> Iterator[Sample]:
-    """The plant by the classical Runge-Kutta method, under a controller that acts once in so many steps.
+class Sampled:
+    """`Control` that acts once in so many multiples of dt, while torque is held in between.
 
     Args:
         loop: the closed loop.
         clock: its instants.
-        schedule: disturbances.
         every: how many multiples of dt a sample lasts.
         period: the same in s, as the controller integrates it.
         step_error: told what the worst step was.
-
-    Yields:
-        One sample per multiple of dt. The torque of an instant is the one that acts from it on; at the end of
-        the run that of a new sample, if one is due.
-    """
-    control, y = _Control(loop, period), loop.state(loop.initial_state())
-    step_error.add(0.0, y.v)
-    for step in steps(loop, clock, schedule):
-        disturbance, now = schedule.torques[step.window], loop.at(0.5 * (step.t + step.t_next))
-        k1, signals = loop.state(np.zeros(loop.size)), None
-        if step.checked:
-            due = step.number % every == 0
-            signals = control.sample(step.t, y) if due else control.look(step.stages[0], y)
-        now.respond(y, control.tau, disturbance, k1)
-        if signals is not None:
-            loop.watch(y, signals, k1.v)
-            yield Sample(step.t, y.flat, disturbance, signals, step.logged)
-        y, gap = _rk4_step(now, step, y, k1, control.tau, disturbance)
-        control.carry(step.t_next, y)
-        step_error.add(step.t_next, y.v, step.t_next - step.t, gap)
-    at_end = control.sample if clock.sampled_at_end(every) else control.look_at
-    yield Sample(clock.end, y.flat, disturbance, at_end(clock.end, y))
-
-
-class _Control:
-    """The controller in the loop, and its estimates and memory on their way to its next sample.
-
-    Attributes:
-        tau: torque that it holds, (n, nv), N·m, before it is cut off.
     """
 
-    def __init__(self, loop: ClosedLoop, period: float):
-        self._loop, self._controller = loop, DiscreteController(loop.controller, period)
-        self._t = 0.0
-        self.tau = np.zeros((loop.cell.n, loop.cell.nv))
+    def __init__(self, loop: ClosedLoop, clock: Clock, every: int, period: float, step_error: StepError):
+        self._loop, self._every, self._step_error = loop, every, step_error
+        self._controller = DiscreteController(loop.controller, period)
+        self._at_end = self._sample if clock.sampled_at_end(every) else self._look_at
+        self._after = loop.state(np.zeros(loop.size))
+        step_error.add(0.0, loop.cell.v0)
 
-    def sample(self, t: float, y: State) -> Signals:
+    def begin(self, step: Step, y: State, rate: State) -> Signals:
+        due = step.checked and step.number % self._every == 0
+        signals = self._sample(step.t, y) if due else self._look(step.stages[0], y)
+        self.rate(step, step.stages[0], y, rate)
+        step.loop.watch(y, signals, rate.v)
+        return signals
+
+    def rate(self, step: Step, reference: Reference, y: State, rate: State) -> None:
+        step.loop.respond(y, self._tau, step.push, rate)
+
+    def arrive(self, step: Step, y: State, expected: Any = np.nan) -> None:
+        self.rate(step, step.stages[2], y, self._after)
+        self._step_error.add(step.t_next, y.v, step.h, expected - self._after.v)
+        since = step.t_next - self._t
+        y.z[...] = self._z + since * self._z_dot
+        y.memory[...] = self._memory + since * self._memory_dot
+
+    def finish(self, t: float, y: State) -> Signals:
+        return self._at_end(t, y)
+
+    def _sample(self, t: float, y: State) -> Signals:
         """Let the controller act on the state, which gets its estimates and memory."""
         controller = self._controller
-        self._t, self._z, self._memory = t, controller.z, controller.memory
+        self._t, self._z, self._memory = t, controller.z, controller.heard(t, y.motion)
         y.z[...], y.memory[...] = self._z, self._memory
         signals = controller.sample(t, y.motion)
         self._z_dot, self._memory_dot = np.array(signals.z_dot), np.array(signals.memory_dot)
-        self.tau = np.array(signals.tau)
+        self._tau = np.array(signals.tau)
         return signals
 
-    def carry(self, t: float, y: State) -> None:
-        """Put into the state how far estimates and memory have come at time t."""
-        y.z[...] = self._z + (t - self._t) * self._z_dot
-        y.memory[...] = self._memory + (t - self._t) * self._memory_dot
-
-    def look(self, reference: Reference, y: State) -> Signals:
+    def _look(self, reference: Reference, y: State) -> Signals:
         """What the law would compute between two samples, with the torque that is held."""
-        return replace(self._loop.look(reference, y), tau=self.tau)
+        return replace(self._loop.look(reference, y), tau=self._tau)
 
-    def look_at(self, t: float, y: State) -> Signals:
-        """`look` at time t, s."""
-        return self.look(self._loop.cell.references(np.array([t]))[0], y)
-
-
-def _rk4_step(
-    loop: ClosedLoop, step: Step, y: State, k1: State, tau: np.ndarray, disturbance: np.ndarray
-) -> tuple[State, np.ndarray]:
-    """The plant's state a step later, and by how much its acceleration there was guessed wrong, (n, nv)."""
-    h, stage = step.t_next - step.t, loop.state()
-    k2, k3, k4, k5 = (loop.state(row) for row in np.zeros((4, loop.size)))
-    loop.respond(stage.ahead(y, 0.5 * h, k1.flat), tau, disturbance, k2)
-    loop.respond(stage.ahead(y, 0.5 * h, k2.flat), tau, disturbance, k3)
-    loop.respond(stage.ahead(y, h, k3.flat), tau, disturbance, k4)
-    after = loop.state(y.flat + (h / 6) * (k1.flat + 2 * (k2.flat + k3.flat) + k4.flat))
-    loop.respond(after, tau, disturbance, k5)
-    return after, k4.v - k5.v
+    def _look_at(self, t: float, y: State) -> Signals:
+        """`_look` at time t, s."""
+        return self._look(self._loop.cell.references(np.array([t]))[0], y)

@@ -189,7 +189,9 @@ class Experiment:
         duration = self.duration if duration is None else duration
         loop = self.closed_loop(plant)
         schedule = DisturbanceSchedule(self.cell, self.disturbances)
-        edges = (*schedule.edges, *loop.plant.schedule.edges)
+        edges = [*schedule.edges, *loop.plant.schedule.edges, *loop.events]
+        if control_period is None:
+            edges += loop.messages.between(0.0, positive_number("duration", duration))
         clock = make_clock(duration, dt, edges, self.cell.breaks, log_dt)
         every = None if control_period is None else steps_per_sample(control_period, dt)
         info: dict[str, Any] = {"integrator": "rk4", "dt": float(dt), "duration": float(duration)}

@@ -46,15 +46,23 @@ def digest(arrays: Any) -> str:
 
 
 def _flow(setup: Setup, times: np.ndarray) -> list[np.ndarray]:
-    """y' of the closed loop at some instants, near its initial state: robots, friction, options and all."""
+    """y' of the closed loop at some instants, near its initial state: robots, friction, options and all.
+
+    Events of the plant come after it, each with what it makes of such a state.
+    """
     loop = setup.experiment.closed_loop()
     rng = np.random.default_rng(0)
     y, none = loop.initial_state(), np.zeros((loop.cell.n, loop.cell.nv))
     spread = 0.01 * _used(loop)
-    return [
+    flow = [
         loop.at(float(t)).evaluate(reference, y + spread * rng.standard_normal(y.size), none)[0]
         for t, reference in zip(times, loop.cell.references(times), strict=True)
     ]
+    for t in loop.events.tolist():
+        state = loop.state(y + spread * rng.standard_normal(y.size))
+        loop.at(t).meet(t, state)
+        flow += [np.array([t]), state.flat]
+    return flow
 
 
 def _used(loop: Any) -> np.ndarray:

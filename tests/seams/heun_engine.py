@@ -1,6 +1,5 @@
 """An engine of one's own: the trapezoidal predictor-corrector of second order, for continuous control."""
 
-from synctrl.simulation.integrators import Sample, final, steps
 from synctrl.simulation.run import collect
 
 
@@ -10,16 +9,11 @@ class Heun:
 
     def run(self, run, progress):
         run.info["engine"] = "Heun"
-        return collect(run, self.samples(run), progress)
+        return collect(run, run.samples(self), progress)
 
-    def samples(self, run):
-        y = run.loop.initial_state()
-        for step in steps(run.loop, run.clock, run.schedule):
-            push, h = run.schedule.torques[step.window], step.t_next - step.t
-            now = run.loop.at(0.5 * (step.t + step.t_next))
-            rate, signals = now.evaluate(step.stages[0], y, push)
-            if step.checked:
-                yield Sample(step.t, y, push, signals, step.logged)
-            ahead, _ = now.evaluate(step.stages[2], y + h * rate, push)
-            y = y + 0.5 * h * (rate + ahead)
-        yield final(run.loop, run.clock, y, push)
+    def carry(self, control, step, y, rate):
+        ahead, slope = step.loop.state(y.flat + step.h * rate.flat), step.loop.state()
+        control.rate(step, step.stages[2], ahead, slope)
+        after = step.loop.state(y.flat + 0.5 * step.h * (rate.flat + slope.flat))
+        control.arrive(step, after)
+        return after

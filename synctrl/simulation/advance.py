@@ -1,0 +1,130 @@
+"""The one loop through time: from each joint of the clock to the next, with events in between.
+
+At a joint the state arrives as x-. What falls there happens in this order:
+
+1. the plant changes: loads are picked up and put down, and its own events move its state;
+2. desired motions break, and torques from outside begin and end;
+3. messages of the network arrive, with continuous control;
+4. the controller takes a sample, with sampled control, and messages that are due with it.
+
+That gives x+, from which the state goes on to the next joint. The row of a logged instant is x+, with the
+torque and the push that act from it on. What falls on the end of a run belongs to a run that goes on from
+there; only a sample that is due is still taken, and its torque is in the last row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from ..control.controller import Signals
+from ..coupling.cell import Reference
+from .clock import Clock
+from .closed_loop import ClosedLoop
+from .disturbances import DisturbanceSchedule
+from .state import State
+from .steps import Step, steps
+
+
+class Sample(NamedTuple):
+    """State and signals at one instant, after its events, and whether it belongs into the log."""
+
+    t: float
+    y: np.ndarray
+    disturbance: np.ndarray
+    signals: Signals
+    logged: bool = True
+
+
+class Control(Protocol):
+    """Who says how fast the state changes, and what happens when a step begins: `Continuous`, `Sampled`."""
+
+    def begin(self, step: Step, y: State, rate: State) -> Signals:
+        """Let messages arrive and samples be taken, which make the state x+.
+
+        Args:
+            step: the step that begins.
+            y: the state, to be changed in place.
+            rate: where its rate goes.
+
+        Returns:
+            What the controller computed in x+.
+        """
+
+    def rate(self, step: Step, reference: Reference, y: State, rate: State) -> None:
+        """Write how fast the state changes within a step, where `reference` is desired."""
+
+    def arrive(self, step: Step, y: State, expected: Any = np.nan) -> None:
+        """Be told where a step has led.
+
+        Args:
+            step: the step.
+            y: the state at its end, to be changed in place.
+            expected: accelerations that the solver expected there, (n, nv), if it has an idea.
+        """
+
+    def finish(self, t: float, y: State) -> Signals:
+        """What the controller computes at the end of a run, s."""
+
+
+class Solver(Protocol):
+    """How the state gets across a step: `RungeKutta`, `Scipy`, or one of a user's own."""
+
+    def carry(self, control: Control, step: Step, y: State, rate: State) -> State:
+        """The state at the end of a step.
+
+        Args:
+            control: asked for rates; told by `arrive` of every step that the solver makes.
+            step: the step.
+            y: the state at its beginning, which the solver may use from now on.
+            rate: the rate there, valid until the next call.
+        """
+
+
+class Agenda:
+    """Instants, each of which comes up once.
+
+    Args:
+        instants: in any order, s; those before the run are left out.
+    """
+
+    def __init__(self, instants: Iterable[float]):
+        self._left = sorted((t for t in instants if t >= 0), reverse=True)
+
+    def until(self, t: float) -> list[float]:
+        """What comes up until time t, in order."""
+        due = []
+        while self._left and self._left[-1] <= t:
+            due.append(self._left.pop())
+        return due
+
+
+def advance(
+    loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule, control: Control, solver: Solver
+) -> Iterator[Sample]:
+    """Carry the initial state through time.
+
+    Args:
+        loop: the closed loop.
+        clock: its joints.
+        schedule: torques from outside.
+        control: what the controller does.
+        solver: how a step is made.
+
+    Yields:
+        One sample per multiple of dt, and one at the end. Its arrays are valid until the next one.
+
+    Raises:
+        SynctrlError: the run cannot go on.
+    """
+    y, rate, events = loop.state(loop.initial_state()), loop.state(np.zeros(loop.size)), Agenda(loop.events)
+    for step in steps(loop, clock, schedule):
+        for event in events.until(step.middle):
+            step.loop.meet(event, y)
+        signals = control.begin(step, y, rate)
+        if step.checked:
+            yield Sample(step.t, y.flat, step.push, signals, step.logged)
+        y = solver.carry(control, step, y, rate)
+    yield Sample(clock.end, y.flat, step.push, control.finish(clock.end, y))
