@@ -9,7 +9,7 @@ from .coupling.reachability import inverse_kinematics
 from .coupling.synchronization import SynchronizationFunction
 from .coupling.weights import SmoothWeights
 from .errors import SynctrlError
-from .moved import serve_old_names
+from .renamed import serve_old_names
 from .robots.base_parameters import BaseParameters
 from .robots.friction import Friction
 from .robots.friction_parameters import FrictionParameters

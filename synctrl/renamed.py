@@ -1,14 +1,51 @@
-"""Names and arguments of version 0.1 that are others today: they work, and warn with the new one."""
+"""Modules, names and arguments of version 0.1 that are others today: they work, and warn with the new one."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
 from typing import Any, TypeVar
 
 from .errors import warn
 
 T = TypeVar("T")
+
+#: rooms that modules have left, the room they are in now, and their names
+_MOVES = (
+    (
+        "tasks",
+        "coupling",
+        "cell coupling desired expansion graphs member_checks member_parameters motion_checks reachability "
+        "synchronization weight_checks weights",
+    ),
+    ("analysis", "paper", "baselines claims claims_a460 claims_planar judge matching trials"),
+    ("experiments", "paper", "batch judged reproduction theory"),
+    (
+        "show",
+        "paper",
+        "formulas judge_plots judge_section paper_sections plant_sections report step_section "
+        "theory_sections",
+    ),
+    ("simulation", "sweep", "prepared"),
+)
+_URDF = "checks", "document", "meshes", "reader", "writer", "xml"
+
+
+def _pairs() -> Iterator[tuple[str, str]]:
+    """Old and new names, within the package."""
+    for old, new, names in _MOVES:
+        yield from ((f"{old}.{name}", f"{new}.{name}") for name in names.split())
+    yield from ((f"robots.urdf_{name}", f"robots.urdf.{name}") for name in _URDF)
+
+
+#: old names and new ones
+MOVED = {f"{__package__}.{old}": f"{__package__}.{new}" for old, new in _pairs()}
+#: a room that is elsewhere as a whole
+_ROOM, _NEW_ROOM = f"{__package__}.simulation.compiled", f"{__package__}.compiled"
 
 
 def names_elsewhere(module: str, new_home: str, *names: str) -> Callable[[str], Any]:
@@ -52,3 +89,32 @@ def argument(function: str, old: str, given: T | None, new: str, value: T | None
 def tell(old: str, new: str) -> None:
     """Warn whoever called the package that something has another name now."""
     warn(f"{old} is deprecated: use {new}", DeprecationWarning)
+
+
+# -- modules -----------------------------------------------------------------------------------------------
+
+
+def new_name(name: str) -> str | None:
+    """Where a module of the package is now; None if it has not moved."""
+    if name == _ROOM or name.startswith(f"{_ROOM}."):
+        return _NEW_ROOM + name[len(_ROOM) :]
+    return MOVED.get(name)
+
+
+class _Moved(MetaPathFinder, Loader):
+    """Finds modules under their old names."""
+
+    def find_spec(self, name: str, path: Any, target: ModuleType | None = None) -> ModuleSpec | None:
+        return None if new_name(name) is None else ModuleSpec(name, self)
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Put the module that has moved in the place of this one."""
+        old, new = module.__name__, str(new_name(module.__name__))
+        tell(old, new)
+        sys.modules[old] = import_module(new)
+
+
+def serve_old_names() -> None:
+    """Let old names be imported; more than once does no harm."""
+    if not any(isinstance(finder, _Moved) for finder in sys.meta_path):
+        sys.meta_path.insert(0, _Moved())

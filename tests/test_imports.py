@@ -24,7 +24,6 @@ ROOMS = (
     "renamed",
     "checks",
     "files",
-    "moved",
     "robots",
     "tasks",
     "coupling",

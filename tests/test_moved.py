@@ -8,7 +8,7 @@ from importlib import import_module
 
 import pytest
 
-from synctrl.moved import MOVED, new_name
+from synctrl.renamed import MOVED, new_name
 
 OLD = [*MOVED, "synctrl.simulation.compiled", "synctrl.simulation.compiled.program"]
 

@@ -1,0 +1,39 @@
+"""The page about the house is true, and its examples run."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from pathlib import Path
+
+import test_imports
+
+from synctrl.errors import StepWarning
+
+DOCS = Path(__file__).parents[1] / "docs"
+PAGE = (DOCS / "architecture.md").read_text("utf-8")
+PICTURE = (DOCS / "architecture.svg").read_text("utf-8")
+
+
+def test_the_examples_of_the_page_run_one_after_another():
+    names: dict = {}
+    blocks = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    assert len(blocks) >= 7
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StepWarning)
+        for number, block in enumerate(blocks, start=1):
+            exec(compile(block, f"block {number} of docs/architecture.md", "exec"), names)
+
+
+def test_the_picture_has_the_rooms_from_the_ground_up():
+    words = re.findall(r'font-weight="bold"[^>]*>([^<]+)<', PICTURE)
+    floors = [word.split(", ") for word in reversed(words) if "/" not in word]
+    assert [room for floor in floors for room in floor] == list(test_imports.ROOMS)
+
+
+def test_every_room_and_every_file_that_the_page_names_is_there():
+    rooms = set(re.findall(r"^\| `(\w+)`", PAGE, flags=re.MULTILINE))
+    folders = {path.parent.name for path in test_imports.PACKAGE.glob("*/__init__.py")}
+    assert folders - {"_urdf"} <= rooms | {"tune"}
+    for name in re.findall(r"`((?:\w+/)+\w+\.py)`", PAGE):
+        assert (test_imports.PACKAGE / name).is_file() or (DOCS.parent / name).is_file(), name
