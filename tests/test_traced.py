@@ -27,12 +27,11 @@ SPACES = {
 
 def evaluated(function, *arguments: np.ndarray) -> list[np.ndarray]:
     """What a function of arrays makes of symbols, at these numbers."""
-    from synctrl.compiled.algebra import array_of, symbols_of
+    from synctrl.compiled.algebra import column_of, symbols
 
-    flat = [ca.SX.sym("x", argument.size) for argument in arguments]
-    symbols = [array_of(x).reshape(a.shape) for x, a in zip(flat, arguments, strict=True)]
-    traced = function(*symbols)
-    outputs = ca.Function("f", flat, [symbols_of(array.ravel()) for array in traced])
+    given = [symbols("x", *argument.shape) for argument in arguments]
+    traced = function(*given)
+    outputs = ca.Function("f", [*map(column_of, given)], [*map(column_of, traced)])
     found = outputs.call([argument.ravel() for argument in arguments])
     return [np.array(x).reshape(a.shape) for x, a in zip(found, traced, strict=True)]
 

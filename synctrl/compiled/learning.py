@@ -61,6 +61,8 @@ def trace_learning(controller: Controller) -> list[Learning | None]:
 def _traced(controller: Controller) -> list[Learning | None]:
     import casadi as ca
 
+    from .algebra import column_of
+
     cell, adaptation = controller.cell, controller.adaptation
     joints = [robot.nv for robot in cell.robots]
     counts = [len(parameters.theta) for parameters in cell.parameters]
@@ -75,27 +77,19 @@ def _traced(controller: Controller) -> list[Learning | None]:
     )
     found: list[Learning | None] = []
     for i, (nv, count) in enumerate(zip(joints, counts, strict=True)):
-        inputs = [_vector(z[i])]
-        seen = [*(_vector(part[i, :nv]) for part in motion), _vector(gradient[i, :count])]
-        estimate = ca.Function("estimate", inputs, [_vector(estimates[i, :count])])
-        rate = ca.Function("rate", [*inputs, *seen], [_vector(rates[i])])
+        inputs = [column_of(z[i])]
+        seen = [*(column_of(part[i, :nv]) for part in motion), column_of(gradient[i, :count])]
+        estimate = ca.Function("estimate", inputs, [column_of(estimates[i, :count])])
+        rate = ca.Function("rate", [*inputs, *seen], [column_of(rates[i])])
         found.append(Learning(size, estimate, rate))
     return found
 
 
 def _symbols(name: str, lengths: list[int], longest: int) -> np.ndarray:
     """Rows of symbols, (n, longest), padded with zeros."""
-    import casadi as ca
+    from .algebra import symbols
 
     rows = np.zeros((len(lengths), longest), dtype=object)
     for row, length in zip(rows, lengths, strict=True):
-        symbols = ca.SX.sym(name, length)
-        for k in range(length):
-            row[k] = symbols[k]
+        row[:length] = symbols(name, length)
     return rows
-
-
-def _vector(row: np.ndarray) -> Any:
-    import casadi as ca
-
-    return ca.densify(ca.vertcat(*row))

@@ -19,7 +19,7 @@ from ..control.commands import REFERENCE_ACCELERATIONS
 from ..robots.symbolic import Symbols
 from ..tasks.redundancy import Inversion, velocity_lost
 from ..tasks.spaces import Measurement
-from ..tasks.tips import Poses, Tip
+from ..tasks.tips import Poses, Positions
 from .algebra import SYMBOLS, array_of, column_of
 from .kind import Kind
 from .lawful import TracedLaw
@@ -27,8 +27,8 @@ from .learning import Learning
 from .quantities import DESIRED, FUNCTIONS, QUANTITIES, columns
 
 
-class TracedTip(Tip):
-    """The tip of a robot whose joint positions are symbols.
+class TracedTip:
+    """The tip of a robot whose joint positions are symbols, see `Kinematics`.
 
     Args:
         recursion: at these positions.
@@ -41,6 +41,10 @@ class TracedTip(Tip):
     def poses(self, q: np.ndarray, v: np.ndarray) -> Poses:
         x, R, J, J_dot = map(array_of, self._recursion.tip(column_of(v), *self._base))
         return np.stack((x[:, 0], J[:3] @ v)), R, J, J_dot
+
+    def positions(self, q: np.ndarray, v: np.ndarray) -> Positions:
+        moved, _, J, J_dot = self.poses(q, v)
+        return moved, J[:3], J_dot[:3]
 
 
 class Trace:

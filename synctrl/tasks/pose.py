@@ -63,6 +63,11 @@ class PoseSpace(TipSpace):
     def over(self, tips: Kinematics, inverse: InverseMap, square: ArrayLike) -> BoundPoseSpace:
         return BoundPoseSpace(tips, inverse, square, self.limits)
 
+    def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        pose, J, _ = robot.tip_kinematics(q, np.zeros(robot.nv))
+        _, e, J, _ = compare(target, pose.translation, pose.rotation, J)
+        return e, J
+
     def displacement(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
         """From one pose to another, (..., 6): a translation and, in world axes, a rotation vector."""
         turn = rotations.exp(end[..., 3:]) @ np.swapaxes(rotations.exp(start[..., 3:]), -1, -2)
@@ -82,17 +87,33 @@ class BoundPoseSpace(BoundTipSpace):
     def place(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
         v, (xd, xd_dot, xd_ddot) = motion[1], desired
         (position, _), R, J_t, J_t_dot = self._tips.poses(*motion)
-        J_w, J_w_dot, wd, wd_dot = J_t[..., 3:, :], J_t_dot[..., 3:, :], xd_dot[..., 3:], xd_ddot[..., 3:]
-        e_o, phi = rotations.log(np.stack((rotations.exp(xd[..., 3:]) @ R.mT, R)))
-        left = rotations.left_jacobian_inverse(e_o)
-        J = _below(J_t[..., :3, :], left.mT @ J_w)
-        x_dot, turning = np.matvec(J, v), np.matvec(left, wd)
-        left_dot = rotations.left_jacobian_inverse_dot(e_o, turning - x_dot[..., 3:])
-        J_dot = _below(J_t_dot[..., :3, :], left_dot.mT @ J_w + left.mT @ J_w_dot)
-        x, e = _beside(position, phi), _beside(xd[..., :3] - position, e_o)
+        x, e, J, left = compare(xd, position, R, J_t)
+        wd, wd_dot, x_dot = xd_dot[..., 3:], xd_ddot[..., 3:], np.matvec(J, v)
+        turning = np.matvec(left, wd)
+        left_dot = rotations.left_jacobian_inverse_dot(e[..., 3:], turning - x_dot[..., 3:])
+        J_o_dot = left_dot.mT @ J_t[..., 3:, :] + left.mT @ J_t_dot[..., 3:, :]
         turning_dot = np.matvec(left_dot, wd) + np.matvec(left, wd_dot)
         rates = np.stack((_beside(xd_dot[..., :3], turning), _beside(xd_ddot[..., :3], turning_dot)))
-        return Measurement(np.stack((x, x_dot)), np.stack((e, rates[0] - x_dot)), rates, J, J_dot=J_dot)
+        moved, error = np.stack((x, x_dot)), np.stack((e, rates[0] - x_dot))
+        return Measurement(moved, error, rates, J, J_dot=_below(J_t_dot[..., :3, :], J_o_dot))
+
+
+def compare(
+    target: np.ndarray, position: np.ndarray, R: np.ndarray, J: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Where a tip is, and by how much it misses a target.
+
+    Args:
+        target: position and rotation vector, (..., 6).
+        position, R, J: of the tip, (..., 3), (..., 3, 3) and (..., 6, nv).
+
+    Returns:
+        x and e, (..., 6), the J with e' = -J v, (..., 6, nv), and Jl^-1(e_o), (..., 3, 3).
+    """
+    e_o, phi = rotations.log(np.stack((rotations.exp(target[..., 3:]) @ R.mT, R)))
+    left = rotations.left_jacobian_inverse(e_o)
+    task_J = _below(J[..., :3, :], left.mT @ J[..., 3:, :])
+    return _beside(position, phi), _beside(target[..., :3] - position, e_o), task_J, left
 
 
 def _beside(linear: np.ndarray, angular: np.ndarray) -> np.ndarray:

@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike
 from ..checks import choice, instance, positive_number
 from ..errors import InputError
 from ..robots.robot import Robot
-from .redundancy import Damping, Inverse, InverseMap, Inversion, Redundancy, inverse_map
-from .tips import Kinematics, Tip, Tips
+from .redundancy import Damping, InverseMap, Inversion, Redundancy, inverse_map
+from .tips import Kinematics, Tips
 from .validity import WATCHED
 
 AXES = "xyz"
@@ -206,9 +206,7 @@ class TipSpace:
 
     def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Error e, (m,), of one robot against a target, (m,), and the J, (m, nv), with e' = -J v."""
-        tip = self.over(Tip(robot), Inverse(), [False])
-        task = tip.place(np.stack((q, np.zeros_like(q))), np.stack((target, *np.zeros((2, self.m)))))
-        return task.e, task.J  # type: ignore[return-value]
+        raise NotImplementedError
 
     def inverse_map(self, robots: Sequence[Robot]) -> InverseMap:
         """The way to the joints of these robots.
@@ -261,6 +259,10 @@ class CartesianSpace(TipSpace):
 
     def over(self, tips: Kinematics, inverse: InverseMap, square: ArrayLike) -> BoundCartesianSpace:
         return BoundCartesianSpace(tips, inverse, square, self.limits, self.rows)
+
+    def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        pose, J, _ = robot.tip_kinematics(q, np.zeros(robot.nv))
+        return target - pose.translation[self.rows], J[self.rows]
 
     def __repr__(self) -> str:
         return f"CartesianSpace('{self.axes}')"

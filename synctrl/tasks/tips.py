@@ -26,21 +26,6 @@ class Kinematics(Protocol):
         """Positions and velocities, (2, ..., 3); rotation matrices, (..., 3, 3); then (..., 6, nv), twice."""
 
 
-class Tip:
-    """The tip of one robot: `Kinematics` without a leading axis."""
-
-    def __init__(self, robot: Robot):
-        self._robot = robot
-
-    def positions(self, q: np.ndarray, v: np.ndarray) -> Positions:
-        moved, _, J, J_dot = self.poses(q, v)
-        return moved, J[:3], J_dot[:3]
-
-    def poses(self, q: np.ndarray, v: np.ndarray) -> Poses:
-        pose, J, J_dot = self._robot.tip_kinematics(q, v)
-        return np.stack((pose.translation, J[:3] @ v)), pose.rotation, J, J_dot
-
-
 class Tips:
     """Where the tips of robots are and how they move with the joints, in world axes."""
 
