@@ -1,14 +1,10 @@
-"""Arrays of symbols, and the linear algebra of one robot's matrices of them.
-
-Only what traces imports this module: it needs CasADi.
-"""
+"""Arrays of CasADi symbols, and the linear algebra of one robot's matrices of them."""
 
 from __future__ import annotations
 
 from itertools import combinations
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from ..tasks.algebra import Algebra, two_by_two
@@ -27,12 +23,16 @@ def array_of(symbols: Any, *shape: int) -> np.ndarray:
 
 def column_of(array: Any) -> Any:
     """The entries of an array, row by row, as a dense CasADi column."""
+    import casadi as ca
+
     entries = np.ravel(array)
     return ca.densify(ca.vertcat(*entries)) if entries.size else ca.SX.zeros(0, 1)
 
 
 def symbols(name: str, *shape: int) -> np.ndarray:
     """An array of new symbols."""
+    import casadi as ca
+
     return array_of(ca.SX.sym(name, int(np.prod(shape))), *shape)
 
 
@@ -41,6 +41,8 @@ def _inverse(A: np.ndarray) -> np.ndarray:
     rows = len(A)
     if rows == 2:
         return two_by_two(A)
+    import casadi as ca
+
     given = ca.SX.sym("A", rows, rows)
     inverse = ca.inv_minor(given) if rows <= 3 else ca.solve(given, ca.SX.eye(rows))
     function = ca.Function("inverse", [given], [inverse])
@@ -49,22 +51,22 @@ def _inverse(A: np.ndarray) -> np.ndarray:
 
 def _determinant(A: np.ndarray) -> np.ndarray:
     """By Laplace's expansion, row after row; every minor is computed once."""
-    minors: dict[tuple[int, ...], Any] = {(): ca.SX(1)}
+    minors: dict[tuple[int, ...], Any] = {(): np.ones(1)}
     for row, entries in enumerate(A):
         minors = {
             columns: sum(
-                (-1) ** (row - k) * entries[j] * minors[columns[:k] + columns[k + 1 :]]
+                (-1) ** (row - k) * entries[j : j + 1] * minors[columns[:k] + columns[k + 1 :]]
                 for k, j in enumerate(columns)
             )
             for columns in combinations(range(len(A)), row + 1)
         }
-    return array_of(*minors.values(), 1)
+    return minors[tuple(range(len(A)))]
 
 
 def _smallest(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """By Jacobi's method: A is turned in one plane after another until it is diagonal."""
     rows = len(A)
-    A, V, below = A.copy(), array_of(ca.SX(ca.DM.eye(rows))), np.tril_indices(rows, -1)
+    A, V, below = A.copy(), np.eye(rows).astype(object), np.tril_indices(rows, -1)
     for _ in range(1 if rows <= 2 else SWEEPS):
         for plane in combinations(range(rows), 2):
             turn = _turn(A, *plane)
@@ -81,11 +83,12 @@ def _smallest(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _turn(A: np.ndarray, p: int, q: int) -> np.ndarray:
     """The rotation by the smaller angle after which A[p, q] is zero, (2, 2)."""
-    gap, off = A[q, q] - A[p, p], 2 * A[p, q]
-    tangent = (1 - 2 * (gap < 0)) * off / (abs(gap) + ca.sqrt(gap**2 + off**2 + 1e-300))
-    cosine = 1 / ca.sqrt(1 + tangent**2)
+    gap, off = A[q : q + 1, q] - A[p : p + 1, p], 2 * A[p : p + 1, q]
+    sign = 1 - 2 * np.less(gap, 0, dtype=object)
+    tangent = sign * off / (abs(gap) + np.sqrt(gap**2 + off**2 + 1e-300))
+    cosine = 1 / np.sqrt(1 + tangent**2)
     sine = tangent * cosine
-    return array_of(ca.vertcat(cosine, sine, -sine, cosine), 2, 2)
+    return np.concatenate((cosine, sine, -sine, cosine)).reshape(2, 2)
 
 
 #: of symbols, of one robot

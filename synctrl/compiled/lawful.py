@@ -19,6 +19,7 @@ from ..control.laws import Asked, BoundLaw, Errors
 from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.cell import Cell
 from ..errors import InputError
+from .algebra import column_of, symbols
 
 #: what a law is a function of, (m,) each; the weights come after them
 ROWS = ("e", "e_dot", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot", "E", "sigma", "sigma_dot")
@@ -62,8 +63,6 @@ def trace_law(controller: Controller) -> list[TracedLaw | None]:
 
 def _traced(law: BoundLaw, n: int, m: int) -> list[TracedLaw | None]:
     import casadi as ca
-
-    from .algebra import column_of, symbols
 
     rows = {name: symbols(name, n, m) for name in ROWS}
     weights = {name: symbols(name, n, m, m) for name in WEIGHTS}

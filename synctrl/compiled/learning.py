@@ -15,6 +15,7 @@ from ..control.adaptation import Seen
 from ..control.adaptation.gradient import BoundGradient
 from ..control.controller import Controller
 from ..errors import InputError
+from .algebra import column_of, symbols
 
 #: what a rate is a function of, beside z and the gradient
 MOTION = ("q", "v", "v_ref", "a_ref", "s_q")
@@ -61,8 +62,6 @@ def trace_learning(controller: Controller) -> list[Learning | None]:
 def _traced(controller: Controller) -> list[Learning | None]:
     import casadi as ca
 
-    from .algebra import column_of
-
     cell, adaptation = controller.cell, controller.adaptation
     joints = [robot.nv for robot in cell.robots]
     counts = [len(parameters.theta) for parameters in cell.parameters]
@@ -87,8 +86,6 @@ def _traced(controller: Controller) -> list[Learning | None]:
 
 def _symbols(name: str, lengths: list[int], longest: int) -> np.ndarray:
     """Rows of symbols, (n, longest), padded with zeros."""
-    from .algebra import symbols
-
     rows = np.zeros((len(lengths), longest), dtype=object)
     for row, length in zip(rows, lengths, strict=True):
         row[:length] = symbols(name, length)

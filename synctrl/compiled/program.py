@@ -27,6 +27,7 @@ from .kind import Classified, Kind, classify
 from .known import check_known, check_untouched
 from .quantities import DESIRED, checked, owned_by, shape
 from .specimen import Specimen
+from .trace import Trace
 
 #: relative difference between generated code and the reference engine above which the code is refused
 AGREEMENT = 1e-9
@@ -35,8 +36,6 @@ AGREEMENT = 1e-9
 def generate(kinds: list[Kind]) -> Iterator[str]:
     """C sources one after another: one per function of each kind of robot, and the driver."""
     import casadi as ca
-
-    from .trace import Trace
 
     for k, kind in enumerate(kinds):
         for function in Trace(kind, f"kind{k}").functions():

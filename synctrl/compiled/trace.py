@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from ..control import law
@@ -56,10 +55,12 @@ class Trace:
     """
 
     def __init__(self, kind: Kind, name: str):
-        self.kind, self.name = kind, name
-        self.given = {key: ca.SX.sym(key, columns(key, kind.sizes)) for key in QUANTITIES}
+        import casadi as ca
+
+        self.ca, self.kind, self.name = ca, kind, name
+        self.given = {key: self.ca.SX.sym(key, columns(key, kind.sizes)) for key in QUANTITIES}
         self.q, self.v = self.given["q"], self.given["v"]
-        still = Symbols(kind.fixed, self.q, ca.sin(self.q), ca.cos(self.q))
+        still = Symbols(kind.fixed, self.q, self.ca.sin(self.q), self.ca.cos(self.q))
         posture = self._row("W_inv"), self._row("posture"), self._row("gain")
         self.space: Any = kind.bound(TracedTip(still, self._base()), posture, SYMBOLS)
 
@@ -170,7 +171,7 @@ class Trace:
             torque, gradient = self._model(z, *motion)
             return array_of(torque, -1), law.adaptation(array_of(gradient, -1), self._row("Gamma"))
         theta_hat = self.given["theta_hat"]
-        parts = ca.substitute([*self._model(theta_hat, *motion)], [theta_hat], [learning.estimate(z)])
+        parts = self.ca.substitute([*self._model(theta_hat, *motion)], [theta_hat], [learning.estimate(z)])
         z_dot = learning.rate(z, self.q, self.v, *motion, parts[1])
         return array_of(parts[0], -1), array_of(z_dot)
 
@@ -178,21 +179,21 @@ class Trace:
         """Y theta_hat, and Y^T s_q as the derivative of s_q^T Y theta_hat with respect to theta_hat."""
         kind = self.kind
         rigid = theta_hat[: kind.rigid_parameters]
-        pi = rigid if kind.matrix is None else ca.mtimes(ca.SX(kind.matrix), rigid)
+        pi = rigid if kind.matrix is None else self.ca.mtimes(self.ca.SX(kind.matrix), rigid)
         torque = self._recursion().torque(pi, self.v, v_ref, a_ref, self._gravity())
         if kind.smoothing is not None:
-            columns = [v_ref, ca.tanh(self.v / kind.smoothing), *([a_ref] if kind.rotors else [])]
+            columns = [v_ref, self.ca.tanh(self.v / kind.smoothing), *([a_ref] if kind.rotors else [])]
             rubbing = theta_hat[kind.rigid_parameters :]
             torque += sum(rubbing[k * kind.nv : (k + 1) * kind.nv] * c for k, c in enumerate(columns))
-        return torque, ca.jtimes(torque, theta_hat, s_q, True)
+        return torque, self.ca.jtimes(torque, theta_hat, s_q, True)
 
     # -- the plant ----------------------------------------------------------------------------------------
 
     def plant(self) -> Any:
         """v' = M^-1 (tau - C v - g), through a Cholesky factor of M."""
         pi, recursion = self.given["pi"], self._recursion()
-        bias = recursion.torque(pi, self.v, self.v, ca.SX.zeros(self.kind.nv), self._gravity())
-        v_dot = _solve_positive(recursion.mass_matrix(pi), self.given["moving"] - bias)
+        bias = recursion.torque(pi, self.v, self.v, self.ca.SX.zeros(self.kind.nv), self._gravity())
+        v_dot = _solve_positive(self.ca, recursion.mass_matrix(pi), self.given["moving"] - bias)
         return self._function("plant", v_dot=array_of(v_dot))
 
     # -- symbols and arrays -------------------------------------------------------------------------------
@@ -202,8 +203,8 @@ class Trace:
         inputs, outputs = FUNCTIONS[name]
         given = [self.given[key] for key in inputs]
         found = [computed.get(key) for key in outputs]
-        results = ca.cse([column_of([] if array is None else array) for array in found])
-        return ca.Function(f"{self.name}_{name}", given, results, [*inputs], [*outputs])
+        results = self.ca.cse([column_of([] if array is None else array) for array in found])
+        return self.ca.Function(f"{self.name}_{name}", given, results, [*inputs], [*outputs])
 
     def _recursion(self) -> Symbols:
         """At joint positions of which sine and cosine are known."""
@@ -211,12 +212,12 @@ class Trace:
 
     def _base(self) -> tuple[Any, Any]:
         shared, base = self.kind.base_rotation, self.given["base"]
-        rotation = ca.reshape(base[:9], 3, 3).T if shared is None else ca.SX(shared)
+        rotation = self.ca.reshape(base[:9], 3, 3).T if shared is None else self.ca.SX(shared)
         return rotation, base[9:]
 
     def _gravity(self) -> Any:
         """Gravity in the frame of the first joint's placement."""
-        return ca.mtimes(self._base()[0].T, ca.SX(ca.DM(self.kind.gravity)))
+        return self.ca.mtimes(self._base()[0].T, self.ca.SX(self.ca.DM(self.kind.gravity)))
 
     def _weights(self) -> np.ndarray:
         return array_of(self.given["weights"], 4, self.kind.m, self.kind.m)
@@ -226,7 +227,7 @@ class Trace:
         return array_of(self.given[name], -1)
 
 
-def _solve_positive(M: Any, b: Any) -> Any:
+def _solve_positive(ca: Any, M: Any, b: Any) -> Any:
     """M^-1 b for a symmetric positive definite matrix, by M = L D L^T without pivoting."""
     n = M.shape[0]
     L, LD = ca.SX.eye(n), ca.SX.zeros(n, n)
