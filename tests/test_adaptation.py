@@ -25,21 +25,11 @@ ADAPTATIONS = {
 }
 
 
-class Products:
-    """A regressor of random numbers."""
-
-    def __init__(self, Y: np.ndarray):
-        self.Y = Y
-
-    def times(self, x: np.ndarray) -> np.ndarray:
-        return np.matvec(self.Y, x)
-
-
 def seen(rng: np.random.Generator) -> Seen:
     """Random signals with a gradient that belongs to them."""
     q, v, v_ref, a_ref, s_q = rng.standard_normal((5, 2, 3))
     Y = rng.standard_normal((2, 3, 30))
-    return Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Products(Y))
+    return Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Y)
 
 
 def some_state(bound, rng: np.random.Generator) -> np.ndarray:

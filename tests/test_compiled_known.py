@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from cells import SMALL_GAINS, small_cell
 from seams.lagging_network import Lagging
-from seams.pulling_law import BoundPulling
 
 from synctrl import (
     CartesianSpace,
@@ -30,7 +29,7 @@ from synctrl import (
     load_robot,
 )
 from synctrl.compiled import program
-from synctrl.control import commands, law, structure
+from synctrl.control import law
 from synctrl.control.controller import Controller
 from synctrl.errors import InputError
 from synctrl.robots.base_parameters import BaseParameters
@@ -231,18 +230,6 @@ REPLACED = {
         lambda: with_own(lambda loop: loop.controller, "evaluate", Damped.evaluate),
         r"Controller\.evaluate",
     ),
-    "the damping of one controller": (
-        lambda: with_own(lambda loop: loop.controller, "_damping", lambda *_: np.zeros((2, 2))),
-        "damping",
-    ),
-    "the law of one controller": (
-        lambda: with_own(lambda loop: loop.controller, "_command", print),
-        "law of the controller",
-    ),
-    "the law behind one controller": (
-        lambda: with_own(lambda loop: loop.controller, "law", BoundPulling(1.0, np.ones(2))),
-        "law that was replaced",
-    ),
     "a gain of one law": (
         lambda: with_own(lambda loop: loop.controller.law, "beta", np.full(2, 7.0)),
         "beta was changed",
@@ -254,10 +241,6 @@ REPLACED = {
     "the network of one controller": (
         lambda: with_own(lambda loop: loop.controller, "network", Lagging(0.1).bind(small_cell())),
         "network .*BoundLagging",
-    ),
-    "the options of one controller": (
-        lambda: with_own(lambda loop: loop.controller, "k_r_space", "task"),
-        "damping",
     ),
     "a gain of one controller": (
         lambda: with_own(lambda loop: loop.controller, "Lambda", np.full(2, 7.0)),
@@ -339,16 +322,17 @@ def dressed(function):
 CLASSES = {
     "a method": (Controller, "evaluate", lambda *_: None),
     "a computed attribute": (Robot, "gravity_vector", property(lambda self: np.zeros(3))),
-    "a line of the law": (law, "synchronizing_force", lambda c, sigma, K_eps: 0 * sigma),
-    "a command": (commands, "couple", lambda coupling, w, integral: (w, w)),
-    "what a command imports": (commands, "structured", lambda c, rows: c),
-    "a structure": (structure, "structured", lambda c, rows: c),
+    "a line of the law": (law, "compute_joint_command", lambda asked, *_: asked),
+    "another line of the law": (law, "compute_weighted_errors", lambda c, c_dot, error: error),
     "a dressed method": (Controller, "evaluate", dressed(Controller.evaluate)),
-    "a dressed line of the law": (law, "torque", dressed(law.torque)),
-    "a dressed command": (commands, "couple", dressed(commands.couple)),
-    "a dressed command with a memory": (commands, "couple", cache_of_results(dressed(commands.couple))),
+    "a dressed line of the law": (law, "compute_joint_command", dressed(law.compute_joint_command)),
+    "a dressed line with a memory": (
+        law,
+        "compute_joint_command",
+        cache_of_results(dressed(law.compute_joint_command)),
+    ),
     "a function of a space": (spaces, "inverse_map", dressed(spaces.inverse_map)),
-    "a partial command": (commands, "couple", partial(commands.couple)),
+    "a partial line": (law, "compute_joint_command", partial(law.compute_joint_command)),
 }
 
 
@@ -359,12 +343,6 @@ def test_what_was_exchanged_in_the_package_itself_is_refused(cache, name, monkey
     with pytest.raises(InputError, match=CLASSES[name][1]):
         experiment.plan(0.01, 1e-3)
         program.Program(experiment.closed_loop())
-
-
-def test_a_reference_acceleration_of_a_user_is_refused(cache, monkeypatch):
-    monkeypatch.setitem(commands.REFERENCE_ACCELERATIONS, "mine", lambda c_inv, c_dot, u_dot, *_: u_dot)
-    with pytest.raises(InputError, match="reference acceleration"):
-        plain(reference_acceleration="mine").simulate(0.01, engine="compiled")
 
 
 def test_motions_weights_and_disturbances_of_a_user_are_traced(cache):

@@ -13,6 +13,7 @@ from synctrl import Cell, Friction, FrictionParameters, LinearParameters, load_r
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair
 from synctrl.experiments.a460_pair import FRICTION
+from synctrl.robots.friction_parameters import friction_diagonals, with_friction_columns
 from synctrl.robots.parameters import planar_two_link_parameters
 
 
@@ -47,6 +48,24 @@ def test_what_the_proof_needs_holds_with_friction(seed: int) -> None:
     left = robot.mass_matrix(q) @ s_dot + robot.coriolis_matrix(q, v) @ s
     right = parameters.regressor(q, v, v_ref, a_ref) @ parameters.theta - friction.viscous * s - tau
     np.testing.assert_allclose(left, right, atol=1e-8 * (1 + np.abs(right).max()))
+
+
+@pytest.mark.parametrize("armature", [True, False])
+def test_the_columns_of_friction_are_those_of_each_robot_alone_and_can_be_traced(armature: bool) -> None:
+    ca = pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    rng = np.random.default_rng(0)
+    v, v_ref, a_ref = rng.normal(size=(3, 4, 3))
+    Y_b, smoothing = rng.normal(size=(4, 3, 5)), rng.uniform(0.01, 1, (4, 1))
+    together = with_friction_columns(Y_b, v, v_ref, a_ref, smoothing, armature)
+    symbols = [np.array(ca.vertsplit(ca.SX.sym(name, 3)), dtype=object) for name in ("v", "v_ref", "a_ref")]
+    for i, width in enumerate(smoothing[:, 0]):
+        motion = v[i], v_ref[i], a_ref[i]
+        alone = with_friction_columns(Y_b[i], *motion, width, armature)
+        np.testing.assert_array_equal(together[i], alone)
+        traced = np.stack(friction_diagonals(*symbols, width, armature)).ravel()
+        found = ca.Function("columns", [ca.vertcat(*row) for row in symbols], [ca.vertcat(*traced)])(*motion)
+        diagonals = [np.diagonal(alone[:, k : k + 3]) for k in range(5, alone.shape[1], 3)]
+        np.testing.assert_allclose(np.array(found)[:, 0], np.concatenate(diagonals), rtol=1e-14)
 
 
 def friction_run(duration: float, **options):

@@ -12,6 +12,8 @@ from machines import seeds
 
 from synctrl import Cell, Coupling, simulate
 from synctrl.control import law
+from synctrl.control.laws import Errors
+from synctrl.control.laws.sun_mills import BoundSunMills
 from synctrl.errors import CouplingWarning
 from synctrl.simulation.simulate import Experiment
 
@@ -64,7 +66,7 @@ def test_the_reference_acceleration_is_the_derivative_of_the_reference_velocity(
     # with full matrices c that change with time; in joint space v_ref is xref', otherwise J^-1 xref'
     loop, y, now = case(seed, space=space, coupling=coupling)
     assert_rate(loop, y, lambda t, y, s: s.v_ref, now.a_ref)
-    assert_rate(loop, y, lambda t, y, s: law.times(s.reference.c_inv, s.u), xref_ddot(now))
+    assert_rate(loop, y, lambda t, y, s: np.matvec(s.reference.c_inv, s.u), xref_ddot(now))
 
 
 def xref_ddot(now) -> np.ndarray:
@@ -81,7 +83,7 @@ def test_the_papers_reference_acceleration_differs_by_what_erratum_three_says(se
     _, _, exact = case(seed, space=space, coupling=coupling)
     _, _, paper = case(seed, space=space, coupling=coupling, reference_acceleration="paper")
     c_inv, c_dot = exact.reference.c_inv, exact.reference.c_dot
-    surplus = law.times(c_inv, law.times(c_dot, law.times(c_inv, exact.r)))
+    surplus = np.matvec(c_inv, np.matvec(c_dot, np.matvec(c_inv, exact.r)))
     np.testing.assert_allclose(xref_ddot(paper) - xref_ddot(exact), surplus, rtol=1e-9, atol=1e-9)
     np.testing.assert_array_equal(paper.v_ref, exact.v_ref)
 
@@ -266,57 +268,90 @@ def test_c_times_a_number_and_k_eps_over_its_square_is_the_same_motion(number):
 # -- plain arithmetic -------------------------------------------------------------------------------------
 
 
-def test_one_robot_alone_is_a_row_of_many():
+LAWS = pytest.mark.parametrize("reference_acceleration", ["exact", "paper"])
+
+
+class Bent:
+    """Ways from task to joints that are plain array arithmetic: v_ref = 2 xref'."""
+
+    def to_joints(self, task, xref_dot, xref_ddot):
+        return 2 * xref_dot, 2 * xref_ddot - xref_dot
+
+    def to_torque(self, task, force):
+        return 2 * force
+
+
+def whole_order(reference_acceleration, k_r_space, numbers):
+    """All lines from errors to torque, for arrays of any numbers, with or without a leading axis."""
+    x = dict(numbers)
+    Lambda, beta, K_eps, K_r, v = (x.pop(name) for name in ("Lambda", "beta", "K_eps", "K_r", "v"))
+    w, w_dot = law.compute_weighted_errors(x["c"], x["c_dot"], np.array((x["e"], x["e_dot"])))
+    errors = Errors.from_rows(**x, w=w, w_dot=w_dot)
+    asked = BoundSunMills(Lambda, beta, K_eps, reference_acceleration).command(errors)
+    return *asked, *law.compute_joint_command(asked, errors, v, Bent(), K_r, k_r_space)
+
+
+def some_numbers(rows, draw):
+    """Random inputs of `whole_order`: one row per robot, and gains that are the same for all."""
+    names = "e", "e_dot", "x_dot", "xd_dot", "xd_ddot", "E", "sigma", "sigma_dot", "K_r", "v"
+    found = {name: draw(rows, 3) for name in names}
+    found |= {name: draw(rows, 3, 3) for name in ("c", "c_dot", "c_ddot", "c_inv")}
+    return found | {name: draw(3) for name in GAINS_OF_ALL}
+
+
+GAINS_OF_ALL = "Lambda", "beta", "K_eps"
+
+
+@LAWS
+@pytest.mark.parametrize("k_r_space", ["joint", "task"])
+def test_one_robot_alone_is_a_row_of_many(reference_acceleration, k_r_space):
     rng = np.random.default_rng(0)
-    rows = {
-        name: rng.normal(size=(5, 3)) for name in ("xd_dot", "xd_ddot", "e", "e_dot", "sigma", "sigma_dot")
-    }
-    c, c_dot, c_ddot = rng.normal(size=(3, 5, 3, 3))
-    Lambda, beta = rng.normal(size=(2, 3))
-
-    def command_dot(pick):
-        r = {name: pick(row) for name, row in rows.items()}
-        w_dot = law.weighted_error_dot(pick(c), pick(c_dot), r["e"], r["e_dot"])
-        return law.command_dot(
-            pick(c), pick(c_dot), pick(c_ddot), r["xd_dot"], r["xd_ddot"], r["e"], r["e_dot"], w_dot,
-            r["sigma"], r["sigma_dot"], beta, Lambda,
-        )  # fmt: skip
-
-    together = command_dot(lambda array: array)
+    numbers = some_numbers(5, lambda *shape: rng.normal(size=shape))
+    together = whole_order(reference_acceleration, k_r_space, numbers)
     for i in range(5):
-        np.testing.assert_allclose(
-            command_dot(lambda array, i=i: array[i]), together[i], rtol=1e-13, atol=1e-13
-        )
+        one = {name: array if name in GAINS_OF_ALL else array[i] for name, array in numbers.items()}
+        alone = whole_order(reference_acceleration, k_r_space, one)
+        for mine, rows in zip(alone, together, strict=True):
+            row = rows[:, i] if rows.ndim == 3 else rows[i]
+            np.testing.assert_allclose(mine, row, rtol=1e-13, atol=1e-13)
 
 
-def test_the_law_never_asks_what_its_numbers_are():
+@LAWS
+@pytest.mark.parametrize("k_r_space", ["joint", "task"])
+def test_the_order_of_the_law_never_asks_what_its_numbers_are(reference_acceleration, k_r_space):
     rng = np.random.default_rng(1)
 
     def fractions(*shape):
         return np.vectorize(Fraction)(rng.integers(-9, 10, shape), rng.integers(1, 10, shape))
 
-    c, c_dot, c_inv = (fractions(2, 3, 3) for _ in range(3))
-    e, xd_dot, sigma, u_dot, E, x_dot = (fractions(2, 3) for _ in range(6))
-    Lambda, beta = fractions(3), fractions(3)
+    numbers = some_numbers(2, fractions)
+    exact, rounded = (
+        whole_order(reference_acceleration, k_r_space, some)
+        for some in (numbers, {name: array.astype(float) for name, array in numbers.items()})
+    )
+    for one, other in zip(exact, rounded, strict=True):
+        assert all(isinstance(value, Fraction) for value in one.ravel())
+        np.testing.assert_allclose(one.astype(float), other, rtol=1e-12, atol=1e-12)
 
-    def chain(c, c_dot, c_inv, e, xd_dot, sigma, u_dot, E, x_dot, Lambda, beta):
-        e_star = law.coupled_error(law.weighted_error(c, e), E, beta)
-        u = law.command(c, c_dot, xd_dot, e, sigma, e_star, beta, Lambda)
-        r = law.coupled_velocity_error(u, c, x_dot)
-        xref_dot = law.reference_velocity(c_inv, u)
-        return (
-            r,
-            law.reference_acceleration_exact(c_inv, c_dot, u_dot, xref_dot, x_dot),
-            law.reference_acceleration_paper(c_inv, c_dot, u_dot, xref_dot, x_dot),
-            law.torque(
-                c, law.adaptation(law.gradient(c, e), beta), r, law.synchronizing_force(c, sigma, Lambda)
-            ),
-        )
 
-    numbers = (c, c_dot, c_inv, e, xd_dot, sigma, u_dot, E, x_dot, Lambda, beta)
-    for exact, rounded in zip(chain(*numbers), chain(*(n.astype(float) for n in numbers)), strict=True):
-        assert all(isinstance(value, Fraction) for value in exact.ravel())
-        np.testing.assert_allclose(exact.astype(float), rounded, rtol=1e-12)
+@LAWS
+@pytest.mark.parametrize("k_r_space", ["joint", "task"])
+def test_the_order_of_the_law_can_be_traced_with_symbols(reference_acceleration, k_r_space):
+    ca = pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    rng = np.random.default_rng(2)
+    numbers = {
+        name: array if name in GAINS_OF_ALL else array[0]
+        for name, array in some_numbers(1, lambda *shape: rng.normal(size=shape)).items()
+    }
+    vector = ca.SX.sym("numbers", sum(array.size for array in numbers.values()))
+    symbols, values = {}, iter(ca.vertsplit(vector))
+    for name, array in numbers.items():
+        symbols[name] = np.array([next(values) for _ in range(array.size)], dtype=object).reshape(array.shape)
+    traced = whole_order(reference_acceleration, k_r_space, symbols)
+    flat = ca.vertcat(*(entry for part in traced for entry in part.ravel()))
+    found = ca.Function("order", [vector], [flat])(np.concatenate([a.ravel() for a in numbers.values()]))
+    expected = np.concatenate([p.ravel() for p in whole_order(reference_acceleration, k_r_space, numbers)])
+    np.testing.assert_allclose(np.array(found)[:, 0], expected, rtol=1e-12, atol=1e-12)
 
 
 def test_signals_survive_the_next_evaluation():

@@ -75,13 +75,13 @@ def test_energies_change_by_the_power_of_the_force_and_the_named_powers(name, ce
     motion = np.stack((made.q0, made.v0)) + 0.1 * rng.standard_normal((2, made.n, made.nv))
     memory = rng.standard_normal((made.coupling.pairs, made.m))
     s = controller.evaluate(made.references(np.array([0.3]))[0], motion, made.theta_hat0, memory)
-    c, (E, sigma, sigma_dot) = s.reference.c, s.command.shares
+    c, E, sigma, sigma_dot = s.reference.c, s.E, s.sigma, s.sigma_dot
     at = (part[None] for part in (s.epsilon, s.epsilon_dot, E, sigma, sigma_dot, s.e_star, s.r, c))
     proof = controller.law.proof(Along(*at))
     rates, powers = (
         sum(float(term.sum()) for term in terms.values()) for terms in (proof.rates, proof.powers)
     )
-    pushed = float(np.sum(np.matvec(s.reference.c_inv, s.r) * s.command.force))
+    pushed = float(np.sum(np.matvec(s.reference.c_inv, s.r) * s.force))
     size = 1 + abs(rates) + abs(powers) + abs(pushed)
     assert rates == pytest.approx(pushed + powers, abs=1e-11 * size)
     assert set(proof.energies) == set(proof.rates)

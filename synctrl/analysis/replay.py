@@ -12,8 +12,7 @@ from ..checks import instance
 from ..control.controller import Signals
 from ..coupling.cell import Reference
 from ..errors import InputError
-from ..robots.blocks import Rows
-from ..robots.forest import Forest, forests
+from ..robots.forest import Forest, Selection, forests
 from ..simulation.clock import before
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.disturbances import DisturbanceSchedule
@@ -31,7 +30,7 @@ KNOWN = 1e-9
 #: numbers beyond it are those of a run that went astray, and have no squares
 LARGEST = 1e100
 
-Bodies = Sequence[tuple[Rows, Forest]]
+Bodies = Sequence[tuple[Selection, Forest]]
 """The robots of a cell as `forests` groups them."""
 
 
@@ -177,7 +176,6 @@ def _row(
     y_dot, s = loop.evaluate(reference, y, disturbance)
     theta, adaptation, z = loop.cell.theta, loop.controller.adaptation, loop.state(y).z
     J, J_inv = _jacobians(loop, s)
-    E, sigma, sigma_dot = s.command.shares
     M, C_s = _dynamics(bodies, q, v, s.s_q)
     friction, friction_damping = _friction(loop, bodies, q, v, s)
     return Row(
@@ -185,9 +183,9 @@ def _row(
         s.tau - loop.plant.applied(s.tau), np.array(adaptation.storage(z, theta)),
         np.array(adaptation.storage_rate(z, s.z_dot, theta)),
         np.array([*adaptation.powers(z, theta, s.seen).values()]), s.epsilon, s.epsilon_dot,
-        E, sigma, sigma_dot, s.e_star, s.u, s.r, s.command.force, reference.c,
+        s.E, s.sigma, s.sigma_dot, s.e_star, s.u, s.r, s.force, reference.c,
         reference.c_dot, reference.c_inv, J, J_inv, M, C_s,
-        s.regressor.size(np.abs(s.theta_hat) + np.abs(theta)),
+        np.matvec(np.abs(s.Y), np.abs(s.theta_hat) + np.abs(theta)),
     )  # fmt: skip
 
 
@@ -237,11 +235,11 @@ def _friction(
     if not loop.plant.rubs:
         return unknown, damping
     theta = loop.cell.theta
-    known = s.regressor.times(theta)
+    known = np.matvec(s.Y, theta)
     for rows, forest in bodies:
         k = forest.nv
         known[rows, :k] -= forest.torque(*(x[rows, :k] for x in (q, v, s.v_ref, s.a_ref)))
-    knows = (np.abs(known) > KNOWN * s.regressor.size(np.abs(theta))).any(axis=1, keepdims=True)
+    knows = (np.abs(known) > KNOWN * np.matvec(np.abs(s.Y), np.abs(theta))).any(axis=1, keepdims=True)
     damping = np.where(knows, loop.plant.viscous * s.s_q, 0.0)
     return unknown + damping - np.where(knows, known, 0.0), damping
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..tasks.algebra import Algebra, two_by_two
+from ..tasks.algebra import Algebra
 
 #: rounds of Jacobi's method after which symmetric matrices of six rows are diagonal to rounding
 SWEEPS = 6
@@ -38,11 +38,9 @@ def symbols(name: str, *shape: int) -> np.ndarray:
 
 def _inverse(A: np.ndarray) -> np.ndarray:
     """By minors up to three rows, by an unrolled QR factorization above."""
-    rows = len(A)
-    if rows == 2:
-        return two_by_two(A)
     import casadi as ca
 
+    rows = len(A)
     given = ca.SX.sym("A", rows, rows)
     inverse = ca.inv_minor(given) if rows <= 3 else ca.solve(given, ca.SX.eye(rows))
     function = ca.Function("inverse", [given], [inverse])

@@ -16,11 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..control import commands, law, structure
+from ..control import law
 from ..control.adaptation.gradient import BoundGradient
-from ..control.commands import REFERENCE_ACCELERATIONS, Composed, ConstantWeights
 from ..control.controller import Controller
-from ..control.folded import FoldedWeights
 from ..control.gains import Gains
 from ..control.laws.sun_mills import BoundSunMills
 from ..control.network import BoundIdeal
@@ -34,6 +32,7 @@ from ..robots.robot import Robot
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.payloads import PayloadSchedule
 from ..simulation.plant import Plant
+from ..tasks import algebra, rotations, validity
 from ..tasks.pose import BoundPoseSpace, PoseSpace
 from ..tasks.redundancy import DampedInverse, Inverse, Pseudoinverse, Redundancy
 from ..tasks.spaces import BoundCartesianSpace, BoundJointSpace, CartesianSpace, JointSpace
@@ -45,11 +44,8 @@ SPACES = (JointSpace, CartesianSpace, PoseSpace)
 BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace)
 RIGID = (FullParameters, LinearParameters, BaseParameters)
 INVERSES = (Inverse, Pseudoinverse, DampedInverse)
-WAYS = (FoldedWeights, ConstantWeights, Composed)
-
-
-#: modules whose functions a controller calls, beside those of its parts
-LINES = (law, commands, structure)
+#: modules whose functions the parts of a closed loop call, beside those of their own
+LINES = (law, algebra, rotations, validity)
 
 
 class Part(NamedTuple):
@@ -102,7 +98,6 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     if isinstance(controller.law, BoundSunMills):  # others are traced
         yield Part("law", controller.law, (BoundSunMills,))
     yield Part("network", controller.network, (BoundIdeal,))
-    yield Part("law of the controller", controller._command, WAYS)
     if isinstance(controller.adaptation, BoundGradient):  # others are traced
         yield Part("adaptation", controller.adaptation, (BoundGradient,))
     yield Part("gains", controller.gains, (Gains,))
@@ -115,6 +110,8 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
         yield Part("redundancy", space.redundancy, (Redundancy,))
         yield Part("tips of the robots", task._tips, (Tips,))
         yield Part("way from the task to the joints", task._inverse, INVERSES)
+        if task._inverse.algebra is not algebra.LAPACK:
+            raise _replaced("linear algebra of the way to the joints", task._inverse.algebra)
     for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True):
         yield Part(f"model of {name}", robot, (Robot,))
         yield Part(f"parameters of {name}", parameters, (*RIGID, FrictionParameters))
@@ -126,12 +123,10 @@ def _functions(loop: ClosedLoop) -> Iterator[tuple[str, str, Any, str]]:
     """Functions that generated code was traced from: role, name, function, and the module it was found in."""
     bases = {base for part in _parts(loop) for base in type(part.value).__mro__}
     ours = {base.__module__ for base in bases if _is_ours(base.__module__)}
-    for module in sorted(ours | {each.__name__ for each in LINES}):
+    for module in sorted(ours | {lines.__name__ for lines in LINES}):
         for name, function in vars(sys.modules[module]).items():
             if callable(function) and name[0].islower() and not isinstance(function, type):
                 yield f"function '{name}' of {module}", name, function, module
-    acceleration = REFERENCE_ACCELERATIONS[loop.controller.reference_acceleration]
-    yield "reference acceleration", "", acceleration, law.__name__
 
 
 def _belongs(name: str, function: Any, module: str) -> bool:
@@ -187,10 +182,6 @@ def _check_class(kind: type) -> None:
 
 def _check_controller(controller: Controller) -> None:
     """Refuse a controller whose parts no longer say what it does: it made some of them into others."""
-    damping = controller._joint_damping if controller.k_r_space == "joint" else controller._task_damping
-    if controller._damping != damping:
-        raise _replaced("damping of the controller", controller._damping)
-    _check_law(controller)
     for name in ("Lambda", "beta", "K_eps"):
         then = getattr(controller.gains, name)
         own = [part for part in (controller, controller.law) if isinstance(part, (Controller, BoundSunMills))]
@@ -199,17 +190,6 @@ def _check_controller(controller: Controller) -> None:
                 f"engine='compiled' does not have a controller whose {name} was changed after its law was "
                 f"made of it; make another one of changed gains, or {WAY_OUT}"
             )
-
-
-def _check_law(controller: Controller) -> None:
-    """Refuse a controller that has got another law than the one that its commands come from."""
-    way: Any = controller._command
-    if type(way) is Composed:
-        same = way.law is controller.law and way.network is controller.network
-    else:
-        same = type(controller.law) is BoundSunMills
-    if not same:
-        raise _replaced("law", controller.law)
 
 
 def _changed(now: Any, then: np.ndarray, m: int) -> bool:

@@ -7,23 +7,19 @@ traced, asks for the time, or lets a robot use what others know, is refused by n
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..control.commands import completed
 from ..control.controller import Controller
 from ..control.gains import Gains
-from ..control.laws import Asked, BoundLaw, Errors
+from ..control.laws import Asked, BoundLaw, Errors, completed
+from ..control.laws.protocol import ROWS, WEIGHTS
 from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.cell import Cell
 from ..errors import InputError
 from .algebra import column_of, symbols
-
-#: what a law is a function of, (m,) each; the weights come after them
-ROWS = ("e", "e_dot", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot", "E", "sigma", "sigma_dot")
-WEIGHTS = ("c", "c_dot", "c_ddot", "c_inv")
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +28,7 @@ class TracedLaw:
 
     Attributes:
         command: CasADi function, those of `ROWS` and the weights, (4 m m), row by row -> xref', xref'',
-            force, e* and u.
+            force and e*.
     """
 
     command: Any
@@ -66,14 +62,14 @@ def _traced(law: BoundLaw, n: int, m: int) -> list[TracedLaw | None]:
 
     rows = {name: symbols(name, n, m) for name in ROWS}
     weights = {name: symbols(name, n, m, m) for name in WEIGHTS}
-    errors = Errors(t=None, **rows, **weights)
+    errors = Errors.from_rows(**rows, **weights)
     asked = completed(law.command(errors), errors)
     found: list[TracedLaw | None] = []
     for i in range(n):
         inputs = [column_of(rows[name][i]) for name in ROWS]
         inputs.append(column_of(np.stack([weights[name][i] for name in WEIGHTS])))
         outputs = [column_of(part[i]) for part in (asked.xref_dot, asked.xref_ddot, asked.force)]
-        outputs += [column_of(asked.e_star[i]), column_of(asked.u[0, i])]  # type: ignore[index]
+        outputs.append(column_of(asked.e_star[i]))
         found.append(TracedLaw(ca.Function("command", inputs, outputs)))
     return found
 
@@ -102,18 +98,18 @@ class ChosenLaw:
         for row, robot in enumerate(self._robots):
             alone = self._alone(errors, row, robot)
             asked = completed(self._law.command(alone), alone)
-            rows.append([*(part[robot] for part in asked[:4]), asked.u[:, robot]])  # type: ignore[index]
+            rows.append([*(part[robot] for part in asked[:4]), asked.u[:, robot]])
         velocity, acceleration, force, e_star, u = (np.stack(part) for part in zip(*rows, strict=True))
         return Asked(velocity, acceleration, force, e_star, u.swapaxes(0, 1))
 
     def _alone(self, errors: Errors, row: int, robot: int) -> Errors:
         """What one robot sees, in the larger cell."""
         found = {}
-        for name in (field.name for field in fields(Errors) if field.name != "t"):
+        for name in (*ROWS, *WEIGHTS):
             value = getattr(errors, name)[row]
             rows = np.zeros((self._n, *value.shape))
             if name in ("c", "c_inv"):
                 rows[...] = np.eye(len(value))
             rows[robot] = value
             found[name] = rows
-        return Errors(t=None, **found)
+        return Errors.from_rows(**found)

@@ -125,6 +125,8 @@ class Signature(NamedTuple):
 
 #: what is desired at an instant: position, velocity and acceleration
 DESIRED = "desired", "desired_dot", "desired_ddot"
+#: what a robot hears of the others, see `Errors`
+HEARD = "E", "sigma", "sigma_dot"
 
 FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
     {
@@ -137,7 +139,7 @@ FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
         ),
         "control": Signature(
             (
-                "q", "v", "sine", "cosine", "z", "E", "sigma", "sigma_dot", "e", "x_dot", "xd_dot", "xd_ddot",
+                "q", "v", "sine", "cosine", "z", *HEARD, "e", "x_dot", "xd_dot", "xd_ddot",
                 "w", "w_dot", "J", "J_dot", "J_inv", "G", "zeta", "zeta_dot", "damping_rate", "weights",
                 "Lambda", "beta", "K_eps", "K_r", "Gamma", "W_inv", "base",
             ),

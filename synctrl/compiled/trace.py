@@ -14,16 +14,19 @@ from typing import Any
 import numpy as np
 
 from ..control import law
-from ..control.commands import REFERENCE_ACCELERATIONS
+from ..control.laws import Asked, Errors
+from ..control.laws.protocol import ROWS
+from ..control.laws.sun_mills import BoundSunMills
+from ..coupling.weights import Weights
+from ..robots.friction_parameters import friction_diagonals
 from ..robots.symbolic import Symbols
 from ..tasks.redundancy import Inversion, velocity_lost
 from ..tasks.spaces import Measurement
 from ..tasks.tips import Poses, Positions
 from .algebra import SYMBOLS, array_of, column_of
 from .kind import Kind
-from .lawful import TracedLaw
 from .learning import Learning
-from .quantities import DESIRED, FUNCTIONS, QUANTITIES, columns
+from .quantities import DESIRED, FUNCTIONS, HEARD, QUANTITIES, columns
 
 
 class TracedTip:
@@ -81,8 +84,7 @@ class Trace:
         motion, desired = (np.stack([*map(self._row, names)]) for names in (("q", "v"), DESIRED))
         task = self.space.measure(motion, desired)
         c, c_dot = self._weights()[:2]
-        w = law.weighted_error(c, task.e)
-        w_dot = law.weighted_error_dot(c, c_dot, task.e, task.e_dot)
+        w, w_dot = law.compute_weighted_errors(c, c_dot, task.error)
         way = {} if task.inversion is None else task.inversion._asdict()
         return self._function(
             "measure",
@@ -118,46 +120,32 @@ class Trace:
     def control(self) -> Any:
         """The law: torque, z' of the adaptation, e*, s_q."""
         task = self._task()
-        e_star, r, xref_dot, xref_ddot, force = self._law(task)
-        v_ref, a_ref = self.space.to_joints(task, xref_dot, xref_ddot)
-        s_q = v_ref - self._row("v")
-        model_torque, z_dot = self._adaptive(v_ref, a_ref, s_q)
-        tau = model_torque + self._damping(task, s_q, r) + self.space.to_torque(task, force)
-        lost = velocity_lost(self._jacobians()[0], v_ref, xref_dot) if self.kind.damped else None
-        return self._function("control", tau=tau, z_dot=z_dot, e_star=e_star, s_q=s_q, velocity_lost=lost)
-
-    def _law(self, task: Measurement) -> tuple:
-        """The same lines as `Controller.evaluate`, for one robot."""
-        c, c_dot, c_ddot, c_inv = self._weights()
-        w, w_dot, E, sigma, sigma_dot = map(self._row, ("w", "w_dot", "E", "sigma", "sigma_dot"))
-        (e, e_dot), (xd_dot, xd_ddot), x_dot = task.error, task.rates, task.x_dot
-        if self.kind.law is not None:
-            given = [e, e_dot, x_dot, xd_dot, xd_ddot, w, w_dot, E, sigma, sigma_dot]
-            return self._other_law(self.kind.law, given)
-        Lambda, beta, K_eps = map(self._row, ("Lambda", "beta", "K_eps"))
-        e_star = law.coupled_error(w, E, beta)
-        u = law.command(c, c_dot, xd_dot, e, sigma, e_star, beta, Lambda)
-        u_dot = law.command_dot(
-            c, c_dot, c_ddot, xd_dot, xd_ddot, e, e_dot, w_dot, sigma, sigma_dot, beta, Lambda
+        errors = self._errors(task)
+        asked = self._asked(errors)
+        v_ref, a_ref, s_q, feedback = law.compute_joint_command(
+            asked, task, self._row("v"), self.space, self._row("K_r"), self.kind.k_r_space
         )
-        r = law.coupled_velocity_error(u, c, x_dot)
-        xref_dot = law.reference_velocity(c_inv, u)
-        acceleration = REFERENCE_ACCELERATIONS[self.kind.reference_acceleration]
-        xref_ddot = acceleration(c_inv, c_dot, u_dot, xref_dot, x_dot)
-        return e_star, r, xref_dot, xref_ddot, law.synchronizing_force(c, sigma, K_eps)
+        model_torque, z_dot = self._adaptive(v_ref, a_ref, s_q)
+        lost = velocity_lost(self._jacobians()[0], v_ref, asked.xref_dot) if self.kind.damped else None
+        return self._function(
+            "control",
+            tau=model_torque + feedback, z_dot=z_dot, e_star=asked.e_star, s_q=s_q, velocity_lost=lost,
+        )  # fmt: skip
 
-    def _other_law(self, other: TracedLaw, given: list) -> tuple:
-        """e*, r, xref', xref'' and force of a law that was traced."""
-        asked = other.command(*map(column_of, given), self.given["weights"])
-        xref_dot, xref_ddot, force, e_star, u = (array_of(part, -1) for part in asked)
-        r = law.coupled_velocity_error(u, self._weights()[0], given[2])
-        return e_star, r, xref_dot, xref_ddot, force
+    def _errors(self, task: Measurement) -> Errors:
+        """What a law is told of one robot."""
+        w, heard = (np.stack([*map(self._row, names)]) for names in (("w", "w_dot"), HEARD))
+        return Errors(None, task.error, task.x_dot, task.rates, w, heard, Weights(*self._weights()))
 
-    def _damping(self, task: Measurement, s_q: np.ndarray, r: np.ndarray) -> np.ndarray:
-        gain = self._row("K_r")
-        if self.kind.k_r_space == "joint":
-            return gain * s_q
-        return self.space.to_torque(task, gain * law.times(self._weights()[3], r))
+    def _asked(self, errors: Errors) -> Asked:
+        """What the law asks of one robot."""
+        kind = self.kind
+        if kind.law is None:
+            Lambda, beta, K_eps = map(self._row, ("Lambda", "beta", "K_eps"))
+            return BoundSunMills(Lambda, beta, K_eps, kind.reference_acceleration).command(errors)
+        rows = (column_of(getattr(errors, name)) for name in ROWS)
+        parts = kind.law.command(*rows, self.given["weights"])
+        return Asked(*(array_of(part, -1) for part in parts))
 
     def estimate(self, learning: Learning) -> Any:
         """z -> theta_hat, of an adaptation whose state is something else."""
@@ -169,7 +157,7 @@ class Trace:
         motion = tuple(map(column_of, (v_ref, a_ref, s_q)))
         if learning is None:
             torque, gradient = self._model(z, *motion)
-            return array_of(torque, -1), law.adaptation(array_of(gradient, -1), self._row("Gamma"))
+            return array_of(torque, -1), self._row("Gamma") * array_of(gradient, -1)
         theta_hat = self.given["theta_hat"]
         parts = self.ca.substitute([*self._model(theta_hat, *motion)], [theta_hat], [learning.estimate(z)])
         z_dot = learning.rate(z, self.q, self.v, *motion, parts[1])
@@ -182,9 +170,10 @@ class Trace:
         pi = rigid if kind.matrix is None else self.ca.mtimes(self.ca.SX(kind.matrix), rigid)
         torque = self._recursion().torque(pi, self.v, v_ref, a_ref, self._gravity())
         if kind.smoothing is not None:
-            columns = [v_ref, self.ca.tanh(self.v / kind.smoothing), *([a_ref] if kind.rotors else [])]
-            rubbing = theta_hat[kind.rigid_parameters :]
-            torque += sum(rubbing[k * kind.nv : (k + 1) * kind.nv] * c for k, c in enumerate(columns))
+            rubbing = array_of(theta_hat[kind.rigid_parameters :], -1, kind.nv)
+            v, v_ref, a_ref = (array_of(part, -1) for part in (self.v, v_ref, a_ref))
+            diagonals = friction_diagonals(v, v_ref, a_ref, kind.smoothing, kind.rotors)
+            torque += column_of(sum(rubbing * np.stack(diagonals)))
         return torque, self.ca.jtimes(torque, theta_hat, s_q, True)
 
     # -- the plant ----------------------------------------------------------------------------------------

@@ -13,42 +13,50 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, instance
 from ..coupling.cell import Cell, Reference
 from ..renamed import argument, names_elsewhere, tell
-from ..robots.regressors import RegressorBlocks, regressors
+from ..robots.regressors import Regressors, make_regressors
 from ..tasks.spaces import Measurement
 from . import law, laws
 from .adaptation import Adaptation, Seen, chosen
-from .commands import Command, Commander, Composed, ConstantWeights
-from .folded import folded
 from .gains import Gains, spread, spread_rows
-from .laws import Law
-from .laws.sun_mills import BoundSunMills
-from .network import BoundIdeal, Network, connected
+from .laws import Asked, Errors, Law, completed
+from .network import Network, Received, connected
+from .part_checks import check_parts
 
 
 @dataclass(slots=True)
 class Signals:
     """Everything one evaluation of the controller computed, under its name.
 
-    Task-space rows are (n, m), rows per pair (p, m), joint-space rows (n, nv), parameters (n, P), the state
-    of the adaptation (n, Z).
+    Task-space rows are (n, m), rows per pair (p, m), joint-space rows (n, nv), parameters (n, P), the
+    regressors Y are (n, nv, P), the state of the adaptation is (n, Z).
     """
 
     reference: Reference
     task: Measurement
-    command: Command
+    received: Received
+    errors: Errors
+    asked: Asked
     v_ref: np.ndarray
     a_ref: np.ndarray
     s_q: np.ndarray
-    regressor: RegressorBlocks
+    Y: np.ndarray
     tau: np.ndarray
     theta_hat: np.ndarray
     z_dot: np.ndarray
     seen: Seen
 
-    @property
-    def Y(self) -> np.ndarray:  # noqa: N802
-        """The regressors, (n, nv, P)."""
-        return self.regressor.matrices()
+    memory_dot = property(lambda self: self.received.memory_dot)
+    epsilon = property(lambda self: self.received.epsilon)
+    epsilon_dot = property(lambda self: self.received.epsilon_dot)
+    e = property(lambda self: self.errors.e)
+    e_dot = property(lambda self: self.errors.e_dot)
+    E = property(lambda self: self.errors.E)
+    sigma = property(lambda self: self.errors.sigma)
+    sigma_dot = property(lambda self: self.errors.sigma_dot)
+    force = property(lambda self: self.asked.force)
+    e_star = property(lambda self: completed(self.asked, self.errors).e_star)
+    u = property(lambda self: completed(self.asked, self.errors).u[0])
+    u_dot = property(lambda self: completed(self.asked, self.errors).u[1])
 
     @property
     def theta_hat_dot(self) -> np.ndarray:
@@ -56,17 +64,10 @@ class Signals:
         tell("Signals.theta_hat_dot", "Signals.z_dot")
         return self.z_dot
 
-    memory_dot = property(lambda self: self.command.memory_dot)
-    e = property(lambda self: self.task.error[0])
-    e_dot = property(lambda self: self.task.error[1])
-    epsilon = property(lambda self: self.command.epsilon)
-    epsilon_dot = property(lambda self: self.command.epsilon_dot)
-    E = property(lambda self: self.command.shares[0])
-    sigma = property(lambda self: self.command.shares[1])
-    e_star = property(lambda self: self.command.e_star)
-    u = property(lambda self: self.command.u[0])
-    u_dot = property(lambda self: self.command.u[1])
-    r = property(lambda self: law.coupled_velocity_error(self.u, self.reference.c, self.task.x_dot))
+    @property
+    def r(self) -> np.ndarray:
+        """Coupled velocity error r = u - c x' = (e*)' + Lambda e*, eqs. (12) and (31), (n, m)."""
+        return self.u - np.matvec(self.errors.c, self.errors.x_dot)
 
 
 class Controller:
@@ -117,19 +118,7 @@ class Controller:
         self.law, self.law_settings = options.law.bind(cell, gains), settings_of(options.law)
         connection = connected(network)
         self.network, self.network_settings = connection.bind(cell), settings_of(connection)
-        self._damping = self._joint_damping if self.k_r_space == "joint" else self._task_damping
-        self._command = self._commander()
-
-    def _commander(self) -> Commander:
-        """The law over the network, in the way that costs least."""
-        cell = self.cell
-        usual = type(self.law) is BoundSunMills and type(self.network) is BoundIdeal
-        if usual and cell.coupling.is_constant:
-            return folded(cell, ConstantWeights(cell, self.Lambda, self.beta, self.K_eps))
-        composed = Composed(self.law, self.network)
-        if not usual:
-            composed.check(cell.n, cell.coupling.pairs, cell.m)
-        return composed
+        check_parts(self.law, self.network, cell.n, cell.coupling.pairs, m)
 
     @property
     def Gamma(self) -> np.ndarray:  # noqa: N802
@@ -138,9 +127,9 @@ class Controller:
         return self.adaptation.Gamma  # type: ignore[attr-defined]
 
     @cached_property
-    def _regressor(self) -> Callable[..., RegressorBlocks]:
-        """q, v, v_ref and a_ref, (n, nv), -> the regressors."""
-        return regressors(self.cell.parameters, [robot.nv for robot in self.cell.robots])
+    def _compute_regressors(self) -> Regressors:
+        """q, v, v_ref and a_ref, (n, nv), -> the regressors, (n, nv, P)."""
+        return make_regressors(self.cell.parameters, [robot.nv for robot in self.cell.robots])
 
     def evaluate(
         self,
@@ -184,30 +173,24 @@ class Controller:
         self, reference: Reference, motion: np.ndarray, z: np.ndarray, integral: np.ndarray
     ) -> Signals:
         """`evaluate` without its checks, for many evaluations: numbers that are not finite go through."""
-        space = self.cell.task
-        task = space.measure(motion, reference.desired)
-        command = self._command(task, reference, integral)
-        v_ref, a_ref = space.to_joints(task, *command.xref)
         q, v = motion
-        s_q = v_ref - v
-        Y = self._regressor(q, v, v_ref, a_ref)
-        damping = self._damping(reference, task, command, s_q)
+        space, weights = self.cell.task, reference.weights
+        task = space.measure(motion, reference.desired)
+        w = law.compute_weighted_errors(weights.c, weights.c_dot, task.error)
+        received = self.network.exchange(reference.t, w, integral)
+        errors = Errors(reference.t, task.error, task.motion[1], task.rates, w, received.shares, weights)
+        asked = self.law.command(errors)
+        v_ref, a_ref, s_q, feedback = law.compute_joint_command(
+            asked, task, v, space, self.K_r, self.k_r_space
+        )
+        Y = self._compute_regressors(q, v, v_ref, a_ref)
         theta_hat = self.adaptation.estimate(z)
-        tau = law.torque(Y, theta_hat, damping, space.to_torque(task, command.force))
-        seen = Seen(q, v, v_ref, a_ref, s_q, law.gradient(Y, s_q), Y)
+        tau = np.matvec(Y, theta_hat) + feedback  # (13), (32)
+        seen = Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Y)
         z_dot = self.adaptation.rate(z, seen)
-        return Signals(reference, task, command, v_ref, a_ref, s_q, Y, tau, theta_hat, z_dot, seen)
-
-    def _joint_damping(
-        self, reference: Reference, task: Measurement, command: Command, s_q: np.ndarray
-    ) -> np.ndarray:
-        return self.K_r * s_q
-
-    def _task_damping(
-        self, reference: Reference, task: Measurement, command: Command, s_q: np.ndarray
-    ) -> np.ndarray:
-        r = law.coupled_velocity_error(command.u[0], reference.c, task.x_dot)
-        return self.cell.task.to_torque(task, self.K_r * law.times(reference.c_inv, r))
+        return Signals(
+            reference, task, received, errors, asked, v_ref, a_ref, s_q, Y, tau, theta_hat, z_dot, seen
+        )
 
 
 def settings_of(part: Adaptation | Law | Network) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array
 from ..errors import InputError
-from .rows import Rows, are_ragged
+from .ragged_gain import RaggedGain, are_ragged
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,14 +84,14 @@ _SIGNS = {"Lambda": True, "beta": False, "K_r": True, "K_eps": False, "Gamma": F
 _PER_ROBOT = ("K_r", "Gamma")
 
 
-def read_gain(name: str, gain: Any) -> np.ndarray | Rows:
+def read_gain(name: str, gain: Any) -> np.ndarray | RaggedGain:
     """A gain as finite numbers, or as rows where robots have different numbers of entries.
 
     Raises:
         InputError: not numbers, or not finite.
     """
     if name in _PER_ROBOT and are_ragged(gain):
-        return Rows(name, gain)
+        return RaggedGain(name, gain)
     return finite_array(name, gain)
 
 
@@ -106,7 +106,7 @@ def spread(name: str, gain: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     return np.broadcast_to(gain, shape).copy()
 
 
-def spread_rows(name: str, gain: np.ndarray | Rows, lengths: Sequence[int]) -> np.ndarray:
+def spread_rows(name: str, gain: np.ndarray | RaggedGain, lengths: Sequence[int]) -> np.ndarray:
     """A gain as an array with a row per robot, (n, longest), padded with zeros if rows are given.
 
     Args:
@@ -118,7 +118,7 @@ def spread_rows(name: str, gain: np.ndarray | Rows, lengths: Sequence[int]) -> n
         InputError: the gain has other dimensions.
     """
     shape, own = (len(lengths), max(lengths)), tuple(lengths)
-    if isinstance(gain, Rows):
+    if isinstance(gain, RaggedGain):
         if gain.lengths != own:
             raise InputError(
                 f"{name}: expected a row for each robot, of {_listed(own)} entries, "

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..coupling.cell import Cell, Reference
 from ..errors import InputError, NonFiniteError
-from .commands import weighted
+from .law import compute_weighted_errors
 from .network import BoundNetwork
 
 #: how far beyond an interval a message may be that counts as in it, as a share of its ends
@@ -68,7 +68,8 @@ class Messages:
         """
         if not times:
             return memory
-        w = weighted(self._measure(motion, reference.desired), reference)
+        error, (c, c_dot, _, _) = self._measure(motion, reference.desired).error, reference.weights
+        w = compute_weighted_errors(c, c_dot, error)
         for t in times:
             memory = self._after(t, w, memory)
         return memory

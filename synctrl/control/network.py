@@ -89,15 +89,16 @@ class BoundIdeal:
     """`Ideal` between the robots of a cell: its memory are the integrals of epsilon, (p, m)."""
 
     def __init__(self, coupling: Coupling, m: int):
-        self._coupling, self._m = coupling, m
+        self._shape = coupling.pairs, m
+        self._compare, self._distribute = coupling.products
 
     def start(self) -> np.ndarray:
-        return np.zeros((self._coupling.pairs, self._m))
+        return np.zeros(self._shape)
 
     def exchange(self, t: float, w: np.ndarray, memory: np.ndarray) -> Received:
-        compared = self._coupling.compare(w)
-        shares = self._coupling.distribute(np.concatenate((memory[None], compared)))
-        return Received(compared[0], compared[1], shares, compared[0])
+        epsilon, epsilon_dot = self._compare(w)  # (7), (28), and the derivative
+        shares = self._distribute(np.array((memory, epsilon, epsilon_dot)))
+        return Received(epsilon, epsilon_dot, shares, epsilon)
 
     def integral(self, memory: np.ndarray) -> np.ndarray:
         return memory

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import copy
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -17,6 +19,7 @@ from .weights import ConstantWeights, WeightFunction, Weights, WeightSource, as_
 #: entries of S up to which a product with S written out is the quickest way
 SMALL = 256
 
+RowProduct = Callable[[np.ndarray], np.ndarray]
 #: what the arguments `c` below may be
 WeightsLike = ArrayLike | WeightFunction | WeightSource
 
@@ -199,7 +202,8 @@ class Coupling:
     @property
     def incidence(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """S^T as lists: where the rows of each robot begin, (n + 1,); then each row, and its entry of S."""
-        return np.append(self._first, self._incident.size), self._incident, self._incident_sign[:, 0]
+        transposed = self._entries().T.tocsr()
+        return transposed.indptr, transposed.indices, transposed.data
 
     @property
     def matrix(self) -> np.ndarray:
@@ -238,28 +242,36 @@ class Coupling:
         """
         check_weights(self._source, np.asarray(times, dtype=float), m)
 
+    @property
+    def products(self) -> tuple[RowProduct, RowProduct]:
+        """`compare` and `distribute` as functions for who needs them often."""
+        return self._S, self._S_T
+
     def compare(self, w: np.ndarray) -> np.ndarray:
         """S w, (..., p, k), for one row of w, (..., n, k), per robot."""
-        if self._S is not None:
-            return self._S @ w
-        return np.vecmat(self.signs, w.take(self.edges, -2))
+        return self._S(w)
 
     def distribute(self, z: np.ndarray) -> np.ndarray:
         """S^T z, (..., n, k), for one row of z, (..., p, k), per pair."""
-        if self._S is not None:
-            return self._S.T @ z
-        return np.add.reduceat(z.take(self._incident, -2) * self._incident_sign, self._first, axis=-2)
+        return self._S_T(z)
 
     # -- internals ----------------------------------------------------------------------------------------
 
     def _set_sums(self) -> None:
-        """Lists the rows of each robot one after another, so that a sum over them is one pass."""
-        ends = self.edges.T.ravel()
-        order = np.argsort(ends, kind="stable")
-        self._incident = np.tile(np.arange(self.pairs), self.edges.shape[1])[order]
-        self._incident_sign = self.signs.T.ravel()[order][:, None]
-        self._first = np.searchsorted(ends[order], np.arange(self.robots))
-        self._S = self.matrix if self.robots * self.pairs <= SMALL else None
+        """Products with S: written out for a few robots, else as the list of its entries."""
+        if self.robots * self.pairs <= SMALL:
+            S = self.matrix
+            self._S, self._S_T = partial(np.matmul, S), partial(np.matmul, S.T)
+        else:
+            S = self._entries()
+            self._S, self._S_T = partial(_sparse_product, S), partial(_sparse_product, S.T.tocsr())
+
+    def _entries(self) -> Any:
+        """S as the list of its entries."""
+        from scipy.sparse import csr_array
+
+        rows = np.repeat(np.arange(self.pairs), self.edges.shape[1])
+        return csr_array((self.signs.ravel(), (rows, self.edges.ravel())), (self.pairs, self.robots))
 
     def __repr__(self) -> str:
         rows = f"{self.pairs} pairs" if self._in_pairs else "all in one"
@@ -271,3 +283,10 @@ def _count(n: int) -> int:
     if isinstance(n, bool) or n < 2:
         raise CouplingError(f"robots: a coupling compares at least 2 robots, found {n}")
     return int(n)
+
+
+def _sparse_product(S: Any, x: np.ndarray) -> np.ndarray:
+    """S x for one row of x, (..., k), per column of S."""
+    rows = np.moveaxis(x, -2, 0)
+    product = S @ rows.reshape(len(rows), -1)
+    return np.moveaxis(product.reshape(-1, *rows.shape[1:]), 0, -2)

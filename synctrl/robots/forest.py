@@ -13,7 +13,6 @@ from typing import Any, TypeVar
 import numpy as np
 import pinocchio as pin
 
-from .blocks import Blocks, Rows
 from .per_thread import PerThread
 from .robot import Robot
 
@@ -27,6 +26,9 @@ _WORLD = pin.Convention.WORLD
 _CROSS = np.array([[[0, -z, y], [z, 0, -x], [-y, x, 0]] for x, y, z in np.eye(3)]).reshape(3, 9)
 K = TypeVar("K", bound=Hashable)
 
+Selection = slice | np.ndarray
+"""Which of the robots: rows of arrays that have one per robot."""
+
 
 class Forest:
     """Robots with equal numbers of joints and bodies under the same gravity, as one mechanism.
@@ -35,10 +37,12 @@ class Forest:
 
     Args:
         robots: the robots, at least one.
+        maps: matrices that make inertial parameters of the adapted ones, (n, 10 bodies, P), see
+            `LinearParameters`; by default all inertial parameters are adapted.
     """
 
-    def __init__(self, robots: Sequence[Robot]):
-        self.robots = tuple(robots)
+    def __init__(self, robots: Sequence[Robot], maps: np.ndarray | None = None):
+        self.robots, self._maps = tuple(robots), maps
         self.n, self.nv = len(robots), robots[0].nv
         self._model, tips = _side_by_side(robots)
         self._weightless = pin.Model(self._model)
@@ -49,17 +53,20 @@ class Forest:
         plain = self._model.nq == self._model.nv
         #: joint positions as Pinocchio stores them
         self._stored: Callable[[np.ndarray], np.ndarray] = np.ndarray.ravel if plain else self._integrated
-        moves = _joints_that_move(self._model, tips).reshape(self.n, self.nv, 1)
-        self._cut: Callable[[np.ndarray], np.ndarray] = _whole if moves.all() else partial(np.multiply, moves)
+        self._moves = _joints_that_move(self._model, tips).reshape(self.n, self.nv, 1)
 
-    def regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> Blocks:
-        """Slotine-Li regressors, blocks (nv, 10 bodies), see `Robot.regressor`; arguments are (n, nv)."""
+    def regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
+        """Slotine-Li regressors of the adapted parameters, (n, nv, P); arguments are (n, nv).
+
+        See `Robot.regressor`. Pinocchio gives a matrix with a block per tree, of which the blocks are taken.
+        """
         q, v = self._stored(q), v.ravel()
         half = 0.5 * (v_ref.ravel() - v)
         data, weightless_data = self._scratch.own.data, self._weightless_data.own
         whole = pin.computeJointTorqueRegressor(self._model, data, q, v + half, a_ref.ravel())
         whole -= pin.computeJointTorqueRegressor(self._weightless, weightless_data, q, half, self._still)
-        return Blocks(whole if whole.ndim == 2 else whole[None], self.n)  # a single row comes as a vector
+        Y = whole.T.reshape(self.n, -1, self.n, self.nv).diagonal(axis1=0, axis2=2).T
+        return Y if self._maps is None else Y @ self._maps
 
     def torque(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
         """M a_ref + C(q, v) v_ref + g, (n, nv), with the true parameters by the identity of `regressor`."""
@@ -95,10 +102,10 @@ class Forest:
         p, p_dot = motion
         np.concatenate(scratch.positions, out=p.reshape(-1))
         np.matmul(p, _CROSS, out=scratch.arms)
-        J = self._cut(scratch.J @ scratch.to_tip)
+        J = self._moves * (scratch.J @ scratch.to_tip)
         np.vecmat(v, J, out=p_dot)
         np.matmul(p_dot, _CROSS, out=scratch.arms_dot)
-        J_dot = self._cut(scratch.J_dot @ scratch.to_tip + scratch.J @ scratch.to_tip_dot)
+        J_dot = self._moves * (scratch.J_dot @ scratch.to_tip + scratch.J @ scratch.to_tip_dot)
         return motion, J.mT, J_dot.mT
 
     def poses(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -109,7 +116,7 @@ class Forest:
         motion, J, J_dot = self.tips(q, v)
         scratch = self._scratch.own
         R = np.concatenate(scratch.rotations).reshape(-1, 3, 3)
-        turning, turning_dot = (self._cut(part[..., 3:]).mT for part in (scratch.J, scratch.J_dot))
+        turning, turning_dot = ((self._moves * part[..., 3:]).mT for part in (scratch.J, scratch.J_dot))
         twists = np.concatenate((J, turning), axis=1)
         return motion, R, twists, np.concatenate((J_dot, turning_dot), axis=1)
 
@@ -129,7 +136,7 @@ class Forest:
 
     def __reduce__(self) -> tuple:
         """Copies and other processes make the scratch memory anew: views would come apart from it."""
-        return type(self), (self.robots,)
+        return type(self), (self.robots, self._maps)
 
 
 class _Scratch:
@@ -160,7 +167,7 @@ class _Scratch:
         self.arms, self.arms_dot = (A.reshape(n, 18)[:, 9:] for A in (self.to_tip, self.to_tip_dot))
 
 
-def forests(robots: Sequence[Robot], joints: int = LARGE) -> list[tuple[Rows, Forest]]:
+def forests(robots: Sequence[Robot], joints: int = LARGE) -> list[tuple[Selection, Forest]]:
     """Forests that together have all robots, each with the rows it stands for, which ascend.
 
     Robots share a forest wherever they stand: how many forests there are does not depend on their order.
@@ -169,7 +176,7 @@ def forests(robots: Sequence[Robot], joints: int = LARGE) -> list[tuple[Rows, Fo
         robots: the robots.
         joints: joints of a forest at most.
     """
-    return [(as_rows(part), Forest([robots[i] for i in part])) for part in shares(robots, joints)]
+    return [(as_selection(part), Forest([robots[i] for i in part])) for part in shares(robots, joints)]
 
 
 def shares(robots: Sequence[Robot], joints: int) -> Iterator[list[int]]:
@@ -187,7 +194,7 @@ def alike(kinds: Iterable[K]) -> dict[K, list[int]]:
     return found
 
 
-def as_rows(indices: Sequence[int]) -> Rows:
+def as_selection(indices: Sequence[int]) -> Selection:
     """Ascending indices of rows; as a slice, which copies nothing, where they are evenly spaced."""
     first, *others = indices
     step = others[0] - first if others else 1
@@ -224,8 +231,3 @@ def _joints_that_move(model: pin.Model, tips: Sequence[int]) -> np.ndarray:
         for joint in list(model.supports[model.frames[tip].parentJoint])[1:]:  # the first one is the world
             moves[model.joints[joint].idx_v] = 1
     return moves
-
-
-def _whole(J: np.ndarray) -> np.ndarray:
-    """A Jacobian in which every joint of a robot moves its tip."""
-    return J

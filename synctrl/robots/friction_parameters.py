@@ -97,14 +97,41 @@ class FrictionParameters:
 
     def regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
         """[Y_b, diag(v_ref), diag(tanh(v / smoothing)), diag(a_ref)], (nv, P)."""
-        columns = [np.diag(v_ref), np.diag(np.tanh(v / self.smoothing))]
-        if self.armature:
-            columns.append(np.diag(a_ref))
-        return np.concatenate([self.base.regressor(q, v, v_ref, a_ref), *columns], axis=1)
+        Y_b = self.base.regressor(q, v, v_ref, a_ref)
+        return with_friction_columns(Y_b, v, v_ref, a_ref, self.smoothing, self.armature)
 
     def _true_values(self, friction: Friction) -> np.ndarray:
         parts = [_spread(self.robot, name, getattr(friction, name)) for name in ("viscous", "coulomb")]
         return np.concatenate([self.base.theta, *parts, *([self.robot.armature] if self.armature else [])])
+
+
+def friction_diagonals(
+    v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray, smoothing: float | np.ndarray, armature: bool
+) -> tuple[np.ndarray, ...]:
+    """Diagonals of the columns beside those of the rigid bodies: v_ref, tanh(v / smoothing) and a_ref.
+
+    Plain array arithmetic: the same line is traced with symbols.
+
+    Args:
+        v, v_ref, a_ref: (..., nv).
+        smoothing: velocity at which Coulomb friction reaches tanh(1) of its value, rad/s.
+        armature: whether there are columns of the rotors, the last of the three.
+    """
+    return (v_ref, np.tanh(v / smoothing), a_ref)[: 3 if armature else 2]
+
+
+def with_friction_columns(
+    Y_b: np.ndarray,
+    v: np.ndarray,
+    v_ref: np.ndarray,
+    a_ref: np.ndarray,
+    smoothing: float | np.ndarray,
+    armature: bool,
+) -> np.ndarray:
+    """[Y_b, diag(v_ref), diag(tanh(v / smoothing)), diag(a_ref)], (..., nv, P), of Y_b, (..., nv, P_b)."""
+    one = np.eye(v.shape[-1])
+    diagonals = friction_diagonals(v, v_ref, a_ref, smoothing, armature)
+    return np.concatenate([Y_b, *(d[..., None] * one for d in diagonals)], axis=-1)
 
 
 def _unknown() -> InputError:

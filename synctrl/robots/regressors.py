@@ -1,4 +1,9 @@
-"""The regressors of all robots of a cell, from as few calls as their parameters allow."""
+"""The regressors of all robots of a cell, as one array, from as few calls as their parameters allow.
+
+    Y theta = M a_ref + C(q, v) v_ref + g,   Y (n, nv, P).
+
+Rows and columns of robots with fewer joints or parameters than the largest are zero.
+"""
 
 from __future__ import annotations
 
@@ -8,39 +13,34 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .blocks import Beside, BlockProduct, Blocks, Padded, Part, Rows
-from .forest import SMALL, Forest, alike, as_rows, shares
-from .friction_parameters import FrictionParameters
+from .forest import SMALL, Forest, Selection, alike, as_selection, shares
+from .friction_parameters import FrictionParameters, with_friction_columns
 from .parameters import FullParameters, LinearParameters, Parameters
 
 #: what is linear in the regressor of all inertial parameters, and so can share a forest
 _RIGID = (FullParameters.regressor, LinearParameters.regressor)
 
-RegressorBlocks = Blocks | BlockProduct | Beside | Padded
-"""Regressors of all robots, with the products that the law needs."""
-Regressor = Callable[..., Any]
-"""q, v, v_ref and a_ref of some robots, (k, nv), -> their regressors."""
+Regressors = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""q, v, v_ref and a_ref of k robots, (k, nv) each, -> their regressors, (k, nv, P)."""
 
 
 class Group(NamedTuple):
     """Robots whose regressors are evaluated together.
 
     Attributes:
-        rows: which robots.
+        robots: which robots.
         nv, size: numbers of joints and of parameters of each.
-        regressor: of these robots.
+        compute: gives their regressors.
     """
 
-    rows: Rows
+    robots: Selection
     nv: int
     size: int
-    regressor: Regressor
+    compute: Regressors
 
 
-def regressors(parameters: Sequence[Parameters], joints: Sequence[int]) -> Callable[..., RegressorBlocks]:
-    """A function of q, v, v_ref and a_ref, (n, nv), that gives the regressors of all robots.
-
-    Rows and columns of robots with fewer joints or parameters than the largest are padded with zeros.
+def make_regressors(parameters: Sequence[Parameters], joints: Sequence[int]) -> Regressors:
+    """A function of q, v, v_ref and a_ref, (n, nv), that gives the regressors of all robots, (n, nv, P).
 
     Args:
         parameters: what is adapted, one entry per robot.
@@ -48,25 +48,27 @@ def regressors(parameters: Sequence[Parameters], joints: Sequence[int]) -> Calla
     """
     groups = list(_groups(parameters, joints))
     shape = len(joints), max(joints), max(len(p.theta) for p in parameters)
-    return groups[0].regressor if len(groups) == 1 else partial(_together, groups, shape)
+    return groups[0].compute if len(groups) == 1 else partial(_compute_together, groups, shape)
 
 
-def _together(groups: Sequence[Group], shape: tuple[int, int, int], *motion: np.ndarray) -> Padded:
-    parts = []
-    for rows, nv, size, regressor in groups:
-        parts.append(Part(rows, nv, size, regressor(*(array[rows, :nv] for array in motion))))
-    return Padded(shape, parts)
+def _compute_together(
+    groups: Sequence[Group], shape: tuple[int, int, int], *motion: np.ndarray
+) -> np.ndarray:
+    Y = np.zeros(shape)
+    for robots, nv, size, compute in groups:
+        Y[robots, :nv, :size] = compute(*[part[robots, :nv] for part in motion])
+    return Y
 
 
 def _groups(parameters: Sequence[Any], joints: Sequence[int]) -> Iterator[Group]:
     """Parameters of one kind share forests wherever their robots stand; others are asked one by one."""
-    for kind, rows in alike(map(_kind, parameters)).items():
+    for kind, robots in alike(map(_kind, parameters)).items():
         if kind is None:
-            yield from (_alone(i, parameters[i], joints[i]) for i in rows)
+            yield from (_alone(i, parameters[i], joints[i]) for i in robots)
         else:
-            rigid = [_rigid(parameters[i]) for i in rows]
+            rigid = [_rigid(parameters[i]) for i in robots]
             for share in shares([p.robot for p in rigid], SMALL):
-                yield _in_forest([rows[k] for k in share], parameters)
+                yield _in_forest([robots[k] for k in share], parameters)
 
 
 def _kind(parameters: Any) -> Hashable:
@@ -83,37 +85,36 @@ def _rigid(parameters: Any) -> Any:
     return parameters.base if isinstance(parameters, FrictionParameters) else parameters
 
 
-def _in_forest(rows: Sequence[int], parameters: Sequence[Any]) -> Group:
+def _in_forest(robots: Sequence[int], parameters: Sequence[Any]) -> Group:
     """The group of some parameters of one kind whose robots share a forest."""
-    mine = [parameters[i] for i in rows]
+    mine = [parameters[i] for i in robots]
     rigid = [_rigid(p) for p in mine]
-    forest = Forest([p.robot for p in rigid])
-    regressor: Regressor = forest.regressor
-    if isinstance(rigid[0], LinearParameters):
-        regressor = partial(_mapped, regressor, Blocks.of(np.stack([p.matrix for p in rigid])))
+    linear = isinstance(rigid[0], LinearParameters)
+    forest = Forest([p.robot for p in rigid], np.stack([p.matrix for p in rigid]) if linear else None)
+    compute: Regressors = forest.regressor
     if isinstance(mine[0], FrictionParameters):
         smoothing = np.array([[p.smoothing] for p in mine])
-        regressor = partial(_rubbing, regressor, smoothing, mine[0].armature)
-    return Group(as_rows(rows), forest.nv, len(mine[0].theta), regressor)
+        compute = partial(_compute_with_friction, compute, smoothing, mine[0].armature)
+    return Group(as_selection(robots), forest.nv, len(mine[0].theta), compute)
 
 
-def _mapped(regressor: Regressor, B: Blocks, *motion: np.ndarray) -> BlockProduct:
-    """Y B, see `LinearParameters`."""
-    return BlockProduct(regressor(*motion), B)
-
-
-def _rubbing(regressor: Regressor, smoothing: np.ndarray, armature: bool, *motion: np.ndarray) -> Beside:
-    """[Y_b, diag(v_ref), diag(tanh(v / smoothing)), diag(a_ref)], see `FrictionParameters`."""
-    _, v, v_ref, a_ref = motion
-    diagonals = (v_ref, np.tanh(v / smoothing), *((a_ref,) if armature else ()))
-    return Beside(regressor(*motion), np.stack(diagonals, axis=1))
+def _compute_with_friction(
+    compute: Regressors,
+    smoothing: np.ndarray,
+    armature: bool,
+    q: np.ndarray,
+    v: np.ndarray,
+    v_ref: np.ndarray,
+    a_ref: np.ndarray,
+) -> np.ndarray:
+    return with_friction_columns(compute(q, v, v_ref, a_ref), v, v_ref, a_ref, smoothing, armature)
 
 
 def _alone(i: int, parameters: Parameters, nv: int) -> Group:
     """One robot with parameters of a kind of their own."""
-    return Group(slice(i, i + 1), nv, len(parameters.theta), partial(_asked, parameters))
+    return Group(slice(i, i + 1), nv, len(parameters.theta), partial(_compute_alone, parameters))
 
 
-def _asked(parameters: Parameters, *motion: np.ndarray) -> Blocks:
+def _compute_alone(parameters: Parameters, *motion: np.ndarray) -> np.ndarray:
     """The regressor of one robot as its parameters give it."""
-    return Blocks(np.asarray(parameters.regressor(*(part[0] for part in motion))), 1)
+    return np.asarray(parameters.regressor(*(part[0] for part in motion)))[None]

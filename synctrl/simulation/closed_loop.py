@@ -110,7 +110,7 @@ class ClosedLoop:
         signals = self.look(reference, state)
         self.respond(state, signals.tau, disturbance, rate)
         self.watch(state, signals, rate.v)
-        rate.z[...], rate.memory[...] = signals.z_dot, signals.command.memory_dot
+        rate.z[...], rate.memory[...] = signals.z_dot, signals.memory_dot
         return signals
 
     def final(self, t: float, state: State) -> Signals:

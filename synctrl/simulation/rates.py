@@ -24,10 +24,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..control.adaptation import Seen
-from ..control.commands import no_errors
+from ..control.laws import no_errors
 from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.cell import Reference
-from ..robots.regressors import regressors
+from ..robots.regressors import make_regressors
 from .closed_loop import ClosedLoop
 
 #: largest product of rate and step that was ever seen to do with the classical Runge-Kutta method, whose own
@@ -134,8 +134,7 @@ def _maps(
         memory, z = loop.controller.network.start(), loop.controller.adaptation.start()
         signals = loop.controller.evaluate(reference, motion, z, memory)
         wanted = signals.v_ref, signals.a_ref
-    regressor = regressors(cell.parameters, [robot.nv for robot in cell.robots])
-    Y = regressor(*motion, *wanted).matrices()
+    Y = make_regressors(cell.parameters, [robot.nv for robot in cell.robots])(motion[0], motion[1], *wanted)
     J = np.broadcast_to(np.eye(cell.m, cell.nv), (cell.n, cell.m, cell.nv)) if task.J is None else task.J
     return J, Y
 
@@ -160,15 +159,22 @@ def _answers(loop: ClosedLoop, reference: Reference, i: int) -> tuple[np.ndarray
     """
     n, m = loop.cell.n, loop.cell.m
     weights, share = reference.weights, _largest_share(loop)
-    still = replace(no_errors(n, m), t=reference.t, **weights._asdict())
+    still = replace(no_errors(n, m), t=reference.t, weights=weights)
     rest = loop.controller.law.command(still).force[i]
     found = np.zeros((2, m, m))
     for k in range(m):
-        e = np.zeros((n, m))
+        e, none = np.zeros((2, n, m))
         e[i, k] = -1.0
         w = np.matvec(weights.c, e)
-        moving = replace(still, e_dot=e, x_dot=-e, w_dot=w, sigma_dot=share * w)
-        away = replace(still, e=e, w=w, sigma=share * w)
+        heard = share * w
+        moving = replace(
+            still, error=np.array((none, e)), x_dot=-e, weighted=np.array((none, w)),
+            shares=np.array((none, none, heard)),
+        )  # fmt: skip
+        away = replace(
+            still, error=np.array((e, none)), weighted=np.array((w, none)),
+            shares=np.array((none, heard, none)),
+        )  # fmt: skip
         for matrix, errors in zip(found, (moving, away), strict=True):
             matrix[:, k] = rest - loop.controller.law.command(errors).force[i]
     damping, spring = (np.clip(np.nan_to_num(A + A.T) / 2, -HUGE, HUGE) for A in found)

@@ -25,17 +25,12 @@ class Algebra(NamedTuple):
     smallest: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def two_by_two(A: np.ndarray) -> np.ndarray:
-    """A^-1 of matrices with two rows, by minors."""
-    determinant = A[..., :1, :1] * A[..., 1:, 1:] - A[..., :1, 1:] * A[..., 1:, :1]
-    return _CHECKERED * A[..., ::-1, ::-1].mT / determinant
-
-
 def _inverse(A: np.ndarray) -> np.ndarray:
     """A^-1, and NaN where there is none, so that the run's guard can name the robot."""
     if A.shape[-1] == 2:
         with np.errstate(divide="ignore", invalid="ignore"):
-            return two_by_two(A)
+            determinant = A[..., :1, :1] * A[..., 1:, 1:] - A[..., :1, 1:] * A[..., 1:, :1]
+            return _CHECKERED * A[..., ::-1, ::-1].mT / determinant
     try:
         return np.linalg.inv(A)
     except np.linalg.LinAlgError:

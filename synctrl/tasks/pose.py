@@ -84,7 +84,7 @@ class BoundPoseSpace(BoundTipSpace):
     x'' = (acceleration, w_d'), all in world axes, see poses.py.
     """
 
-    def place(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
         v, (xd, xd_dot, xd_ddot) = motion[1], desired
         (position, _), R, J_t, J_t_dot = self._tips.poses(*motion)
         x, e, J, left = compare(xd, position, R, J_t)
@@ -92,10 +92,12 @@ class BoundPoseSpace(BoundTipSpace):
         turning = np.matvec(left, wd)
         left_dot = rotations.left_jacobian_inverse_dot(e[..., 3:], turning - x_dot[..., 3:])
         J_o_dot = left_dot.mT @ J_t[..., 3:, :] + left.mT @ J_t_dot[..., 3:, :]
+        J_dot = _below(J_t_dot[..., :3, :], J_o_dot)
+        inversion = self._inverse.invert(J, J_dot, *motion)
         turning_dot = np.matvec(left_dot, wd) + np.matvec(left, wd_dot)
         rates = np.stack((_beside(xd_dot[..., :3], turning), _beside(xd_ddot[..., :3], turning_dot)))
         moved, error = np.stack((x, x_dot)), np.stack((e, rates[0] - x_dot))
-        return Measurement(moved, error, rates, J, J_dot=_below(J_t_dot[..., :3, :], J_o_dot))
+        return Measurement(moved, error, rates, J, inversion.J_inv, J_dot, inversion)
 
 
 def compare(

@@ -114,6 +114,15 @@ class Inversion(NamedTuple):
     damping_rate: Any = None
 
 
+class Inverted(Protocol):
+    """What a way to joint space needs to know of an instant; a `Measurement` does."""
+
+    J: Any
+    J_inv: Any
+    J_dot: Any
+    inversion: Any
+
+
 class InverseMap(Protocol):
     """A way from task space to joint space."""
 
@@ -125,12 +134,7 @@ class InverseMap(Protocol):
         """Everything about this instant that does not depend on the reference."""
 
     def to_joints(
-        self,
-        J: np.ndarray,
-        J_dot: np.ndarray,
-        inversion: Inversion,
-        xref_dot: np.ndarray,
-        xref_ddot: np.ndarray,
+        self, task: Inverted, xref_dot: np.ndarray, xref_ddot: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """v_ref and a_ref = d/dt v_ref, (..., nv), from the reference in task space, (..., m)."""
 
@@ -148,15 +152,11 @@ class Inverse:
         return Inversion(self.algebra.inverse(J))
 
     def to_joints(
-        self,
-        J: np.ndarray,
-        J_dot: np.ndarray,
-        inversion: Inversion,
-        xref_dot: np.ndarray,
-        xref_ddot: np.ndarray,
+        self, task: Inverted, xref_dot: np.ndarray, xref_ddot: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        v_ref = np.matvec(inversion.J_inv, xref_dot)
-        return v_ref, np.matvec(inversion.J_inv, xref_ddot - np.matvec(J_dot, v_ref))
+        J_inv = task.J_inv
+        v_ref = np.matvec(J_inv, xref_dot)
+        return v_ref, np.matvec(J_inv, xref_ddot - np.matvec(task.J_dot, v_ref))
 
 
 class Pseudoinverse:
@@ -182,13 +182,9 @@ class Pseudoinverse:
         return self._inversion(J, q, v)
 
     def to_joints(
-        self,
-        J: np.ndarray,
-        J_dot: np.ndarray,
-        inversion: Inversion,
-        xref_dot: np.ndarray,
-        xref_ddot: np.ndarray,
+        self, task: Inverted, xref_dot: np.ndarray, xref_ddot: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
+        J, J_dot, inversion = task.J, task.J_dot, task.inversion
         J_inv, G, zeta, zeta_dot = inversion[:4]
         gap = xref_dot - np.matvec(J, zeta)
         mu = np.matvec(G, gap)

@@ -6,7 +6,7 @@ what its numbers are or goes one of two ways, so the same lines are traced with 
 
 from __future__ import annotations
 
-from math import factorial
+import math
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,7 +24,7 @@ _TINY = 1e-300
 _BERNOULLI = (1/6, 1/30, 1/42, 1/30, 5/66, 691/2730, 7/6, 3617/510, 43867/798, 174611/330)  # fmt: skip
 _POLES = (2 * np.pi * np.arange(1, 4)) ** 2
 _POWERS = np.arange(len(_BERNOULLI))
-_SERIES = np.array([B / factorial(2 * k) for k, B in enumerate(_BERNOULLI, start=1)]) - 2 * sum(
+_SERIES = np.array([B / math.factorial(2 * k) for k, B in enumerate(_BERNOULLI, start=1)]) - 2 * sum(
     1 / pole ** (_POWERS + 1.0) for pole in _POLES
 )
 #: of the derivative with respect to a^2

@@ -278,19 +278,10 @@ class BoundTipSpace:
 
     def __init__(self, tips: Kinematics, inverse: InverseMap, square: ArrayLike, limits: Mapping[str, float]):
         self._tips, self._inverse, self._square, self.limits = tips, inverse, np.array(square), limits
-
-    def place(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
-        """As `measure`, without the way back to the joints."""
-        raise NotImplementedError
+        self.to_joints = inverse.to_joints
 
     def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
-        task = self.place(motion, desired)
-        task.inversion = self._inverse.invert(task.J, task.J_dot, *motion)  # type: ignore[arg-type]
-        task.J_inv = task.inversion.J_inv
-        return task
-
-    def to_joints(self, task: Measurement, xref_dot: np.ndarray, xref_ddot: np.ndarray) -> Joints:
-        return self._inverse.to_joints(task.J, task.J_dot, task.inversion, xref_dot, xref_ddot)  # type: ignore[arg-type]
+        raise NotImplementedError
 
     def to_torque(self, task: Measurement, force: np.ndarray) -> np.ndarray:
         return np.matvec(task.J.mT, force)  # type: ignore[union-attr]
@@ -322,10 +313,11 @@ class BoundCartesianSpace(BoundTipSpace):
         first, last = rows[0], rows[-1]
         self._rows = slice(first, last + 1) if rows == list(range(first, last + 1)) else rows
 
-    def place(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
         moved, J, J_dot = self._tips.positions(*motion)
         moved, J, J_dot = moved[..., self._rows], J[..., self._rows, :], J_dot[..., self._rows, :]
-        return Measurement(moved, desired[:2] - moved, desired[1:], J, J_dot=J_dot)
+        inversion = self._inverse.invert(J, J_dot, *motion)
+        return Measurement(moved, desired[:2] - moved, desired[1:], J, inversion.J_inv, J_dot, inversion)
 
 
 def _damping(singularity: str | Damping) -> Damping | None:

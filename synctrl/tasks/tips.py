@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
-from ..robots.blocks import Rows
-from ..robots.forest import Forest, forests
+from ..robots.forest import Forest, Selection, forests
 from ..robots.robot import Robot
 
 Positions = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -33,27 +32,27 @@ class Tips:
         self._robots = robots
 
     @cached_property
-    def _forests(self) -> list[tuple[Rows, Forest]]:
+    def _forests(self) -> list[tuple[Selection, Forest]]:
         return forests(self._robots)
 
     @cached_property
-    def _only(self) -> Forest | None:
-        """The forest, if there is only one."""
-        return self._forests[0][1] if len(self._forests) == 1 else None
-
-    def positions(self, q: np.ndarray, v: np.ndarray) -> Positions:
+    def positions(self) -> Callable[[np.ndarray, np.ndarray], Positions]:
         """Positions and velocities of the tips, the velocities' Jacobians, and the Jacobians' derivatives.
 
-        Columns of joints that a robot does not have are zero.
-
-        Args:
-            q, v: joint positions and velocities, (n, nv).
-
-        Returns:
-            (2, n, 3), m and m/s; then (n, 3, nv), twice.
+        Of q and v, (n, nv), it gives (2, n, 3), m and m/s; then (n, 3, nv), twice. Columns of joints that a
+        robot does not have are zero.
         """
-        if self._only is not None:
-            return self._only.tips(q, v)
+        return self._forests[0][1].tips if len(self._forests) == 1 else self._positions_together
+
+    @cached_property
+    def poses(self) -> Callable[[np.ndarray, np.ndarray], Poses]:
+        """The same with rotation matrices, and with Jacobians of linear and angular velocities.
+
+        Of q and v, (n, nv), it gives (2, n, 3), m and m/s; (n, 3, 3); then (n, 6, nv), twice.
+        """
+        return self._forests[0][1].poses if len(self._forests) == 1 else self._poses_together
+
+    def _positions_together(self, q: np.ndarray, v: np.ndarray) -> Positions:
         n, nv = q.shape
         motion, (J, J_dot) = np.empty((2, n, 3)), np.zeros((2, n, 3, nv))
         for rows, forest in self._forests:
@@ -61,17 +60,7 @@ class Tips:
             motion[:, rows], J[rows, :, :k], J_dot[rows, :, :k] = forest.tips(q[rows, :k], v[rows, :k])
         return motion, J, J_dot
 
-    def poses(self, q: np.ndarray, v: np.ndarray) -> Poses:
-        """The same with rotation matrices, (n, 3, 3), and with Jacobians of linear and angular velocities.
-
-        Args:
-            q, v: joint positions and velocities, (n, nv).
-
-        Returns:
-            (2, n, 3), m and m/s; (n, 3, 3); then (n, 6, nv), twice.
-        """
-        if self._only is not None:
-            return self._only.poses(q, v)
+    def _poses_together(self, q: np.ndarray, v: np.ndarray) -> Poses:
         n, nv = q.shape
         motion, R, (J, J_dot) = np.empty((2, n, 3)), np.empty((n, 3, 3)), np.zeros((2, n, 6, nv))
         for rows, forest in self._forests:

@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike
 
 from ...coupling.cell import Cell
 from ...errors import InputError
-from .. import law
 from ..gains import read_gain, spread_rows
-from ..rows import Rows
+from ..ragged_gain import RaggedGain
 from .protocol import Adaptation, Seen
 
 
@@ -30,7 +29,7 @@ class Gradient:
         InputError: not numbers, not finite, or below 0.
     """
 
-    def __init__(self, Gamma: ArrayLike | Rows):
+    def __init__(self, Gamma: ArrayLike | RaggedGain):
         self.Gamma = read_gain("Gamma", Gamma)
         if self.Gamma.size and self.Gamma.min() < 0:
             raise InputError(f"Gamma: expected entries of at least 0, found {self.Gamma.min():g}")
@@ -48,7 +47,7 @@ class Gradient:
         return {"name": "Gradient", "Gamma": self.Gamma.tolist()}
 
 
-def chosen(Gamma: np.ndarray | Rows | None, adaptation: Adaptation | None) -> Adaptation:
+def chosen(Gamma: np.ndarray | RaggedGain | None, adaptation: Adaptation | None) -> Adaptation:
     """The adaptation of a controller: the one given, or the paper's with the rate among its gains.
 
     Raises:
@@ -78,7 +77,7 @@ class BoundGradient:
         return z
 
     def rate(self, z: np.ndarray, seen: Seen) -> np.ndarray:
-        return law.adaptation(seen.gradient, self.Gamma)
+        return self.Gamma * seen.gradient
 
     def settle(self, z: np.ndarray) -> np.ndarray:
         return z
@@ -91,4 +90,4 @@ class BoundGradient:
 
     def powers(self, z: np.ndarray, theta: np.ndarray, seen: Seen) -> Mapping[str, float]:
         frozen = np.where(self.Gamma > 0, 0.0, theta - z)
-        return {"model error": float(np.sum(seen.s_q * seen.regressor.times(frozen)))}
+        return {"model error": float(np.sum(seen.s_q * np.matvec(seen.regressor, frozen)))}

@@ -130,7 +130,7 @@ class BoundNatural:
         frozen = np.zeros_like(theta)
         if not self.gamma_friction:
             frozen[:, 10 * self._bodies :] = true_friction - friction
-        return {"model error": float(np.sum(seen.s_q * seen.regressor.times(frozen)))}
+        return {"model error": float(np.sum(seen.s_q * np.matvec(seen.regressor, frozen)))}
 
     # -- internals ----------------------------------------------------------------------------------------
 

@@ -2,7 +2,7 @@
 
 from .chung_slotine import ChungSlotine
 from .options import Options, chosen
-from .protocol import Along, Asked, BoundLaw, Errors, Law, Proof
+from .protocol import Along, Asked, BoundLaw, Errors, Law, Proof, completed, no_errors
 from .sun_mills import SunMills
 
 __all__ = [
@@ -16,4 +16,6 @@ __all__ = [
     "Proof",
     "SunMills",
     "chosen",
+    "completed",
+    "no_errors",
 ]

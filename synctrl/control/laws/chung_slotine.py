@@ -11,9 +11,9 @@ from ...checks import finite_array
 from ...coupling.cell import Cell
 from ...coupling.coupling import Coupling
 from ...errors import InputError
-from .. import law
 from ..gains import Gains, spread
 from .protocol import Along, Asked, Errors, Proof
+from .sun_mills import BoundSunMills
 
 
 class ChungSlotine:
@@ -61,20 +61,13 @@ class BoundChungSlotine:
     """`ChungSlotine` with gains, (m,), and the coupling that compares r."""
 
     def __init__(self, Lambda: np.ndarray, K_2: np.ndarray, coupling: Coupling):
+        none = np.zeros_like(Lambda)
         self.Lambda, self.K_2, self._coupling = Lambda, K_2, coupling
+        self._tracking = BoundSunMills(Lambda, none, none, "exact")
 
     def command(self, errors: Errors) -> Asked:
-        x, Lambda = errors, self.Lambda
-        none = np.zeros_like(Lambda)
-        u = law.command(x.c, x.c_dot, x.xd_dot, x.e, x.sigma, x.w, none, Lambda)
-        u_dot = law.command_dot(
-            x.c, x.c_dot, x.c_ddot, x.xd_dot, x.xd_ddot, x.e, x.e_dot, x.w_dot, x.sigma, x.sigma_dot,
-            none, Lambda,
-        )  # fmt: skip
-        xref_dot = law.reference_velocity(x.c_inv, u)
-        xref_ddot = law.reference_acceleration_exact(x.c_inv, x.c_dot, u_dot, xref_dot, x.x_dot)
-        force = law.transposed_times(x.c, self.K_2 * (x.sigma_dot + Lambda * x.sigma))
-        return Asked(xref_dot, xref_ddot, force, x.w, np.stack((u, u_dot)))
+        rho_shares = errors.sigma_dot + self.Lambda * errors.sigma
+        return self._tracking.command(errors)._replace(force=np.matvec(errors.c.mT, self.K_2 * rho_shares))
 
     def proof(self, along: Along) -> Proof:
         """No energy of its own; it only takes."""

@@ -23,39 +23,66 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from ...coupling.cell import Cell
+from ...coupling.weights import Weights
 from ..gains import Gains
 
 
 @dataclass(slots=True)
 class Errors:
-    """What a law sees at one instant, one row per robot.
+    """What a law sees at one instant, one row per robot; quantities with their derivatives are pairs.
 
     Attributes:
         t: the instant, s; not in generated code.
-        e, e_dot: tracking errors and their rates, (n, m), task unit and task unit per s.
+        error: tracking errors e and their rates e', (2, n, m), task unit and task unit per s.
         x_dot: measured velocities, (n, m).
-        xd_dot, xd_ddot: desired velocities and accelerations, (n, m).
-        w, w_dot: weighted errors c e and their rates, (n, m).
-        E, sigma, sigma_dot: what the network told, (n, m): S^T times the integrals of epsilon, epsilon
-            itself and its rate.
-        c, c_dot, c_ddot, c_inv: weights, (n, m, m).
+        rates: desired velocities xd' and accelerations xd'', (2, n, m).
+        weighted: weighted errors w = c e and their rates w', (2, n, m).
+        shares: what the network told, (3, n, m): E, sigma and sigma', which are S^T times the integrals of
+            epsilon, epsilon itself and its rate.
+        weights: c, c', c'' and c^-1, (n, m, m) each.
+
+    The same, each (n, m), is called e, e_dot, xd_dot, xd_ddot, w, w_dot, E, sigma and sigma_dot; and the
+    weights c, c_dot, c_ddot and c_inv.
     """
 
     t: Any
-    e: np.ndarray
-    e_dot: np.ndarray
+    error: np.ndarray
     x_dot: np.ndarray
-    xd_dot: np.ndarray
-    xd_ddot: np.ndarray
-    w: np.ndarray
-    w_dot: np.ndarray
-    E: np.ndarray
-    sigma: np.ndarray
-    sigma_dot: np.ndarray
-    c: np.ndarray
-    c_dot: np.ndarray
-    c_ddot: np.ndarray
-    c_inv: np.ndarray
+    rates: np.ndarray
+    weighted: np.ndarray
+    shares: np.ndarray
+    weights: Weights
+
+    e = property(lambda self: self.error[0])
+    e_dot = property(lambda self: self.error[1])
+    xd_dot = property(lambda self: self.rates[0])
+    xd_ddot = property(lambda self: self.rates[1])
+    w = property(lambda self: self.weighted[0])
+    w_dot = property(lambda self: self.weighted[1])
+    E = property(lambda self: self.shares[0])
+    sigma = property(lambda self: self.shares[1])
+    sigma_dot = property(lambda self: self.shares[2])
+    c = property(lambda self: self.weights.c)
+    c_dot = property(lambda self: self.weights.c_dot)
+    c_ddot = property(lambda self: self.weights.c_ddot)
+    c_inv = property(lambda self: self.weights.c_inv)
+
+    @classmethod
+    def from_rows(cls, t: Any = None, **rows: np.ndarray) -> Errors:
+        """Errors of the rows e, e_dot, x_dot, ..., (n, m) each, and the weights, (n, m, m) each, by name."""
+
+        def together(*names: str) -> np.ndarray:
+            return np.array([rows[name] for name in names])
+
+        return cls(
+            t, together("e", "e_dot"), rows["x_dot"], together("xd_dot", "xd_ddot"), together("w", "w_dot"),
+            together("E", "sigma", "sigma_dot"), Weights(*(rows[name] for name in WEIGHTS)),
+        )  # fmt: skip
+
+
+#: what is in `Errors`: rows, (n, m) each, and weights, (n, m, m) each
+ROWS = ("e", "e_dot", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot", "E", "sigma", "sigma_dot")
+WEIGHTS = ("c", "c_dot", "c_ddot", "c_inv")
 
 
 class Asked(NamedTuple):
@@ -71,8 +98,25 @@ class Asked(NamedTuple):
     xref_dot: np.ndarray
     xref_ddot: np.ndarray
     force: np.ndarray
-    e_star: np.ndarray | None = None
-    u: np.ndarray | None = None
+    e_star: Any = None
+    u: Any = None
+
+
+def no_errors(n: int, m: int) -> Errors:
+    """Errors that are all zero, under weights of one."""
+    none, one, zero = np.zeros((3, n, m)), np.broadcast_to(np.eye(m), (n, m, m)), np.zeros((n, m, m))
+    return Errors(0.0, none[:2], none[0], none[:2], none[:2], none, Weights(one, zero, zero, one))
+
+
+def completed(asked: Asked, errors: Errors) -> Asked:
+    """What a law asks for, with w for e*, and c xref' and its rate for u, where it does not say."""
+    if asked.e_star is None:
+        asked = asked._replace(e_star=errors.w)
+    if asked.u is None:
+        u = np.matvec(errors.c, asked.xref_dot)
+        u_dot = np.matvec(errors.c, asked.xref_ddot) + np.matvec(errors.c_dot, asked.xref_dot)
+        asked = asked._replace(u=np.stack((u, u_dot)))
+    return asked
 
 
 @dataclass(slots=True)

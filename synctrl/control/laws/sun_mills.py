@@ -8,14 +8,11 @@ import numpy as np
 
 from ...checks import choice
 from ...coupling.cell import Cell
-from .. import law
 from ..gains import Gains, spread
 from .protocol import Along, Asked, Errors, Proof
 
-REFERENCE_ACCELERATIONS = {
-    "exact": law.reference_acceleration_exact,
-    "paper": law.reference_acceleration_paper,
-}
+#: what xref'' may be: the derivative of xref', or what (13) prints
+REFERENCE_ACCELERATIONS = "exact", "paper"
 #: where the damping K_r may act
 K_R_SPACES = "joint", "task"
 
@@ -33,7 +30,7 @@ class SunMills:
 
     def __init__(self, reference_acceleration: str = "exact", k_r_space: str = "joint"):
         self.reference_acceleration = choice(
-            "reference_acceleration", reference_acceleration, tuple(REFERENCE_ACCELERATIONS)
+            "reference_acceleration", reference_acceleration, REFERENCE_ACCELERATIONS
         )
         self.k_r_space = choice("k_r_space", k_r_space, K_R_SPACES)
 
@@ -61,20 +58,21 @@ class BoundSunMills:
 
     def __init__(self, Lambda: np.ndarray, beta: np.ndarray, K_eps: np.ndarray, reference_acceleration: str):
         self.Lambda, self.beta, self.K_eps = Lambda, beta, K_eps
-        self._acceleration = REFERENCE_ACCELERATIONS[reference_acceleration]
+        self.reference_acceleration = reference_acceleration
 
     def command(self, errors: Errors) -> Asked:
         x, Lambda, beta = errors, self.Lambda, self.beta
-        e_star = law.coupled_error(x.w, x.E, beta)
-        u = law.command(x.c, x.c_dot, x.xd_dot, x.e, x.sigma, e_star, beta, Lambda)
-        u_dot = law.command_dot(
-            x.c, x.c_dot, x.c_ddot, x.xd_dot, x.xd_ddot, x.e, x.e_dot, x.w_dot, x.sigma, x.sigma_dot,
-            beta, Lambda,
-        )  # fmt: skip
-        xref_dot = law.reference_velocity(x.c_inv, u)
-        xref_ddot = self._acceleration(x.c_inv, x.c_dot, u_dot, xref_dot, x.x_dot)
-        force = law.synchronizing_force(x.c, x.sigma, self.K_eps)
-        return Asked(xref_dot, xref_ddot, force, e_star, np.stack((u, u_dot)))
+        c, c_dot, c_ddot, c_inv = x.weights
+        e = x.error[0]
+        e_star = x.weighted + beta * x.shares[:2]  # (10), (29), and the derivative
+        u = np.matvec(c, x.rates) + beta * x.shares[1:] + Lambda * e_star  # (11), (30), and the derivative
+        u[0] += np.matvec(c_dot, e)
+        u[1] += np.matvec(c_dot, x.rates[0] + x.error[1]) + np.matvec(c_ddot, e)
+        xref_dot = np.matvec(c_inv, u[0])
+        turned = xref_dot if self.reference_acceleration == "exact" else x.x_dot  # (13) prints x'
+        xref_ddot = np.matvec(c_inv, u[1] - np.matvec(c_dot, turned))
+        force = np.matvec(c.mT, self.K_eps * x.shares[1])  # the last term of (13) and (32)
+        return Asked(xref_dot, xref_ddot, force, e_star[0], u)
 
     def proof(self, along: Along) -> Proof:
         """Springs on epsilon and E, and what they lose, (19), (24), (34) and (39)."""

@@ -12,7 +12,7 @@ from ..checks import finite_array, finite_number
 from ..tasks.padding import padded
 
 
-class Rows:
+class RaggedGain:
     """Vectors of different lengths that can be scaled like one array.
 
     Args:
@@ -62,9 +62,9 @@ class Rows:
     def __getitem__(self, i: int) -> np.ndarray:
         return self.rows[i]
 
-    def __mul__(self, factor: Any) -> Rows:
+    def __mul__(self, factor: Any) -> RaggedGain:
         factor = finite_number("factor", factor)
-        return Rows(self.name, [factor * row for row in self.rows])
+        return RaggedGain(self.name, [factor * row for row in self.rows])
 
     __rmul__ = __mul__
 
@@ -74,7 +74,7 @@ class Rows:
 
 def are_ragged(value: Any) -> bool:
     """Whether a value consists of vectors of different lengths."""
-    if isinstance(value, Rows):
+    if isinstance(value, RaggedGain):
         return True
     if not isinstance(value, (list, tuple)):
         return False

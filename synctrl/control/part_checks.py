@@ -1,0 +1,64 @@
+"""What a law and a network give, looked at once before anything runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, SynctrlError
+from .laws import BoundLaw, no_errors
+from .network import BoundNetwork
+
+
+def check_parts(law: BoundLaw, network: BoundNetwork, n: int, p: int, m: int) -> None:
+    """Look at what law and network give where there are no errors.
+
+    Args:
+        law, network: for the robots of one cell.
+        n, p, m: numbers of robots, of synchronization errors and of task coordinates.
+
+    Raises:
+        InputError: something of another shape than it should have, or one that fails where there are no
+            errors.
+    """
+    with _named("network", network):
+        memory = network.start()
+        integral = network.integral(memory)
+        received = network.exchange(0.0, np.zeros((2, n, m)), memory)
+    with _named("law", law):
+        asked = law.command(no_errors(n, m))
+    _check_shapes("network", network, {
+        "epsilon": (received.epsilon, (p, m)), "epsilon_dot": (received.epsilon_dot, (p, m)),
+        "shares": (received.shares, (3, n, m)), "memory_dot": (received.memory_dot, np.shape(memory)),
+        "integral": (integral, (p, m)),
+    })  # fmt: skip
+    _check_shapes("law", law, {
+        "xref_dot": (asked.xref_dot, (n, m)), "xref_ddot": (asked.xref_ddot, (n, m)),
+        "force": (asked.force, (n, m)),
+    })  # fmt: skip
+
+
+@contextmanager
+def _named(role: str, part: Any) -> Iterator[None]:
+    """Name the part that fails in between."""
+    try:
+        yield
+    except SynctrlError:
+        raise
+    except Exception as error:  # whatever a user's code raises
+        raise InputError(
+            f"{role} {type(part).__qualname__}: expected one that works where there are no errors, found "
+            f"{type(error).__name__}: {error}"
+        ) from error
+
+
+def _check_shapes(role: str, part: Any, parts: Mapping[str, tuple[Any, tuple[int, ...]]]) -> None:
+    for name, (value, shape) in parts.items():
+        if np.shape(value) != shape:
+            raise InputError(
+                f"{role} {type(part).__qualname__}, {name}: expected an array of shape {shape}, found "
+                f"{np.shape(value)}"
+            )
