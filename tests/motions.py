@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from synctrl.tasks.derivatives import Misfit, Sample, difference, find_misfit, look_at
+from synctrl.tasks.derivatives import Misfit, Sample, difference, find_misfit, spread_windows
 
 
 class Case(NamedTuple):
@@ -19,7 +19,7 @@ class Case(NamedTuple):
     breaks: tuple[float, ...] = ()
 
     def misfit(self, count: int = 24) -> Misfit | None:
-        windows = look_at(0.0, self.duration, self.breaks, count)
+        windows = spread_windows(0.0, self.duration, self.breaks, count)
         return find_misfit(self.sample, windows, [slice(0, self.size)], 0.0, difference)
 
     def spoilt(self, change: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Case:

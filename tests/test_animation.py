@@ -11,8 +11,6 @@ from synctrl import Cell, Coupling, Experiment, Gains, Hold, Member, load_robot
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, planar_four
 from synctrl.show.animation import (
-    ALARM,
-    CALM,
     PAIR_TIMES,
     PAYLOAD,
     PLANAR_TIMES,
@@ -21,6 +19,7 @@ from synctrl.show.animation import (
     payload_pair_scene,
     planar_scene,
 )
+from synctrl.show.arms import ALARM, CALM
 from synctrl.tasks.rotations import from_quaternion as rotations
 
 FPS = 25.0

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from machines import seeds
 from motions import HARD, random_sines
 
-from synctrl.tasks.derivatives import look_at
+from synctrl.tasks.derivatives import spread_windows
 
 
 @settings(max_examples=150)
@@ -67,7 +67,7 @@ def test_a_term_that_is_left_out_is_found() -> None:
     st.integers(2, 30),
 )
 def test_no_window_reaches_across_a_break_or_out_of_the_run(breaks, stop, count) -> None:
-    windows = look_at(0.0, stop, breaks, count)
+    windows = spread_windows(0.0, stop, breaks, count)
     ends = windows.start + windows.room
     assert (windows.start >= 0).all() and (ends <= stop).all() and (windows.room > 0).all()
     for b in breaks:

@@ -181,7 +181,7 @@ def parameters_of(kind: str, robot: Robot):
         ("theta 50", "full", "friction", "base", "friction", "full", "base", "friction"),
     ],
 )
-def test_make_regressors_a_cell_are_those_of_its_robots(kinds: tuple[str, ...]) -> None:
+def test_regressors_of_a_cell_are_those_of_its_robots(kinds: tuple[str, ...]) -> None:
     robots = mixed(7)
     parameters = [parameters_of(kind, robot) for kind, robot in zip(kinds, robots, strict=True)]
     n, nv, P = len(robots), max(r.nv for r in robots), max(p.theta.size for p in parameters)

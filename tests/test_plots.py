@@ -115,6 +115,14 @@ def test_the_same_run_gives_the_same_files(planar, tmp_path):
     assert one[0].read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
 
 
+def test_a_picture_has_the_resolution_of_its_figure(planar, tmp_path):
+    figure = sync_errors(planar)
+    pixels = figure.get_size_inches() * figure.dpi // 1
+    for _ in range(2):
+        header = save(figure, tmp_path / "picture")[0].read_bytes()[16:24]  # width and height, in a PNG
+        assert (np.frombuffer(header, ">u4") == pixels).all()
+
+
 def test_a_vector_figure_holds_no_script_date_or_address_to_load(planar, tmp_path):
     text = save(cell_layout(planar), tmp_path / "layout")[1].read_text("utf-8")
     assert text.rstrip().endswith("</svg>")

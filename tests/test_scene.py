@@ -597,9 +597,9 @@ POINTS = np.zeros((3, 3))
         (lambda s: s.add_sphere(7, 0.1, POINTS, "#ff0000"), "name: expected text, found int"),
         (lambda s: s.add_sphere("b", -1, POINTS, "#ff0000"), "b: radius: expected no length below 0"),
         (lambda s: s.add_sphere("b", 1, np.zeros((0, 3)), "#ff0000"), "b: position: expected shape"),
-        (lambda s: s.add_sphere("b", 1, POINTS, "red"), "b: color: expected #rrggbb.*found 'red'"),
+        (lambda s: s.add_sphere("b", 1, POINTS, "rouge"), "b: color: expected #rrggbb.*found 'rouge'"),
         (lambda s: s.add_sphere("b", 1, POINTS, "#gg0000"), "b: color: expected #rrggbb"),
-        (lambda s: s.add_sphere("b", 1, POINTS, (1, 0)), r"b: color: expected three or four.*\(2,\)"),
+        (lambda s: s.add_sphere("b", 1, POINTS, (1, 0)), r"b: color: expected .*three or four.*\[1"),
         (lambda s: s.add_sphere("b", 1, POINTS, (255, 0, 0)), r"numbers in \[0, 1\], found 0 to 255"),
         (lambda s: s.add_sphere("b", 1, POINTS, 2 * np.ones((3, 3))), r"numbers in \[0, 1\], found 2 to 2"),
         (lambda s: s.add_box("b", (1, 0, 1), POINTS, "#ff0000"), "b: size: expected three lengths above 0"),
@@ -665,7 +665,7 @@ def test_real_meshes_are_shaded_and_hostile_names_do_nothing(tmp_path: Path) -> 
         assert page.evaluate("document.querySelectorAll('img').length") == 0
         assert page.evaluate("document.querySelector('h1').textContent") == HOSTILE
         counts = page.evaluate(COUNT_NORMALS)
-        assert counts["all"] > 100_000
+        assert counts["all"] > 50_000
         assert counts["unit"] > 0.99 * counts["all"]  # a triangle without area has no normal
 
 

@@ -41,6 +41,11 @@ def test_breaks_may_separate_pieces() -> None:
     np.testing.assert_allclose(found(1.3).x_ddot, known(1.3).x_ddot, atol=1e-6)  # from the right
 
 
+def test_a_motion_that_jumps_itself_at_a_break_is_refused() -> None:
+    with pytest.raises(TrajectoryError, match=r"the position cannot be found: near t = 0\.[67]"):
+        SmoothTrajectory(lambda t: [float(t >= 0.7)], 2.0, breaks=(0.7,))
+
+
 @pytest.mark.parametrize(
     ("position", "says"),
     [

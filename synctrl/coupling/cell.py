@@ -171,7 +171,9 @@ class Cell:
 
     def weights(self, times: np.ndarray) -> Weights:
         """Weights of the coupling at the times, (T,); see `desired_weights`."""
-        return desired_weights(self.coupling, times, self.m)
+        if self.coupling.is_constant:
+            return self.coupling.weights(times, self.m)
+        return desired_weights(lambda at: self.coupling.weights(at, self.m), times)
 
     def references(self, times: np.ndarray) -> list[Reference]:
         """What is desired at each of the times, (T,)."""

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 
-from ..tasks.asked import asked, finite_weights, not_finite
+from ..errors import NonFiniteError, SynctrlError, failed
 from ..tasks.trajectories import MOTION_PARTS, Motion, Trajectory
+from .weights import DERIVATIVES, Weights
 
-if TYPE_CHECKING:
-    from .coupling import Coupling
-    from .weights import Weights
+Found = TypeVar("Found")
 
 
 def desired_motion(name: str, robot: int, trajectory: Trajectory, times: np.ndarray) -> Motion:
@@ -33,17 +33,62 @@ def desired_motion(name: str, robot: int, trajectory: Trajectory, times: np.ndar
         x, x_dot, x_ddot = trajectory(at)
         return Motion(x, x_dot, x_ddot)
 
-    motion = asked(call, times, f"the desired motion of {name}", robot)
+    what = f"the desired motion of {name}"
+    motion = _asked(call, times, what, robot)
     for part, value in zip(MOTION_PARTS, motion, strict=True):
-        if not np.isfinite(value).all():
-            k = int(np.argwhere(~np.isfinite(value))[0][0])
-            found = f"its {part} is {np.asarray(value)[k].tolist()}"
-            raise not_finite(f"the desired motion of {name}", found, float(times[k]), robot, "motion")
+        _check_finite(what, f"its {part}", value, times, robot, "motion")
     return motion
 
 
-def desired_weights(coupling: Coupling, times: np.ndarray, m: int) -> Weights:
-    """Weights of a coupling at some times, (T,), for a task of dimension m; see `finite_weights`."""
-    if coupling.is_constant:
-        return coupling.weights(times, m)
-    return finite_weights(lambda at: coupling.weights(at, m), times)
+def desired_weights(weights: Callable[[np.ndarray], Weights], times: np.ndarray) -> Weights:
+    """Weights of a coupling at some times, (T,).
+
+    Args:
+        weights: times -> weights.
+        times: (T,), s.
+
+    Raises:
+        SynctrlError: what the weights raise of this kind.
+        SimulationError: they raise anything else; with the time.
+        NonFiniteError: they are infinite or not numbers; with robot and time.
+    """
+    found = _asked(weights, times, "the weights of the coupling", None)
+    for name, value in zip(DERIVATIVES, found, strict=False):
+        wrong = ~np.isfinite(value).all(axis=(0, 2, 3))
+        for i in np.flatnonzero(wrong)[:1].tolist():
+            _check_finite(f"{name} of the robot at index {i}", "it", value[:, i], times, i, "weights")
+    return found
+
+
+def _asked(call: Callable[[np.ndarray], Found], times: np.ndarray, what: str, robot: int | None) -> Found:
+    """What a function of the user's gives at some times, (T,), s; `what` names it in messages."""
+    try:
+        return call(times)
+    except SynctrlError:
+        raise
+    except Exception as error:
+        raise failed(what, _first_failure(call, times), error, robot) from error
+
+
+def _first_failure(call: Callable[[np.ndarray], Any], times: np.ndarray) -> float:
+    """The first of the times at which a call fails; the first of all if it only fails for many at once."""
+    for t in np.unique(times):
+        try:
+            call(np.array([t]))
+        except Exception:
+            return float(t)
+    return float(times.min())
+
+
+def _check_finite(what: str, part: str, value: np.ndarray, times: np.ndarray, robot: int, cause: str) -> None:
+    """Refuse numbers, (T, ...), that are not finite at one of the times."""
+    wrong = ~np.isfinite(value)
+    if wrong.any():
+        k = int(np.argwhere(wrong)[0][0])
+        raise NonFiniteError(
+            f"{what} is not finite at t = {times[k]:g} s: {part} is {np.asarray(value)[k].tolist()}; "
+            "expected finite numbers at all times of the run",
+            time=float(times[k]),
+            robot=robot,
+            cause=cause,
+        )

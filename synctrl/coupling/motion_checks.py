@@ -9,7 +9,7 @@ import numpy as np
 
 from ..checks import finite_array
 from ..errors import InputError, SimulationError, TrajectoryError
-from ..tasks.derivatives import Displacement, Misfit, difference, find_misfit, look_at
+from ..tasks.derivatives import Misfit, difference, find_misfit_in_motion, spread_windows
 from ..tasks.spaces import units_of
 from ..tasks.trajectories import MOTION_PARTS, Motion
 from .cell import Cell
@@ -38,20 +38,12 @@ def check_motions(cell: Cell, times: np.ndarray) -> None:
 
 
 def _check_motion(cell: Cell, robot: int, start: float, stop: float, count: int) -> None:
-    windows = look_at(start, stop, cell.members[robot].trajectory.breaks, count)
+    windows = spread_windows(start, stop, cell.members[robot].trajectory.breaks, count)
     groups = _groups(units_of(cell.space, cell.m))
     way = getattr(cell.space, "displacement", difference)
-    largest = np.abs(_motion(cell, robot, windows.start).x).max()
-    ways: tuple[Displacement, Displacement] = (way, difference)
-    for order, displacement in enumerate(ways):
-
-        def sample(t: np.ndarray, order: int = order) -> tuple[np.ndarray, np.ndarray]:
-            motion = _motion(cell, robot, t)
-            return motion[order], motion[order + 1]
-
-        misfit = find_misfit(sample, windows, groups, order * largest / stop, displacement)
-        if misfit is not None:
-            raise _error(cell, cell.names[robot], order, misfit)
+    found = find_misfit_in_motion(lambda t: _motion(cell, robot, t), windows, groups, way)
+    if found is not None:
+        raise _error(cell, cell.names[robot], *found)
 
 
 def _groups(units: tuple[str, ...]) -> list[slice]:
@@ -73,8 +65,8 @@ def _motion(cell: Cell, robot: int, times: np.ndarray) -> Motion:
 def _error(cell: Cell, name: str, order: int, misfit: Misfit) -> TrajectoryError:
     label = cell.labels[misfit.coordinate]
     unit = units_of(cell.space, cell.m)[misfit.coordinate]
-    per = ("/s", "/s^2")[order]
-    function, derivative = MOTION_PARTS[order : order + 2]
+    per = ("/s", "/s^2")[order - 1]
+    function, derivative = MOTION_PARTS[order - 1 : order + 1]
     return TrajectoryError(
         f"{name}, trajectory: its {derivative} along {label} does not fit its {function}: near "
         f"t = {misfit.time:.6g} s found {misfit.found:.6g} {unit}{per}, but the {function} changes by "

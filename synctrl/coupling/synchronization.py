@@ -10,18 +10,17 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, finite_number, instance, positive_number
 from ..errors import CouplingError, InputError, SynchronizationError
-from ..tasks.chebyshev import ACCURACY, NotSmoothError, certify
+from ..tasks.chebyshev import NotSmoothError, certify
 from ..tasks.trajectories import Trajectory
 from .coupling import Coupling
 from .expansion import Expansion, expand, least_linear
 from .member_checks import check_trajectory
-from .weights import ConstantWeights, FunctionWeights, SmoothWeights, WeightSource, as_matrices
+from .weights import DERIVATIVES, ConstantWeights, FunctionWeights, SmoothWeights, WeightSource, as_matrices
 
 #: a number of evenly spaced instants of a run
 INSTANTS = 401
 #: f may bend, or be off zero on the desired motion, by these shares of the size of its terms
 LINEAR, SATISFIED = 1e-9, 1e-6
-DERIVATIVES = ("c", "c'", "c''")
 
 MatrixFunction = Callable[[float], ArrayLike]
 GraphLike = Callable[..., Coupling]
@@ -146,10 +145,8 @@ class SynchronizationFunction:
             smooth = certify(self.c, positive_number("duration", duration))
         except NotSmoothError as error:
             raise SynchronizationError(
-                f"the weights cannot be differentiated with a relative error below {ACCURACY:g}: near t = "
-                f"{error.time:g} s {DERIVATIVES[error.order]} of robot {error.row + 1} is off by "
-                f"{ACCURACY * error.error:.2g}; expected functions of time that are smooth and not noisy, "
-                "or their derivatives, see SynchronizationFunction.from_matrices"
+                f"the weights cannot be differentiated: {DERIVATIVES[error.order]} of robot {error.row + 1}: "
+                f"{error}, or its derivatives, see SynchronizationFunction.from_matrices"
             ) from None
         constant = smooth.constant()
         return SmoothWeights(smooth) if constant is None else ConstantWeights(constant)

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import CouplingError
-from ..tasks.asked import finite_weights
-from ..tasks.derivatives import difference, find_misfit, look_at
-from .weights import ConstantWeights, FunctionWeights, Weights, WeightSource
+from ..tasks.derivatives import find_misfit_in_motion, spread_windows
+from .desired import desired_weights
+from .weights import DERIVATIVES, ConstantWeights, FunctionWeights, Weights, WeightSource
 
 
 def check_weights(source: WeightSource, times: np.ndarray, m: int) -> None:
@@ -31,7 +31,7 @@ def check_weights(source: WeightSource, times: np.ndarray, m: int) -> None:
     times = np.unique(times[np.linspace(0, len(times) - 1, _instants(source.robots)).astype(int)])
 
     def look(at: np.ndarray) -> Weights:
-        return finite_weights(lambda instants: source.at(instants, m), at)
+        return desired_weights(lambda instants: source.at(instants, m), at)
 
     c, c_dot, _, c_inv = look(times)
     if isinstance(source, ConstantWeights) or len(times) < 2:
@@ -59,19 +59,16 @@ def _check_derivatives(
     """Compare c' and c'' with differences of c and c'."""
     entries = m * m
     groups = [slice(i * entries, (i + 1) * entries) for i in range(n)]
-    windows = look_at(start, stop, (), int(np.clip(1000 // n, 4, 24)))
-    largest = np.abs(look(windows.start).c).max()
-    for order, name in enumerate(("c'", "c''")):
-
-        def sample(t: np.ndarray, order: int = order) -> tuple[np.ndarray, np.ndarray]:
-            parts = look(t)
-            return parts[order].reshape(len(t), -1), parts[order + 1].reshape(len(t), -1)
-
-        found = find_misfit(sample, windows, groups, order * largest / stop, difference)
-        if found is not None:
-            i, entry = divmod(found.coordinate, entries)
-            raise CouplingError(
-                f"{name} of the robot at index {i} is not the derivative of {name[:-1]}: near "
-                f"t = {found.time:.6g} s entry {divmod(entry, m)} of {name[:-1]} changes by "
-                f"{found.expected:.6g} per second, but {name} says {found.found:.6g}"
-            )
+    windows = spread_windows(start, stop, (), int(np.clip(1000 // n, 4, 24)))
+    found = find_misfit_in_motion(
+        lambda t: [part.reshape(len(t), -1) for part in look(t)[:3]], windows, groups
+    )
+    if found is not None:
+        order, misfit = found
+        i, entry = divmod(misfit.coordinate, entries)
+        name, derivative = DERIVATIVES[order - 1 : order + 1]
+        raise CouplingError(
+            f"{derivative} of the robot at index {i} is not the derivative of {name}: near "
+            f"t = {misfit.time:.6g} s entry {divmod(entry, m)} of {name} changes by "
+            f"{misfit.expected:.6g} per second, but {derivative} says {misfit.found:.6g}"
+        )

@@ -11,10 +11,12 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, positive_number
 from ..errors import CouplingError, InputError
 from ..renamed import names_elsewhere
-from ..tasks.chebyshev import ACCURACY, NotSmoothError, SmoothFunction, certify
+from ..tasks.chebyshev import NotSmoothError, SmoothFunction, certify
 
 #: A condition number above this counts as "no inverse".
 SINGULAR = 1e12
+#: weights and their derivatives, for messages
+DERIVATIVES = ("c", "c'", "c''")
 
 #: t -> c, c', c'', each (n,), (n, m) or (n, m, m)
 WeightFunction = Callable[[float], tuple[ArrayLike, ArrayLike, ArrayLike]]
@@ -106,7 +108,7 @@ class FunctionWeights:
                 "SmoothWeights.from_function takes one that returns c alone"
             )
         try:
-            parts = [finite_array(name, part) for name, part in zip(("c", "c'", "c''"), value, strict=True)]
+            parts = [finite_array(name, part) for name, part in zip(DERIVATIVES, value, strict=True)]
             if any(part.ndim == 0 or len(part) != self.robots for part in parts):
                 found = ", ".join(str(part.shape) for part in parts)
                 raise InputError(
@@ -149,19 +151,17 @@ class SmoothWeights:
             )
         except NotSmoothError as error:
             raise CouplingError(
-                f"the weight of the robot at index {error.row} cannot be differentiated with a relative "
-                f"error below {ACCURACY:g}: near t = {error.time:g} s derivative {error.order} is off by "
-                f"{ACCURACY * error.error:.2g}; expected a smooth function of time that is not noisy"
+                f"the weight of the robot at index {error.row} cannot be differentiated {error.order} times: "
+                f"{error}"
             ) from None
         return cls(smooth)
 
     def at(self, times: np.ndarray, m: int) -> Weights:
-        end = self._c.duration
-        outside = (times < -ACCURACY * end) | (times > (1 + ACCURACY) * end)
-        if np.any(outside):
+        outside = self._c.first_outside(times)
+        if outside is not None:
             raise CouplingError(
-                f"the weights were prepared for times from 0 to {end:g} s, asked for t = "
-                f"{times[np.argmax(outside)]:g} s; make the coupling for a longer duration"
+                f"the weights were prepared for times from 0 to {self._c.duration:g} s, asked for t = "
+                f"{outside:g} s; make the coupling for a longer duration"
             )
         c, c_dot, c_ddot = self._factor * self._c.at(times)
         return Weights(c, c_dot, c_ddot, inverse(c, times))

@@ -9,13 +9,11 @@ from ..errors import InputError
 from ..robots.robot import Robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .bars import bars
+from .arms import add_bars, arms_scene, error_color
 from .runs import check_run, frame_indices, shown_experiment
 from .scene import Scene
 from .style import DESIRED, robot_color
 
-#: colours of a mark without and with the largest synchronization error, told apart by lightness too
-CALM, ALARM = np.array([0.76, 0.79, 0.83]), np.array([0.70, 0.0, 0.11])
 TORQUE = "#e0a100"
 LINE = 0.008  # m
 THIN, THICK = 0.006, 0.022  # m, radius of a bar without and with the largest synchronization error
@@ -32,7 +30,7 @@ def planar_scene(
 ) -> Scene:
     """Planar arms with their desired paths, and bars between the tips of robots that are compared.
 
-    A bar grows and turns red with the synchronization error of its robots, see `bars`. A thin bar in the
+    A bar grows and turns red with the synchronization error of its robots, see `add_bars`. A thin bar in the
     colour of its robot leads from where a tip should be to where it would be if its error were
     `PLANAR_TIMES` as large.
 
@@ -55,12 +53,14 @@ def planar_scene(
         f"Thin bars at the tips: tracking error, {PLANAR_TIMES:g} times as large. Dark lines: desired paths."
     )
     frames = frame_indices(result, fps)
-    scene, robots = _robots(result, experiment, frames, fps, caption, colored=True)
+    scene = arms_scene(
+        result, experiment, frames, fps, caption, [robot_color(i) for i in range(len(result.names))]
+    )
+    robots = shown_experiment(result, experiment).cell.robots
     height = float(robots[0].tip_position(result.q[0, 0, : robots[0].nv])[2])
     tips, desired = (_with_height(x[frames], height) for x in (result.x, result.x_desired))
-    for bar in bars(result.info["pairs"], tips, "error"):
-        color, radius = _mark(share[frames, bar.row])
-        scene.add_segment(bar.name, bar.start, bar.end, radius, color)
+    shown = share[frames]
+    add_bars(scene, "error", result.info["pairs"], tips, THIN + shown * (THICK - THIN), shown)
     _add_tracking(scene, result, desired, tips, PLANAR_TIMES)
     _add_disturbances(scene, result, robots, frames)
     return scene
@@ -97,37 +97,15 @@ def payload_pair_scene(
         "Dark lines: desired paths."
     )
     frames = frame_indices(result, fps)
-    scene, robots = _robots(result, experiment, frames, fps, caption, colored=False)
+    scene = arms_scene(result, experiment, frames, fps, caption)
+    robots = shown_experiment(result, experiment).cell.robots
     wrists, desired = (_tips(robots, q[frames]) for q in (result.q, result.x_desired))
-    color, _ = _mark(share[frames].max(axis=1))
+    color = error_color(share[frames].max(axis=1))
     middle, along = wrists.mean(axis=1), wrists[:, 1] - wrists[:, 0]
     scene.add_box("payload", PAYLOAD, middle, color, quaternion=_turned(along))
     _add_tracking(scene, result, desired, wrists, PAIR_TIMES)
     _add_disturbances(scene, result, robots, frames)
     return scene
-
-
-def _robots(
-    result: Result,
-    experiment: Experiment | None,
-    frames: np.ndarray,
-    fps: float,
-    caption: str,
-    *,
-    colored: bool,
-) -> tuple[Scene, tuple[Robot, ...]]:
-    """A scene with the robots, in their own colours or in those of the figures."""
-    experiment = shown_experiment(result, experiment)
-    title = str(result.info["title"])
-    scene = Scene(fps=fps, title=title[:1].upper() + title[1:], caption=caption)
-    for i, robot in enumerate(experiment.cell.robots):
-        if robot.visual is None:
-            raise InputError(f"robot '{robot.name}' has no shapes to show")
-        q = np.array([robot.configuration(row) for row in result.q[frames, i, : robot.nv]])
-        color = robot_color(i) if colored else None
-        scene.add_robot(result.names[i], robot.model, robot.visual, q, color)
-        scene.add_legend(result.names[i], robot_color(i))
-    return scene, experiment.cell.robots
 
 
 def _add_tracking(scene: Scene, result: Result, desired: np.ndarray, tips: np.ndarray, times: float) -> None:
@@ -167,11 +145,6 @@ def _shown(result: Result, size: float) -> str:
     """A synchronization error for the caption: degrees for rad, else its own unit."""
     unit = result.unit("sync_error")
     return f"{np.rad2deg(size):.2g} deg" if unit == "rad" else f"{size:.2g} {unit}"
-
-
-def _mark(share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Colour, (T, 3), and radius, (T,), of a mark for an error from 0 to 1."""
-    return CALM + share[:, None] * (ALARM - CALM), THIN + share * (THICK - THIN)
 
 
 def _with_height(xy: np.ndarray, z: float) -> np.ndarray:

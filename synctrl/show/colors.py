@@ -1,8 +1,9 @@
-"""Colours as users write them."""
+"""Colours as users write them, read by matplotlib."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ ColorLike = str | Sequence[float] | np.ndarray
 
 
 def read_color(name: str, color: ColorLike) -> Color:
-    """A colour: "#rrggbb", "#rrggbbaa", or three or four numbers in [0, 1].
+    """A colour that matplotlib knows: "#rrggbb", a name, or three or four numbers in [0, 1].
 
     Returns:
         Red, green, blue and opacity in [0, 1].
@@ -22,13 +23,17 @@ def read_color(name: str, color: ColorLike) -> Color:
     Raises:
         InputError: anything else; the message begins with `name`.
     """
-    if isinstance(color, str):
-        return _hex_color(name, color)
-    rgb = within_unit(name, finite_array(f"{name}: color", color))
-    if rgb.shape not in ((3,), (4,)):
-        raise InputError(f"{name}: color: expected three or four numbers, found shape {rgb.shape}")
-    r, g, b, a = (*map(float, rgb), 1.0)[:4]
-    return r, g, b, a
+    from matplotlib.colors import to_rgba
+
+    given: Any = color
+    if not isinstance(color, str):
+        given = within_unit(name, finite_array(f"{name}: color", color)).tolist()
+    try:
+        return to_rgba(given)
+    except ValueError:
+        raise InputError(
+            f"{name}: color: expected #rrggbb, a name, or three or four numbers, found {given!r}"
+        ) from None
 
 
 def within_unit(name: str, rgb: np.ndarray) -> np.ndarray:
@@ -40,14 +45,6 @@ def within_unit(name: str, rgb: np.ndarray) -> np.ndarray:
 
 def hex_color(color: Color) -> str:
     """The colour as "#rrggbb", its opacity left out."""
-    return "#" + "".join(f"{round(255 * c):02x}" for c in color[:3])
+    from matplotlib.colors import to_hex
 
-
-def _hex_color(name: str, color: str) -> Color:
-    try:
-        if not color.startswith("#") or len(color) not in (7, 9):
-            raise ValueError
-        r, g, b, *rest = (byte / 255 for byte in bytes.fromhex(color[1:]))
-    except ValueError:
-        raise InputError(f"{name}: color: expected #rrggbb or #rrggbbaa, found {color!r}") from None
-    return r, g, b, rest[0] if rest else 1.0
+    return to_hex(color)

@@ -25,10 +25,8 @@ body { margin: 0; overflow: hidden; font-family: system-ui, sans-serif; }
 #failure { color: #a40000; font-weight: 600; }
 """
 
-# Vertices of mesh files are shared by all their faces; faces that meet at less than CREASE are shaded as one.
 PLAYER = """
 "use strict";
-const CREASE = Math.cos(35 * Math.PI / 180);
 var viewer;
 
 async function inflate(line) {
@@ -37,44 +35,9 @@ async function inflate(line) {
   return new Uint8Array(await new Response(plain).arrayBuffer());
 }
 
-function faceNormals(p) {
-  const normals = new Float32Array(p.length);
-  for (let k = 0; k < p.length; k += 9) {
-    const ax = p[k+3] - p[k], ay = p[k+4] - p[k+1], az = p[k+5] - p[k+2];
-    const bx = p[k+6] - p[k], by = p[k+7] - p[k+1], bz = p[k+8] - p[k+2];
-    const n = [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx];
-    normals.set(n, k); normals.set(n, k + 3); normals.set(n, k + 6);
-  }
-  return normals;
-}
-
-function creased(geometry) {
-  const flat = geometry.toNonIndexed();
-  const faces = faceNormals(flat.attributes.position.array);
-  const around = Array.from({length: geometry.attributes.position.count}, () => []);
-  geometry.index.array.forEach((vertex, corner) => around[vertex].push(3 * corner));
-  const normals = new Float32Array(faces.length);
-  const size = k => Math.hypot(faces[k], faces[k+1], faces[k+2]);
-  for (const corners of around) for (const a of corners) {
-    let x = 0, y = 0, z = 0;
-    for (const b of corners) {
-      const dot = faces[a] * faces[b] + faces[a+1] * faces[b+1] + faces[a+2] * faces[b+2];
-      if (dot >= CREASE * size(a) * size(b)) { x += faces[b]; y += faces[b+1]; z += faces[b+2]; }
-    }
-    const length = Math.hypot(x, y, z) || 1;
-    normals.set([x / length, y / length, z / length], a);
-  }
-  flat.setAttribute("normal", new MeshCat.THREE.BufferAttribute(normals, 3));
-  return flat;
-}
-
 function shade(root) {
-  const done = new Map();
   root.traverse(object => {
-    const geometry = object.geometry;
-    if (!object.isMesh || geometry.attributes.normal) return;
-    if (!done.has(geometry)) done.set(geometry, creased(geometry));
-    object.geometry = done.get(geometry);
+    if (object.isMesh && !object.geometry.attributes.normal) object.geometry.computeVertexNormals();
   });
 }
 

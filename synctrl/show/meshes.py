@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import pinocchio as pin
 
 FORMATS = (".dae", ".glb", ".obj", ".ply", ".stl")
+CREASE = np.radians(35)  # faces that meet at less than this are shaded as one
 
 
 class MeshLibrary:
@@ -85,8 +86,10 @@ def _primitive(visual: pin.GeometryObject, color: Color) -> Shape:
 
 def _triangles(shape: Any, color: Color) -> Shape:
     """A mesh that was built in memory, already scaled."""
-    triangles = [shape.tri_indices(k) for k in range(shape.num_tris)]
-    return mesh(shape.vertices(), np.array([[t[0], t[1], t[2]] for t in triangles]), color)
+    import trimesh
+
+    triangles = [[shape.tri_indices(k)[corner] for corner in range(3)] for k in range(shape.num_tris)]
+    return replace(_merged([trimesh.Trimesh(shape.vertices(), triangles, process=False)]), color=color)
 
 
 def _read_mesh(path: Path) -> list[tuple[Shape, Color | None]]:
@@ -125,9 +128,10 @@ def _color(part: Any) -> Color | None:
 
 
 def _merged(parts: list[Any]) -> Shape:
-    """One mesh of equal vertices merged; the page computes its normals."""
+    """One mesh whose faces share vertices, and so are shaded as one, where they meet at less than CREASE."""
     import trimesh
 
     whole = trimesh.util.concatenate(parts)
     whole.merge_vertices(merge_norm=True, merge_tex=True)
-    return mesh(whole.vertices, whole.faces)
+    smooth = trimesh.graph.smooth_shade(whole, CREASE, facet_minarea=None)
+    return mesh(smooth.vertices, smooth.faces)

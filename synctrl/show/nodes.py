@@ -101,21 +101,12 @@ def _animation(tracks: list[JSON], fps: float) -> list[JSON]:
 
 def pack(command: JSON) -> bytes:
     """A command as MeshCat reads it: msgpack, numpy arrays as typed arrays."""
-    import umsgpack
+    from umsgpack import Ext, packb
 
-    return umsgpack.packb(_plain(command))
+    def typed(array: np.ndarray) -> Any:
+        return Ext(_EXT_CODES[array.dtype.name], array.tobytes())
 
-
-def _plain(value: Any) -> Any:
-    import umsgpack
-
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_plain(item) for item in value]
-    if isinstance(value, np.ndarray):
-        return umsgpack.Ext(_EXT_CODES[value.dtype.name], value.tobytes())
-    return value
+    return packb(command, ext_handlers={np.ndarray: typed})
 
 
 class _Export:

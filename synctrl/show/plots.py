@@ -99,18 +99,14 @@ def save(figure: Figure, stem: str | Path) -> tuple[Path, Path]:
     Raises:
         ResultError: a file cannot be written.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-
     png, svg = Path(f"{stem}.png"), Path(f"{stem}.svg")
     try:
         with style(), whole_file(svg) as vectors, whole_file(png) as pixels:
             if engine := figure.get_layout_engine():
                 engine.execute(figure)
                 figure.set_layout_engine("none")  # it is arranged now, for both files
-            # savefig would draw once more for each file, only to arrange again
-            FigureCanvasSVG(figure).print_svg(vectors, metadata={"Date": None, "Creator": None})
-            FigureCanvasAgg(figure).print_png(pixels, metadata={"Software": None}, pil_kwargs=_PNG)
+            figure.savefig(vectors, format="svg", metadata={"Date": None, "Creator": None})
+            figure.savefig(pixels, format="png", metadata={"Software": None}, pil_kwargs=_PNG)
     except OSError as error:
         raise ResultError(f"cannot write the figure '{stem}': {error.strerror or error}") from error
     return png, svg

@@ -10,12 +10,11 @@ from ..errors import InputError
 from ..simulation.result import Result
 from ..tasks import rotations
 from ..tasks.poses import Attached
-from .bars import bars
-from .runs import check_run, frame_indices, shown_experiment
+from .arms import add_bars, arms_scene, error_color
+from .runs import check_run, frame_indices
 from .scene import Scene
 from .style import DESIRED, robot_color
 
-GOOD, BAD = np.array([0.10, 0.62, 0.35]), np.array([0.80, 0.10, 0.10])
 #: synchronization error that is shown fully red, as a share of the largest of the run
 RED = 0.3
 LINE, BAR, BALL = 0.005, 0.008, 0.018  # m
@@ -26,7 +25,7 @@ DRAWN = "x", "x_desired", "sync_error", "q"
 def formation_scene(result: Result, fps: float = 25) -> Scene:
     """Arms with their desired paths, and a bar between the tips of every pair that is compared.
 
-    A bar turns from green to red with the synchronization error of its pair.
+    A bar turns from grey to red with the synchronization error of its pair.
 
     Args:
         result: a run in Cartesian space along x, y, z, still with its experiment.
@@ -40,24 +39,21 @@ def formation_scene(result: Result, fps: float = 25) -> Scene:
         found = ", ".join(result.info["axes"])
         raise InputError(f"result: expected tips along x, y and z, found the coordinates {found}")
     frames = frame_indices(result, fps)
-    scene = _robots(
-        result, frames, fps, "Bars between compared tips turn red with the synchronization error."
-    )
+    caption = "Bars between compared tips turn red with the synchronization error."
+    scene = arms_scene(result, None, frames, fps, caption)
     tips = result.x[frames]
     for i, name in enumerate(result.names):
         scene.add_line(f"desired path of {name}", result.x_desired[frames, i], robot_color(i), LINE)
         scene.add_sphere(f"tip of {name}", BALL, tips[:, i], robot_color(i))
-        scene.add_legend(name, robot_color(i))
-    colors = error_colors(result)[frames]
-    for bar in bars(result.info["pairs"], tips, "pair"):
-        scene.add_segment(bar.name, bar.start, bar.end, BAR, colors[:, bar.row])
+    share = _error_share(result)[frames]
+    add_bars(scene, "pair", result.info["pairs"], tips, np.full_like(share, BAR), share)
     return scene
 
 
 def payload_scene(result: Result, size: ArrayLike, fps: float = 25) -> Scene:
     """Two arms whose hands hold a box that lies midway between where each of them holds it.
 
-    The box turns from green to red with the synchronization error; it is drawn, not simulated.
+    The box turns from grey to red with the synchronization error; it is drawn, not simulated.
 
     Args:
         result: a run in pose space with `Attached` desired motions, still with its experiment.
@@ -69,9 +65,8 @@ def payload_scene(result: Result, size: ArrayLike, fps: float = 25) -> Scene:
     """
     check_run(result, *DRAWN)
     frames = frame_indices(result, fps)
-    scene = _robots(
-        result, frames, fps, "The payload turns red with the synchronization error; it has no mass."
-    )
+    caption = "The payload turns red with the synchronization error; it has no mass."
+    scene = arms_scene(result, None, frames, fps, caption)
     hands = [member.trajectory for member in result.experiment.cell.members]
     if len(hands) != 2 or not all(isinstance(hand, Attached) for hand in hands):
         raise InputError("result: expected two robots whose desired motions are Attached to a payload")
@@ -85,22 +80,15 @@ def payload_scene(result: Result, size: ArrayLike, fps: float = 25) -> Scene:
 
 
 def error_colors(result: Result) -> np.ndarray:
-    """A colour per instant and pair, (T, p, 3): green without synchronization error, red with a large one."""
+    """A colour per instant and pair, (T, p, 3), which reddens with the synchronization error."""
     check_run(result, "sync_error")
+    return error_color(_error_share(result))
+
+
+def _error_share(result: Result) -> np.ndarray:
+    """Synchronization errors from 0 to 1, (T, p): from none to fully red."""
     size = np.linalg.norm(result.sync_error[:, :, :3], axis=2)
-    share = np.clip(size / max(RED * float(size.max()), 1e-12), 0, 1)[..., None]
-    return (1 - share) * GOOD + share * BAD
-
-
-def _robots(result: Result, frames: np.ndarray, fps: float, caption: str) -> Scene:
-    experiment = shown_experiment(result, None)
-    scene = Scene(fps=fps, title=str(result.info["title"]), caption=caption)
-    for i, robot in enumerate(experiment.cell.robots):
-        q = np.array([robot.configuration(row) for row in result.q[frames, i, : robot.nv]])
-        if robot.visual is None:
-            raise InputError(f"robot '{robot.name}' has no shapes to show")
-        scene.add_robot(result.names[i], robot.model, robot.visual, q)
-    return scene
+    return np.clip(size / max(RED * float(size.max()), 1e-12), 0, 1)
 
 
 def _held(x: np.ndarray, hands: list[Attached]) -> tuple[np.ndarray, np.ndarray]:

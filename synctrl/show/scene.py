@@ -20,7 +20,7 @@ from .meshes import MeshLibrary
 from .nodes import Node, bounding_box, label, pack, scene_commands
 from .rotations import TINY, continuous, towards
 from .shapes import Color, Shape
-from .view import fit_camera, ground_command, view_commands, viewer_axes
+from .view import fit_camera, view_commands, viewer_axes
 
 if TYPE_CHECKING:
     import pinocchio as pin
@@ -32,9 +32,10 @@ EMPTY = np.array([[-0.5, -0.5, 0.0], [0.5, 0.5, 0.5]])  # what the camera shows 
 class Scene:
     """Robots, lines and solids over T frames, exported as one HTML file that plays offline.
 
-    Positions are in the world, in m, z up; quaternions are x y z w, as Pinocchio's. A colour is "#rrggbb" (or
-    "#rrggbbaa") or three or four numbers in [0, 1]. What moves is given at all T frames, the same T for all;
-    what stands still is given once. Names are text: nothing in them is ever markup or script.
+    Positions are in the world, in m, z up; quaternions are x y z w, as Pinocchio's. A colour is one that
+    matplotlib knows, such as "#ffd700" or "gold", or three or four numbers in [0, 1]. What moves is given at
+    all T frames, the same T for all; what stands still is given once. Names are text: nothing in them is ever
+    markup or script.
 
     Args:
         fps: frames per second, at which all samples are taken and played.
@@ -177,8 +178,7 @@ class Scene:
     def commands(self) -> list[dict]:
         """The scene as MeshCat commands, the animation last; numpy arrays stand for typed arrays."""
         position, target, box = self._view()
-        view = [*view_commands(position, target, box), ground_command(box)]
-        return view + scene_commands(self.nodes, self.fps)
+        return view_commands(position, target, box) + scene_commands(self.nodes, self.fps)
 
     def page(self) -> str:
         """The scene as the text of a self-contained HTML page."""

@@ -13,7 +13,7 @@ import numpy as np
 Color = tuple[float, float, float, float]
 
 GREY: Color = (0.7, 0.7, 0.7, 1.0)
-TUBE_SIDES = 12  # 30 degrees a side: shaded smooth, see CREASE in html.py
+TUBE_SIDES = 12
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,14 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, positive_number
 from ..errors import InputError
 from ..simulation.result import Result
+from ..tasks import rotations
 from .runs import check_run, frame_times
 from .scene import Scene
 
 BODY, WHEEL, SPOKE, NOSE = "#c9d3de", "#26282b", "#ee8730", "#2f6fb3"
 DESIRED, DRIVEN = "#3a9d5d", "#c2403a"
 LINE = 0.012  # m
+X, Y, Z = np.eye(3)
 
 
 def vehicle_path(angles: ArrayLike, wheel_radius: float, track: float) -> np.ndarray:
@@ -72,7 +74,7 @@ def vehicle_animation(result: Result, wheel_radius: float, track: float, fps: fl
 
 
 def _add_body(scene: Scene, poses: np.ndarray, r: float, track: float) -> None:
-    turned = _about(2, poses[:, 2])
+    turned = rotations.quaternion(_heading(poses))
     size = np.array([1.1 * track, 0.7 * track, 0.5 * r])
     scene.add_box("body", size, _at(poses, 0.15 * track, 0.0, 1.2 * r), BODY, turned)
     scene.add_sphere("caster", 0.35 * r, _at(poses, 0.55 * track, 0.0, 0.35 * r), WHEEL)
@@ -80,28 +82,19 @@ def _add_body(scene: Scene, poses: np.ndarray, r: float, track: float) -> None:
 
 
 def _add_wheel(scene: Scene, name: str, poses: np.ndarray, angle: np.ndarray, side: float, r: float) -> None:
-    rolled = _product(_about(2, poses[:, 2]), _about(1, angle))
-    axle = _product(rolled, _about(0, np.full(len(angle), np.pi / 2)))
+    rolled = _heading(poses) @ rotations.exp(np.outer(angle, Y))
+    axle = rolled @ rotations.exp(np.pi / 2 * X)
     centre = _at(poses, 0.0, side, r)
-    scene.add_cylinder(name, r, 0.35 * r, centre, WHEEL, axle)
-    scene.add_box(f"spoke of {name}", [1.7 * r, 0.4 * r, 0.3 * r], centre, SPOKE, rolled)
+    scene.add_cylinder(name, r, 0.35 * r, centre, WHEEL, rotations.quaternion(axle))
+    size = [1.7 * r, 0.4 * r, 0.3 * r]
+    scene.add_box(f"spoke of {name}", size, centre, SPOKE, rotations.quaternion(rolled))
+
+
+def _heading(poses: np.ndarray) -> np.ndarray:
+    """Orientations of the vehicle, (T, 3, 3)."""
+    return rotations.exp(np.outer(poses[:, 2], Z))
 
 
 def _at(poses: np.ndarray, ahead: float, left: float, height: float) -> np.ndarray:
     """A point of the vehicle in the world, (T, 3), m."""
-    x, y, heading = poses.T
-    cos, sin = np.cos(heading), np.sin(heading)
-    return np.stack([x + ahead * cos - left * sin, y + ahead * sin + left * cos, 0 * x + height], axis=1)
-
-
-def _about(axis: int, angle: np.ndarray) -> np.ndarray:
-    """Quaternions x y z w of rotations about a coordinate axis, (T, 4)."""
-    turned = np.zeros((len(angle), 4))
-    turned[:, axis], turned[:, 3] = np.sin(angle / 2), np.cos(angle / 2)
-    return turned
-
-
-def _product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """The rotation q followed by p, both in quaternions x y z w, (T, 4)."""
-    v = p[:, 3:] * q[:, :3] + q[:, 3:] * p[:, :3] + np.cross(p[:, :3], q[:, :3])
-    return np.column_stack([v, p[:, 3] * q[:, 3] - np.sum(p[:, :3] * q[:, :3], axis=1)])
+    return poses * [1, 1, 0] + _heading(poses) @ [ahead, left, height]

@@ -13,7 +13,8 @@ JSON = dict[str, Any]
 FIELD_OF_VIEW = 40.0  # degrees, vertical
 ASPECT = 4 / 3  # narrowest window, width over height, in which everything is seen
 MARGIN = 1.04
-GROUND_COLOR = 0xABB7C3
+GRID_STEP = 0.5  # m, squares of the viewer's grid
+GRID_COLOR = [1.26, 1.35, 1.43, 1.0]  # by which the viewer's grey lines are multiplied
 
 
 def fit_camera(box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -49,16 +50,15 @@ def viewer_axes(point: np.ndarray) -> list[float]:
 
 
 def view_commands(position: np.ndarray, target: np.ndarray, box: np.ndarray) -> list[JSON]:
-    """The MeshCat commands for camera, light and background; what the camera aims at is set by the page."""
+    """Commands for background, ground, camera and light; the page itself sets what the camera aims at."""
     size = max(float(np.linalg.norm(box[1] - box[0])), 0.1)
-    return [*_background(), *_camera(position, target), *_lights(box.mean(axis=0), size)]
+    return [*_background(), *_ground(box), *_camera(position, target), *_lights(box.mean(axis=0), size)]
 
 
 def _background() -> list[JSON]:
     return [
         _property("/Background", "top_color", [0.96, 0.97, 0.98]),
         _property("/Background", "bottom_color", [0.76, 0.81, 0.86]),
-        {"type": "delete", "path": "/Grid"},
         _property("/Axes", "visible", False),
     ]
 
@@ -87,33 +87,18 @@ def _lights(centre: np.ndarray, size: float) -> list[JSON]:
     return commands
 
 
-def ground_command(box: np.ndarray) -> JSON:
-    """The MeshCat command for a square grid below the box, at z = 0 or lower."""
-    extent = box[1] - box[0]
-    step = _round_step(max(extent[0], extent[1], extent[2], 0.1) / 6)
-    reach = 10 * step
-    centre = step * np.round(box.mean(axis=0) / step)
-    ticks = np.arange(-reach, reach + step / 2, step)
-    along = np.array([[t, s * reach, 0] for t in ticks for s in (-1, 1)])
-    lines = np.vstack([along, along[:, [1, 0, 2]]])
-    lines += np.array([centre[0], centre[1], min(0.0, box[0, 2])])
-    position = {"itemSize": 3, "type": "Float32Array", "array": lines.astype(np.float32), "normalized": False}
-    geometry = {"uuid": "ground", "type": "BufferGeometry", "data": {"attributes": {"position": position}}}
-    material = {"uuid": "ground", "type": "LineBasicMaterial", "color": GROUND_COLOR}
-    drawn = {
-        "uuid": "ground",
-        "type": "LineSegments",
-        "name": "grid",
-        "geometry": "ground",
-        "material": "ground",
-    }
-    scene = {
-        "metadata": {"version": 4.5, "type": "Object"},
-        "geometries": [geometry],
-        "materials": [material],
-        "object": {"uuid": "floor", "type": "Group", "children": [drawn]},
-    }
-    return {"type": "set_object", "path": "/Ground", "object": scene}
+def _ground(box: np.ndarray) -> list[JSON]:
+    """The viewer's own grid below the box, at z = 0 or lower, its squares a round part of the box's size.
+
+    Its two dark lines are the x and y axes of the world, unless the scene is far from them.
+    """
+    step = _round_step(max(*(box[1] - box[0]), 0.1) / 6)
+    x, y, _ = 10 * step * np.round(box.mean(axis=0) / (10 * step))
+    place = np.array([x, y, min(0.0, box[0, 2])])
+    return [
+        _transform("/Grid", place, step / GRID_STEP),
+        _property("/Grid/<object>", "color", GRID_COLOR),
+    ]
 
 
 def _round_step(length: float) -> float:

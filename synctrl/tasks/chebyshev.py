@@ -3,11 +3,18 @@
 On each piece of the run the function is a Chebyshev polynomial of degree 16, whose derivatives are exact.
 Twice the degree says how far it, its first and its second derivative are off; a piece that is not good enough
 is halved. What is still not good enough when the pieces become very short is not smooth.
+
+Fits, derivatives and values are those of `numpy.polynomial.chebyshev`. Its class `Chebyshev` holds a single
+number per polynomial: the weights of six coordinates with two derivatives would be 18 of them, and take six
+times as long to evaluate. Its `chebinterpolate` samples inside the interval only, where polynomials of half
+the degree cannot use the same samples, and leaves errors at the ends for which a motion needs a sixth more
+pieces.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -23,32 +30,11 @@ DEPTH = 14
 MAX_PIECES = 250
 #: instants, spread over the run, at which the polynomials are compared with the function itself
 CHECKS = 200
+#: where a function is sampled, in [-1, 1]; every second place serves the polynomial of half the degree
+PLACES = cheb.chebpts2(2 * DEGREE + 1)
+ENDS = np.array([-1.0, 1.0])
 
 Function = Callable[[float], np.ndarray]
-
-
-def _nodes(degree: int) -> np.ndarray:
-    return np.cos(np.pi * np.arange(degree + 1) / degree)
-
-
-def _derivative_matrix(degree: int) -> np.ndarray:
-    """Coefficients of a polynomial -> those of its derivative, of the same length."""
-    D = np.zeros((degree + 1, degree + 1))
-    D[:-1] = cheb.chebder(np.eye(degree + 1))
-    return D
-
-
-def _fit_and_values(degree: int) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Samples -> coefficients; and coefficients -> values, first and second derivatives at the fine nodes."""
-    fit = np.linalg.inv(cheb.chebvander(_nodes(degree), degree))
-    at_nodes = cheb.chebvander(_nodes(2 * DEGREE), degree)
-    D = _derivative_matrix(degree)
-    return fit, [at_nodes, at_nodes @ D, at_nodes @ D @ D]
-
-
-_D = _derivative_matrix(DEGREE)
-_FIT, _VALUES = _fit_and_values(DEGREE)
-_FINE_FIT, _FINE_VALUES = _fit_and_values(2 * DEGREE)
 
 
 class Piece(NamedTuple):
@@ -56,13 +42,13 @@ class Piece(NamedTuple):
 
     Attributes:
         start, stop: s.
-        coefficients: of the function and its two derivatives, (3, DEGREE + 1, n, m, m).
+        series: coefficients of the function and its two derivatives, (DEGREE + 1, 3, n, m, m).
         error, largest: of the function and its two derivatives, (3, n).
     """
 
     start: float
     stop: float
-    coefficients: np.ndarray
+    series: np.ndarray
     error: np.ndarray
     largest: np.ndarray
 
@@ -79,59 +65,76 @@ class NotSmoothError(Portable, Exception):
 
     def __init__(self, time: float, order: int, row: int, error: float):
         self.time, self.order, self.row, self.error = time, order, row, error
-        super().__init__(f"derivative {order} of row {row} near t = {time:g} s: error {error:g}")
+        super().__init__(
+            f"near t = {time:g} s its relative error is {ACCURACY * error:.2g}, allowed is {ACCURACY:g}; "
+            "expected a smooth function of time that is not noisy"
+        )
 
 
 class SmoothFunction:
-    """Polynomials that follow each other from 0 to `duration`."""
+    """Polynomials that follow each other from 0 to `duration`, each from its start on."""
 
     def __init__(self, pieces: list[Piece]):
         self._starts = np.array([piece.start for piece in pieces])
         self._pieces = pieces
         self.duration = pieces[-1].stop
-        self.shape = pieces[0].coefficients.shape[2:]
+        self.shape = pieces[0].series.shape[2:]
 
     def constant(self) -> np.ndarray | None:
         """The value of a function of which no row changes by more than rounding, (n, m, m), or None."""
-        value, *rest = np.array([piece.coefficients[0] for piece in self._pieces]).swapaxes(0, 1)
+        value, *rest = np.array([piece.series[:, 0] for piece in self._pieces]).swapaxes(0, 1)
         change = np.max([np.abs(part).max(axis=(0, 2, 3)) for part in (value - value[0], *rest)], axis=0)
         return value[0] if (change <= 1e-14 * np.abs(value[0]).max(axis=(1, 2))).all() else None
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """The function and its first and second derivative at times inside the run, (3, T, n, m, m)."""
-        where = np.clip(np.searchsorted(self._starts, times, side="right") - 1, 0, None)
-        out = np.empty((3, len(times), *self._pieces[0].coefficients.shape[2:]))
+        where = self.pieces_at(times)
+        out = np.empty((3, len(times), *self.shape))
         for k in np.unique(where):
             piece, chosen = self._pieces[k], where == k
             s = (2 * times[chosen] - piece.start - piece.stop) / (piece.stop - piece.start)
-            out[:, chosen] = np.tensordot(cheb.chebvander(s, DEGREE), piece.coefficients, (1, 1)).swapaxes(
-                0, 1
-            )
+            out[:, chosen] = _values(s, piece.series)
         return out
 
+    def first_outside(self, times: np.ndarray) -> float | None:
+        """The first of some times, (T,), for which it was not made, s."""
+        slack = ACCURACY * self.duration
+        outside = times[(times < -slack) | (times > self.duration + slack)]
+        return float(outside[0]) if outside.size else None
 
-def certify(function: Function, duration: float) -> SmoothFunction:
+    def pieces_at(self, times: np.ndarray) -> np.ndarray:
+        """Which piece holds each of the times, (T,); at the end of one it is the next."""
+        return np.clip(np.searchsorted(self._starts, times, side="right") - 1, 0, None)
+
+
+def certify(function: Function, duration: float, breaks: Iterable[float] = ()) -> SmoothFunction:
     """Polynomials for a function of time with rows for n robots, (n, m, m), accurate as `tolerances` says.
+
+    Args:
+        function: of one time, s.
+        duration: it is looked at from 0 to this time, s.
+        breaks: instants at which a derivative may jump, s.
 
     Raises:
         NotSmoothError: no short pieces are accurate enough.
     """
-    pieces = [_piece(function, 0.0, duration)]
+    edges = [0.0, *sorted({b for b in breaks if 0 < b < duration}), duration]
+    pieces = [_piece(function, start, stop) for start, stop in pairwise(edges)]
     checks = duration * np.modf((np.arange(CHECKS) + 0.5) * (np.sqrt(5) - 1) / 2)[0]
     expected = np.array([function(t) for t in checks])
     for _ in range(DEPTH):
         allowed = tolerances(pieces, duration)
-        pieces = _with_jumps(pieces)
-        missed = _missed(pieces, checks, expected, allowed[0])
+        pieces = _with_jumps(pieces, edges)
+        missed = _missed(SmoothFunction(pieces), checks, expected, allowed[0])
         bad = [i in missed or bool((p.error > allowed).any()) for i, p in enumerate(pieces)]
         if not any(bad):
             return SmoothFunction(pieces)
-        if len(pieces) > MAX_PIECES:
+        if len(pieces) > MAX_PIECES + len(edges):
             break
         pieces = [
             half for p, b in zip(pieces, bad, strict=True) for half in (_halves(function, p) if b else [p])
         ]
-    raise _not_smooth(_with_jumps(pieces), tolerances(pieces, duration))
+    raise _not_smooth(_with_jumps(pieces, edges), tolerances(pieces, duration))
 
 
 def tolerances(pieces: list[Piece], duration: float) -> np.ndarray:
@@ -147,25 +150,31 @@ def tolerances(pieces: list[Piece], duration: float) -> np.ndarray:
 
 
 def _piece(function: Function, start: float, stop: float) -> Piece:
-    half = 0.5 * (stop - start)
-    samples = np.array([function(0.5 * (start + stop) + half * s) for s in _nodes(2 * DEGREE)])
-    first, *_ = flat = samples.reshape(len(samples), -1)
+    middle, half = 0.5 * (start + stop), 0.5 * (stop - start)
+    samples = np.array([function(min(middle + half * s, stop)) for s in PLACES])
+    first, *_ = flat = samples.reshape(len(PLACES), -1)
     flat = flat - first  # what does not change has no rounding errors either
-    coefficients, fine = _FIT @ flat[::2], _FINE_FIT @ flat
-    coefficients[0] += first
-    fine[0] += first
-    scale = half ** -np.arange(3.0)[:, None, None]
-    values = scale * np.array([V @ coefficients for V in _VALUES])
-    error = values - scale * np.array([V @ fine for V in _FINE_VALUES])
-    derivatives = scale * np.array([coefficients, _D @ coefficients, _D @ _D @ coefficients])
-    shape = samples.shape[1:]
-    return Piece(
-        start,
-        stop,
-        derivatives.reshape(3, DEGREE + 1, *shape),
-        np.abs(error).reshape(3, -1, *shape).max(axis=(1, 3, 4)),
-        np.abs(values).reshape(3, -1, *shape).max(axis=(1, 3, 4)),
-    )
+    both = []
+    for part, degree in ((slice(None, None, 2), DEGREE), (slice(None), 2 * DEGREE)):
+        series = cheb.chebfit(PLACES[part], flat[part], degree)
+        series[0] += first
+        both.append(_with_derivatives(series.reshape(-1, *samples.shape[1:]), half))
+    values, fine = (_values(PLACES, series) for series in both)
+    sizes = (np.abs(found).max(axis=(1, 3, 4)) for found in (values - fine, values))
+    return Piece(start, stop, both[0], *sizes)
+
+
+def _with_derivatives(series: np.ndarray, half: float) -> np.ndarray:
+    """A series on a piece of length 2 `half`, (k, n, m, m), with its two derivatives, (k, 3, n, m, m)."""
+    both = np.zeros((len(series), 3, *series.shape[1:]))
+    for order in range(3):
+        both[: len(series) - order, order] = cheb.chebder(series, order, 1 / half)
+    return both
+
+
+def _values(places: np.ndarray, series: np.ndarray) -> np.ndarray:
+    """Series with their derivatives, (k, 3, n, m, m), at places in [-1, 1], (T,): (3, T, n, m, m)."""
+    return np.tensordot(cheb.chebvander(places, len(series) - 1), series, 1).swapaxes(0, 1)
 
 
 def _halves(function: Function, piece: Piece) -> list[Piece]:
@@ -173,24 +182,21 @@ def _halves(function: Function, piece: Piece) -> list[Piece]:
     return [_piece(function, piece.start, middle), _piece(function, middle, piece.stop)]
 
 
-def _with_jumps(pieces: list[Piece]) -> list[Piece]:
-    """Pieces whose errors count what the function or a derivative seems to jump by on the way to the next."""
-    alternating = (-1.0) ** np.arange(DEGREE + 1)
-    starts = [np.tensordot(piece.coefficients, alternating, (1, 0)) for piece in pieces[1:]]
-    jumps = [
-        np.abs(piece.coefficients.sum(axis=1) - start).max(axis=(2, 3))
-        for piece, start in zip(pieces, starts, strict=False)
-    ]
-    jumps.append(np.zeros_like(pieces[-1].error))
+def _with_jumps(pieces: list[Piece], edges: list[float]) -> list[Piece]:
+    """Pieces whose errors count what the function or a derivative seems to jump by where it should not."""
+    ends = np.array([_values(ENDS, piece.series) for piece in pieces])  # (pieces, 3, 2, n, m, m)
+    jumps = np.zeros((len(pieces), *pieces[0].error.shape))
+    jumps[:-1] = np.abs(ends[:-1, :, 1] - ends[1:, :, 0]).max(axis=(3, 4))
+    jumps[[piece.stop in edges for piece in pieces], 1:] = 0.0  # only derivatives may jump at a break
     return [p._replace(error=np.maximum(p.error, jump)) for p, jump in zip(pieces, jumps, strict=True)]
 
 
-def _missed(pieces: list[Piece], times: np.ndarray, expected: np.ndarray, allowed: np.ndarray) -> set[int]:
-    """Pieces that pass beside the function between their nodes."""
-    error = np.abs(SmoothFunction(pieces).at(times)[0] - expected).max(axis=(2, 3))
-    starts = np.array([piece.start for piece in pieces])
-    wrong = times[(error > allowed).any(axis=1)]
-    return set((np.searchsorted(starts, wrong, side="right") - 1).tolist())
+def _missed(
+    function: SmoothFunction, times: np.ndarray, expected: np.ndarray, allowed: np.ndarray
+) -> set[int]:
+    """Pieces that pass beside the expected values between their nodes."""
+    error = np.abs(function.at(times)[0] - expected).max(axis=(2, 3))
+    return set(function.pieces_at(times[(error > allowed).any(axis=1)]).tolist())
 
 
 def _not_smooth(pieces: list[Piece], allowed: np.ndarray) -> NotSmoothError:

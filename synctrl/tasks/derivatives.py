@@ -5,6 +5,11 @@ rule, which needs no derivative of the derivative; Simpson's rule on the same in
 Where both differ, as on a jump or a spike within the window, or where the function is noisier than its
 change, the window says nothing. Windows are chosen as long as the digits of the function ask for, and no
 longer, so that fast functions are resolved; what looks wrong is looked at again in shorter ones.
+
+`scipy.differentiate` answers another question: it finds the derivative at an instant and estimates the
+error. It takes a fast function for a smooth one where its first step is long, and noise for change where the
+step is short. Of 300 right derivatives of sines between 0.01 and 200 Hz it refused 2 to 41, depending on that
+step, and of 300 wrong ones it let 53 to 59 pass; the windows below are right about all of them.
 """
 
 from __future__ import annotations
@@ -86,16 +91,43 @@ def find_misfit(
     for noise in NOISE:
         for length, mine in _lengths(noise * scale.size / (RESOLVED * TOLERANCE * scale.rate), undecided):
             lengths = np.clip(length, floor, windows.room)
-            look = _look(sample, windows.start, lengths, scale, displacement)
-            wrong = look.wrong & mine & ~(noisy & look.stuck)
+            compared = _compare(sample, windows.start, lengths, scale, displacement)
+            wrong = compared.wrong & mine & ~(noisy & compared.stuck)
             for share in AGAIN:
                 if wrong.any():
-                    again = _look(sample, windows.start, share * lengths, scale, displacement)
+                    again = _compare(sample, windows.start, share * lengths, scale, displacement)
                     wrong &= ~(again.rough | again.fits)
             if wrong.any():
-                return look.worst(wrong, windows.start)
-            undecided &= ~(mine & (look.fits | look.wrong))
-            noisy |= mine & ~(look.fits | look.wrong | look.rough)
+                return compared.worst(wrong, windows.start)
+            undecided &= ~(mine & (compared.fits | compared.wrong))
+            noisy |= mine & ~(compared.fits | compared.wrong | compared.rough)
+    return None
+
+
+def find_misfit_in_motion(
+    motion: Callable[[np.ndarray], Sequence[np.ndarray]],
+    windows: Windows,
+    groups: Sequence[slice],
+    displacement: Displacement = difference,
+) -> tuple[int, Misfit] | None:
+    """The first of two derivatives that does not fit, 1 or 2, and where.
+
+    Args:
+        motion: times, (T,), -> a function and its first and second derivative, (T, d) each.
+        windows, groups: see `find_misfit`.
+        displacement: from one value of the function to another; its derivative is a vector as any.
+    """
+    largest = np.abs(motion(windows.start)[0]).max()
+    end = (windows.start + windows.room).max()
+    for order, way in ((1, displacement), (2, difference)):
+
+        def sample(t: np.ndarray, order: int = order) -> tuple[np.ndarray, np.ndarray]:
+            parts = motion(t)
+            return parts[order - 1], parts[order]
+
+        misfit = find_misfit(sample, windows, groups, (order - 1) * largest / end, way)
+        if misfit is not None:
+            return order, misfit
     return None
 
 
@@ -109,7 +141,7 @@ def _lengths(needed: np.ndarray, undecided: np.ndarray) -> Iterator[tuple[float,
         left &= ~near
 
 
-def look_at(start: float, stop: float, breaks: Sequence[float], count: int) -> Windows:
+def spread_windows(start: float, stop: float, breaks: Sequence[float], count: int) -> Windows:
     """Windows spread over a run, none of which reaches across a break.
 
     Args:
@@ -164,7 +196,7 @@ def _scale(
     return _Scale(size, np.maximum(rate, np.finfo(float).tiny), rate * end > STILL * size, end)
 
 
-class _Look(NamedTuple):
+class _Comparison(NamedTuple):
     """What windows say, each (K, d); where it is neither rough nor wrong and does not fit, there is noise.
 
     Attributes:
@@ -188,9 +220,9 @@ class _Look(NamedTuple):
         return Misfit(float(start[k]), int(i), float(self.integral[k, i]), float(self.change[k, i]))
 
 
-def _look(
+def _compare(
     sample: Sample, start: np.ndarray, length: np.ndarray, scale: _Scale, displacement: Displacement
-) -> _Look:
+) -> _Comparison:
     times = start[:, None] + length[:, None] * NODES
     value, derivative = (part.reshape(*times.shape, -1) for part in sample(times.ravel()))
     way = displacement(value[:, :1], value) / length[:, None, None]
@@ -204,4 +236,4 @@ def _look(
     close = np.abs(change - integral) <= TOLERANCE * rate + doubt
     clear = doubt <= allowed
     stuck = (way == 0).all(axis=1)
-    return _Look(change, integral, error > allowed, clear & close, clear & ~close, stuck)
+    return _Comparison(change, integral, error > allowed, clear & close, clear & ~close, stuck)

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, instance, positive_number
 from ..errors import InputError, TrajectoryError
 from . import rotations
-from .chebyshev import ACCURACY, Function, NotSmoothError, SmoothFunction, certify
+from .chebyshev import Function, NotSmoothError, SmoothFunction, certify
 from .poses import Turning
-from .trajectories import MOTION_PARTS, Motion
+from .trajectories import MOTION_PARTS, Motion, finite_value
 
 
 class SmoothTrajectory:
@@ -37,10 +37,10 @@ class SmoothTrajectory:
         self.dimension = int(np.size(position(0.0)))
 
         def rows(t: float) -> np.ndarray:
-            return _value("position", position, t, (self.dimension,))[None, :, None]
+            return finite_value("position", position, t, (self.dimension,))[None, :, None]
 
-        self._pieces = _Pieces(rows, duration, breaks)
-        self.duration, self.breaks = self._pieces.duration, self._pieces.breaks
+        self._function, self.breaks = _certified(rows, duration, breaks)
+        self.duration = self._function.duration
 
     def __call__(self, t: ArrayLike) -> Motion:
         """Motion at t, in s.
@@ -49,7 +49,7 @@ class SmoothTrajectory:
             TrajectoryError: t is outside the time it was made for.
         """
         times = np.asarray(t, dtype=float)
-        parts = self._pieces.at(times.ravel())
+        parts = _at(self._function, times.ravel())
         return Motion(*(part.reshape(*times.shape, self.dimension) for part in parts))
 
 
@@ -72,14 +72,14 @@ class SmoothOrientation:
         instance("rotation", rotation, Callable, "a function of time")  # type: ignore[arg-type]
 
         def matrices(t: float) -> np.ndarray:
-            value = _value("rotation", rotation, t, (3, 3))
+            value = finite_value("rotation", rotation, t, (3, 3))
             try:
                 return rotations.rotation_matrix("rotation", value)[None]
             except InputError as error:
                 raise TrajectoryError(f"orientation at t = {t:g} s: {error}") from error
 
-        self._pieces = _Pieces(matrices, duration, breaks)
-        self.duration, self.breaks = self._pieces.duration, self._pieces.breaks
+        self._function, self.breaks = _certified(matrices, duration, breaks)
+        self.duration = self._function.duration
 
     def __call__(self, t: ArrayLike) -> Turning:
         """Orientation at t, in s.
@@ -88,59 +88,35 @@ class SmoothOrientation:
             TrajectoryError: t is outside the time it was made for.
         """
         times = np.asarray(t, dtype=float)
-        parts = self._pieces.at(times.ravel()).reshape(3, *times.shape, 3, 3)
-        R, R_dot, R_ddot = parts
+        R, R_dot, R_ddot = _at(self._function, times.ravel()).reshape(3, *times.shape, 3, 3)
         w = _axial(R_dot @ R.mT)
         w_dot = _axial(R_ddot @ R.mT + R_dot @ R_dot.mT)
         return Turning(_orthonormal(R), w, w_dot)
 
 
-class _Pieces:
-    """A certified function of shape (1, a, b) from 0 to `duration`, with breaks."""
-
-    def __init__(self, function: Function, duration: float, breaks: Sequence[float]):
-        self.duration = positive_number("duration", duration)
-        self.breaks = tuple(finite_array("breaks", breaks, (None,)).tolist())
-        inner = sorted({b for b in self.breaks if 0 < b < self.duration})
-        self._starts = np.array([0.0, *inner])
-        ends = [*inner, self.duration]
-        spans = zip(self._starts.tolist(), ends, strict=True)
-        self._parts = [_certified(function, start, end) for start, end in spans]
-
-    def at(self, times: np.ndarray) -> np.ndarray:
-        """The function and two derivatives, (3, T, a, b), at a break from the right."""
-        slack = ACCURACY * self.duration
-        outside = (times < -slack) | (times > self.duration + slack)
-        if outside.any():
-            raise TrajectoryError(
-                f"expected a time from 0 to {self.duration:g} s, for which the motion was made, found "
-                f"t = {times[np.argmax(outside)]:g} s; make it for a longer duration"
-            )
-        where = np.clip(np.searchsorted(self._starts, times, side="right") - 1, 0, None)
-        out = np.empty((3, len(times), *self._parts[0].shape[1:]))
-        for k in np.unique(where):
-            chosen = where == k
-            out[:, chosen] = self._parts[k].at(times[chosen] - self._starts[k])[:, :, 0]
-        return out
-
-
-def _certified(function: Function, start: float, end: float) -> SmoothFunction:
-    """The function between two breaks, at which it does not jump itself."""
+def _certified(
+    function: Function, duration: float, breaks: Sequence[float]
+) -> tuple[SmoothFunction, tuple[float, ...]]:
+    """A function of shape (1, a, b) from 0 to `duration`, and its breaks."""
+    instants = tuple(finite_array("breaks", breaks, (None,)).tolist())
     try:
-        return certify(lambda s: function(min(start + s, end)), end - start)
+        return certify(function, positive_number("duration", duration), instants), instants
     except NotSmoothError as error:
         raise TrajectoryError(
-            f"the {MOTION_PARTS[error.order]} cannot be found with a relative error below {ACCURACY:g}: near "
-            f"t = {start + error.time:g} s it is off by {ACCURACY * error.error:.2g}; expected a smooth "
-            "function of time that is not noisy, with `breaks` where a derivative jumps"
+            f"the {MOTION_PARTS[error.order]} cannot be found: {error}, with `breaks` where a derivative "
+            "jumps"
         ) from None
 
 
-def _value(name: str, function: Callable, t: float, shape: tuple[int, ...]) -> np.ndarray:
-    try:
-        return finite_array(name, function(t), shape)
-    except InputError as error:
-        raise TrajectoryError(f"{error} at t = {t:g} s") from error
+def _at(function: SmoothFunction, times: np.ndarray) -> np.ndarray:
+    """A function of shape (1, a, b) and two derivatives, (3, T, a, b), at a break from the right."""
+    outside = function.first_outside(times)
+    if outside is not None:
+        raise TrajectoryError(
+            f"expected a time from 0 to {function.duration:g} s, for which the motion was made, found "
+            f"t = {outside:g} s; make it for a longer duration"
+        )
+    return function.at(times)[:, :, 0]
 
 
 def _axial(A: np.ndarray) -> np.ndarray:

@@ -181,7 +181,7 @@ class FunctionTrajectory:
         acceleration: Callable[[float], ArrayLike],
         breaks: tuple[float, ...] = (),
     ):
-        self._functions = {"position": position, "velocity": velocity, "acceleration": acceleration}
+        self._functions = dict(zip(MOTION_PARTS, (position, velocity, acceleration), strict=True))
         for name, function in self._functions.items():
             instance(name, function, Callable, "a function of time")  # type: ignore[arg-type]
         self.breaks = tuple(finite_array("breaks", breaks, (None,)).tolist())
@@ -190,14 +190,23 @@ class FunctionTrajectory:
 
     def __call__(self, t: ArrayLike) -> Motion:
         times = np.asarray(t, dtype=float)
-        parts = [[self._value(name, tk) for tk in times.ravel().tolist()] for name in self._functions]
+        parts = [
+            [finite_value(name, function, tk, (self.dimension,)) for tk in times.ravel().tolist()]
+            for name, function in self._functions.items()
+        ]
         return Motion(*(np.array(part).reshape(*times.shape, self.dimension) for part in parts))
 
-    def _value(self, name: str, t: float) -> np.ndarray:
-        try:
-            return finite_array(name, self._functions[name](t), (self.dimension,))
-        except InputError as error:
-            raise TrajectoryError(f"{error} at t = {t:g} s") from error
+
+def finite_value(name: str, function: Callable, t: float, shape: tuple[int, ...]) -> np.ndarray:
+    """What a function of one time gives at t.
+
+    Raises:
+        TrajectoryError: another shape, or numbers that are not finite; with the time.
+    """
+    try:
+        return finite_array(name, function(t), shape)
+    except InputError as error:
+        raise TrajectoryError(f"{error} at t = {t:g} s") from error
 
 
 def _times(factor: np.ndarray, vector: np.ndarray) -> np.ndarray:
