@@ -74,13 +74,6 @@ class GivenTips(NamedTuple):
         return self.moved, self.J[..., :3, :], self.J_dot[..., :3, :]
 
 
-def way(kind: type, damping: Damping | None, algebra, W_inv, posture, gain):
-    """The inverse map of a kind."""
-    if kind is Inverse:
-        return Inverse(algebra)
-    return kind(W_inv, posture, gain, *([damping] if kind is DampedInverse else []), algebra)
-
-
 def task_of(space, kind: type, algebra):
     """Everything that a space computes of one instant, by any algebra."""
 
@@ -89,8 +82,8 @@ def task_of(space, kind: type, algebra):
             return np.moveaxis(array, -2, 0)
 
         tips = GivenTips(leading(p), rotations.exp(phi), J, J_dot)
-        inverse = way(kind, space.damping, algebra, W_inv, posture, gain)
-        bound = space.over(tips, inverse, [kind is Inverse])
+        bound = space.over(tips, [q.shape[-1]], (W_inv, posture, gain), algebra)
+        assert type(bound._inverse) is kind
         task = bound.measure(np.stack((q, v)), leading(desired))
         joints = bound.to_joints(task, xref_dot, xref_ddot)
         looks = [bound.watched(task)] if bound.limits else []

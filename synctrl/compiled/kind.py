@@ -12,7 +12,7 @@ from ..control.controller import Controller
 from ..robots.friction_parameters import FrictionParameters
 from ..robots.mechanism import Mechanism, mechanism
 from ..tasks.algebra import Algebra
-from ..tasks.redundancy import Posture, inverse_map
+from ..tasks.redundancy import Posture
 from ..tasks.spaces import BoundJointSpace, BoundTipSpace, JointSpace, TipSpace
 from ..tasks.tips import Kinematics
 from .lawful import TracedLaw, trace_law
@@ -105,8 +105,7 @@ class Kind:
         """
         if not isinstance(self.space, TipSpace):
             return BoundJointSpace()
-        square = self.nv == self.m
-        return self.space.over(tip, inverse_map(square, self.space.damping, posture, algebra), [square])
+        return self.space.over(tip, [self.nv], posture, algebra)
 
     @property
     def sizes(self) -> dict[str, int]:
@@ -131,12 +130,9 @@ class Kind:
         options: list[Any] = [self.reference_acceleration, self.k_r_space, list(self.gravity)]
         options += [self.smoothing, self.rotors, list(self.made_of)]
         options += [None if part is None else part.key() for part in (self.learning, self.law)]
-        return [self.fixed.key(), self._space_key(), matrix, shared, options]
-
-    def _space_key(self) -> list[Any]:
-        space: Any = self.space
-        damping = asdict(space.damping) if self.damped else None
-        return [type(space).__qualname__, list(getattr(space, "rows", ())), damping, list(self.watches)]
+        damping = asdict(self.space.damping) if self.damped else None  # type: ignore[union-attr, arg-type]
+        space = [list(getattr(self.space, "rows", ())), damping, list(self.watches)]
+        return [self.fixed.key(), space, matrix, shared, options]
 
 
 class Classified(NamedTuple):

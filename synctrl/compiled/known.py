@@ -32,7 +32,7 @@ from ..robots.robot import Robot
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.payloads import PayloadSchedule
 from ..simulation.plant import Plant
-from ..tasks import algebra, rotations, validity
+from ..tasks import algebra, rotations
 from ..tasks.pose import BoundPoseSpace, PoseSpace
 from ..tasks.redundancy import DampedInverse, Inverse, Pseudoinverse, Redundancy
 from ..tasks.spaces import BoundCartesianSpace, BoundJointSpace, CartesianSpace, JointSpace
@@ -45,7 +45,7 @@ BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace)
 RIGID = (FullParameters, LinearParameters, BaseParameters)
 INVERSES = (Inverse, Pseudoinverse, DampedInverse)
 #: modules whose functions the parts of a closed loop call, beside those of their own
-LINES = (law, algebra, rotations, validity)
+LINES = (law, algebra, rotations)
 
 
 class Part(NamedTuple):
@@ -174,6 +174,7 @@ def _check_class(kind: type) -> None:
             function = _unwrapped(value)
             if (
                 callable(function)
+                and not isinstance(function, type)
                 and _home(function) != base.__module__
                 and (name == "__call__" or not name.startswith("__"))
             ):

@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import SimulationError
-from ..tasks.validity import condition_number
 from .closed_loop import ClosedLoop
 from .disturbances import DisturbanceSchedule
 from .rates import HELD, HELD_SPRING, RUNGE_KUTTA, SWING, Rate, loop_rates
@@ -115,7 +114,7 @@ class Stop:
         task = cell.task.measure(motion, cell.references(np.array([t]))[0].desired)
         if task.J is None or task.J_inv is None:
             return np.ones(cell.n)
-        return condition_number(task.J, task.J_inv)[:, 0]
+        return task.condition[:, 0]
 
     def quickest(self, robots: Sequence[int]) -> tuple[int, int]:
         """Of some robots the one that began, and its joint: it moves fastest a step after the last calm row.

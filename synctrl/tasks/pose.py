@@ -5,16 +5,37 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..robots.robot import Robot
 from . import rotations
-from .redundancy import Damping, InverseMap, Redundancy
+from .redundancy import Damping, Redundancy
 from .spaces import BoundTipSpace, Measurement, TipSpace
-from .tips import Kinematics
 
 #: An orientation error beyond this ends a run: at pi its direction is not defined, rad.
 MAX_ANGLE = 3.0
+
+
+class BoundPoseSpace(BoundTipSpace):
+    """Tip poses.
+
+    Desired motion comes as x = (position, rotation vector), x' = (velocity, angular velocity w_d) and
+    x'' = (acceleration, w_d'), all in world axes, see poses.py.
+    """
+
+    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+        v, (xd, xd_dot, xd_ddot) = motion[1], desired
+        (position, _), R, J_t, J_t_dot = self._tips.poses(*motion)
+        x, e, J, left = compare(xd, position, R, J_t)
+        wd, wd_dot, x_dot = xd_dot[..., 3:], xd_ddot[..., 3:], np.matvec(J, v)
+        turning = np.matvec(left, wd)
+        left_dot = rotations.left_jacobian_inverse_dot(e[..., 3:], turning - x_dot[..., 3:])
+        J_o_dot = left_dot.mT @ J_t[..., 3:, :] + left.mT @ J_t_dot[..., 3:, :]
+        J_dot = _below(J_t_dot[..., :3, :], J_o_dot)
+        inversion = self._inverse.invert(J, J_dot, *motion)
+        turning_dot = np.matvec(left_dot, wd) + np.matvec(left, wd_dot)
+        rates = np.stack((_beside(xd_dot[..., :3], turning), _beside(xd_ddot[..., :3], turning_dot)))
+        moved, error = np.stack((x, x_dot)), np.stack((e, rates[0] - x_dot))
+        return Measurement(moved, error, rates, J, inversion.J_inv, J_dot, inversion)
 
 
 class PoseSpace(TipSpace):
@@ -42,6 +63,7 @@ class PoseSpace(TipSpace):
 
     unit = "m, rad"
     units = ("m",) * 3 + ("rad",) * 3
+    bound = BoundPoseSpace
 
     def __init__(
         self,
@@ -60,9 +82,6 @@ class PoseSpace(TipSpace):
         """Of the orientation error, rad, and of the condition number."""
         return {"orientation": MAX_ANGLE, **super().limits}
 
-    def over(self, tips: Kinematics, inverse: InverseMap, square: ArrayLike) -> BoundPoseSpace:
-        return BoundPoseSpace(tips, inverse, square, self.limits)
-
     def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         pose, J, _ = robot.tip_kinematics(q, np.zeros(robot.nv))
         _, e, J, _ = compare(target, pose.translation, pose.rotation, J)
@@ -75,29 +94,6 @@ class PoseSpace(TipSpace):
 
     def __repr__(self) -> str:
         return "PoseSpace()"
-
-
-class BoundPoseSpace(BoundTipSpace):
-    """Tip poses.
-
-    Desired motion comes as x = (position, rotation vector), x' = (velocity, angular velocity w_d) and
-    x'' = (acceleration, w_d'), all in world axes, see poses.py.
-    """
-
-    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
-        v, (xd, xd_dot, xd_ddot) = motion[1], desired
-        (position, _), R, J_t, J_t_dot = self._tips.poses(*motion)
-        x, e, J, left = compare(xd, position, R, J_t)
-        wd, wd_dot, x_dot = xd_dot[..., 3:], xd_ddot[..., 3:], np.matvec(J, v)
-        turning = np.matvec(left, wd)
-        left_dot = rotations.left_jacobian_inverse_dot(e[..., 3:], turning - x_dot[..., 3:])
-        J_o_dot = left_dot.mT @ J_t[..., 3:, :] + left.mT @ J_t_dot[..., 3:, :]
-        J_dot = _below(J_t_dot[..., :3, :], J_o_dot)
-        inversion = self._inverse.invert(J, J_dot, *motion)
-        turning_dot = np.matvec(left_dot, wd) + np.matvec(left, wd_dot)
-        rates = np.stack((_beside(xd_dot[..., :3], turning), _beside(xd_ddot[..., :3], turning_dot)))
-        moved, error = np.stack((x, x_dot)), np.stack((e, rates[0] - x_dot))
-        return Measurement(moved, error, rates, J, inversion.J_inv, J_dot, inversion)
 
 
 def compare(

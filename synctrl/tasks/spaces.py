@@ -8,8 +8,7 @@ No formula asks what its numbers are: the compiled engine traces the same lines,
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,41 +16,13 @@ from numpy.typing import ArrayLike
 from ..checks import choice, instance, positive_number
 from ..errors import InputError
 from ..robots.robot import Robot
-from .redundancy import Damping, InverseMap, Inversion, Redundancy, inverse_map
+from .algebra import LAPACK, Algebra
+from .measurement import Measurement as Measurement
+from .redundancy import Damping, InverseMap, Posture, Redundancy, inverse_map
 from .tips import Kinematics, Tips
-from .validity import WATCHED
 
 AXES = "xyz"
 Joints = tuple[np.ndarray, np.ndarray]
-
-
-@dataclass(slots=True)
-class Measurement:
-    """Task coordinates of all robots and their desired motion, such that e' = xd' - x'.
-
-    Attributes:
-        motion: x and x', (2, n, m).
-        error: e and e', (2, n, m).
-        rates: xd' and xd'', (2, n, m).
-        J, J_inv, J_dot: (n, m, nv), (n, nv, m) and (n, m, nv), or None in joint space. J_inv is J^-1, or a
-            right inverse of a redundant arm's J.
-        inversion: how J_inv was found.
-    """
-
-    motion: np.ndarray
-    error: np.ndarray
-    rates: np.ndarray
-    J: np.ndarray | None = None
-    J_inv: np.ndarray | None = None
-    J_dot: np.ndarray | None = None
-    inversion: Inversion | None = None
-
-    x = property(lambda self: self.motion[0])
-    x_dot = property(lambda self: self.motion[1])
-    e = property(lambda self: self.error[0])
-    e_dot = property(lambda self: self.error[1])
-    xd_dot = property(lambda self: self.rates[0])
-    xd_ddot = property(lambda self: self.rates[1])
 
 
 class BoundSpace(Protocol):
@@ -156,6 +127,49 @@ class BoundJointSpace:
         return force
 
 
+class BoundTipSpace:
+    """Task coordinates that move with x' = J v; an inverse of J leads from the task to the joints.
+
+    Args:
+        space: which coordinates.
+        tips: where the tips are, in numbers or in symbols.
+        inverse: the way to the joints.
+        square: which robots have as many joints as there are task coordinates, (..., 1).
+    """
+
+    def __init__(self, space: Any, tips: Kinematics, inverse: InverseMap, square: np.ndarray):
+        self._space, self._tips, self._inverse, self._square = space, tips, inverse, square
+        self.limits, self.to_joints = space.limits, inverse.to_joints
+
+    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+        raise NotImplementedError
+
+    def to_torque(self, task: Measurement, force: np.ndarray) -> np.ndarray:
+        return np.matvec(task.J.mT, force)  # type: ignore[union-attr]
+
+    def watched(self, task: Measurement) -> np.ndarray:
+        """What the guard compares with the limits, (..., number of limits)."""
+        return np.concatenate([getattr(task, name) for name in self.limits], axis=-1)
+
+    def sides(self, task: Measurement) -> np.ndarray:
+        """Determinants of square Jacobians, (..., 1); 0 for others, and where they may be singular."""
+        if "condition" not in self.limits or not self._square.any():
+            return 0.0 * self._square
+        J: np.ndarray = task.J  # type: ignore[assignment]
+        return self._square * self._inverse.algebra.determinant(J[..., : J.shape[-2]])
+
+
+class BoundCartesianSpace(BoundTipSpace):
+    """Tip positions along some axes."""
+
+    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+        rows = self._space.cut
+        moved, J, J_dot = self._tips.positions(*motion)
+        moved, J, J_dot = moved[..., rows], J[..., rows, :], J_dot[..., rows, :]
+        inversion = self._inverse.invert(J, J_dot, *motion)
+        return Measurement(moved, desired[:2] - moved, desired[1:], J, inversion.J_inv, J_dot, inversion)
+
+
 class TipSpace:
     """What position and pose of the tip have in common: how joint motion follows from task motion.
 
@@ -170,6 +184,9 @@ class TipSpace:
         InputError: another word, or a limit that is not positive.
     """
 
+    #: what measures these coordinates
+    bound: type[BoundTipSpace]
+
     def __init__(
         self, m: int, max_condition: float, singularity: str | Damping, redundancy: Redundancy | None
     ):
@@ -182,7 +199,7 @@ class TipSpace:
 
     @property
     def limits(self) -> Mapping[str, float]:
-        """Names and limits of what the guard of a run watches, see `BoundSpace`."""
+        """Names and limits of what the guard of a run watches of a `Measurement`."""
         return {"condition": self.max_condition} if self.damping is None else {}
 
     def bind(self, robots: Sequence[Robot]) -> BoundTipSpace:
@@ -192,36 +209,32 @@ class TipSpace:
             InputError: a robot has fewer joints than there are task coordinates, or a redundancy that does
                 not fit.
         """
-        return self.over(Tips(robots), self.inverse_map(robots), [[robot.nv == self.m] for robot in robots])
-
-    def over(self, tips: Kinematics, inverse: InverseMap, square: ArrayLike) -> BoundTipSpace:
-        """This space over any tips, be they of numbers or of symbols.
-
-        Args:
-            tips: where the tips are.
-            inverse: the way to the joints.
-            square: which robots have as many joints as there are task coordinates, (..., 1).
-        """
-        raise NotImplementedError
-
-    def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Error e, (m,), of one robot against a target, (m,), and the J, (m, nv), with e' = -J v."""
-        raise NotImplementedError
-
-    def inverse_map(self, robots: Sequence[Robot]) -> InverseMap:
-        """The way to the joints of these robots.
-
-        Raises:
-            InputError: a robot with fewer joints than there are task coordinates.
-        """
         for robot in robots:
             if robot.nv < self.m:
                 raise InputError(
                     f"{self!r}: expected robots with at least {self.m} joints, "
                     f"found robot '{robot.name}' with {robot.nv}"
                 )
-        square = all(robot.nv == self.m for robot in robots)
-        return inverse_map(square, self.damping, self.redundancy.spread(robots))
+        return self.over(Tips(robots), [[robot.nv] for robot in robots], self.redundancy.spread(robots))
+
+    def over(
+        self, tips: Kinematics, joints: ArrayLike, posture: Posture, algebra: Algebra = LAPACK
+    ) -> BoundTipSpace:
+        """This space over any tips, be they of numbers or of symbols.
+
+        Args:
+            tips: where the tips are.
+            joints: how many joints the robots have, (..., 1).
+            posture: see `Redundancy.spread`.
+            algebra: of all these.
+        """
+        square = np.equal(joints, self.m)
+        inverse = inverse_map(bool(square.all()), self.damping, posture, algebra)
+        return self.bound(self, tips, inverse, square)
+
+    def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Error e, (m,), of one robot against a target, (m,), and the J, (m, nv), with e' = -J v."""
+        raise NotImplementedError
 
 
 class CartesianSpace(TipSpace):
@@ -239,6 +252,7 @@ class CartesianSpace(TipSpace):
     """
 
     unit = "m"
+    bound = BoundCartesianSpace
 
     def __init__(
         self,
@@ -252,13 +266,12 @@ class CartesianSpace(TipSpace):
         super().__init__(len(axes), max_condition, singularity, redundancy)
         self.axes = axes
         self.rows = [AXES.index(a) for a in axes]
+        first, last = self.rows[0], self.rows[-1]
+        self.cut = slice(first, last + 1) if self.rows == [*range(first, last + 1)] else self.rows
 
     def labels(self, robots: Sequence[Robot]) -> tuple[str, ...]:
         """The axes."""
         return tuple(self.axes)
-
-    def over(self, tips: Kinematics, inverse: InverseMap, square: ArrayLike) -> BoundCartesianSpace:
-        return BoundCartesianSpace(tips, inverse, square, self.limits, self.rows)
 
     def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         pose, J, _ = robot.tip_kinematics(q, np.zeros(robot.nv))
@@ -266,58 +279,6 @@ class CartesianSpace(TipSpace):
 
     def __repr__(self) -> str:
         return f"CartesianSpace('{self.axes}')"
-
-
-class BoundTipSpace:
-    """Task coordinates that move with x' = J v; an inverse of J leads from the task to the joints.
-
-    Args:
-        tips, inverse, square: see `TipSpace.over`.
-        limits: of what is watched, by the names in `WATCHED`.
-    """
-
-    def __init__(self, tips: Kinematics, inverse: InverseMap, square: ArrayLike, limits: Mapping[str, float]):
-        self._tips, self._inverse, self._square, self.limits = tips, inverse, np.array(square), limits
-        self.to_joints = inverse.to_joints
-
-    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
-        raise NotImplementedError
-
-    def to_torque(self, task: Measurement, force: np.ndarray) -> np.ndarray:
-        return np.matvec(task.J.mT, force)  # type: ignore[union-attr]
-
-    def watched(self, task: Measurement) -> np.ndarray:
-        """What the guard compares with the limits, (..., number of limits)."""
-        return np.concatenate([WATCHED[name](task) for name in self.limits], axis=-1)
-
-    def sides(self, task: Measurement) -> np.ndarray:
-        """Determinants of square Jacobians, (..., 1); 0 for others, and where they may be singular."""
-        if "condition" not in self.limits or not self._square.any():
-            return 0.0 * self._square
-        J: np.ndarray = task.J  # type: ignore[assignment]
-        return self._square * self._inverse.algebra.determinant(J[..., : J.shape[-2]])
-
-
-class BoundCartesianSpace(BoundTipSpace):
-    """Tip positions along some axes."""
-
-    def __init__(
-        self,
-        tips: Kinematics,
-        inverse: InverseMap,
-        square: ArrayLike,
-        limits: Mapping[str, float],
-        rows: list[int],
-    ):
-        super().__init__(tips, inverse, square, limits)
-        first, last = rows[0], rows[-1]
-        self._rows = slice(first, last + 1) if rows == list(range(first, last + 1)) else rows
-
-    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
-        moved, J, J_dot = self._tips.positions(*motion)
-        moved, J, J_dot = moved[..., self._rows], J[..., self._rows, :], J_dot[..., self._rows, :]
-        inversion = self._inverse.invert(J, J_dot, *motion)
-        return Measurement(moved, desired[:2] - moved, desired[1:], J, inversion.J_inv, J_dot, inversion)
 
 
 def _damping(singularity: str | Damping) -> Damping | None:
