@@ -131,7 +131,7 @@ class Searching(Leaky):
 
     def bind(self, cell):
         bound = super().bind(cell)
-        bound.rate = lambda z, seen: np.linalg.inv(z.T @ z + np.eye(z.shape[1])) @ seen.gradient.T
+        bound.rate = lambda z, seen: seen.gradient @ np.linalg.inv(z.T @ z + np.eye(z.shape[1]))
         return bound
 
 
@@ -140,6 +140,46 @@ def test_what_cannot_be_traced_is_refused_by_name(kind):
     pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
     with pytest.raises(InputError, match=r"cannot trace the adaptation .*BoundLeaky"):
         with_adaptation(a460_pair(), kind(0.3, 0.1)).simulate(0.01, engine="compiled")
+
+
+@pytest.mark.parametrize(
+    ("method", "gives", "says"),
+    [
+        ("start", lambda z: z.tolist(), "start: expected an array, found list"),
+        ("start", lambda z: z[0], r"start: expected shape \(2, any\), found \(30,\)"),
+        ("start", lambda z: z * np.nan, "start: expected finite numbers"),
+        ("estimate", lambda z: z[:, :2], r"estimate: expected an array of shape \(2, 30\), found \(2, 2\)"),
+        ("estimate", lambda z: None, r"estimate: expected an array of shape \(2, 30\), found \(\)"),
+        ("settle", lambda z: None, r"settle: expected an array of shape \(2, 30\), found \(\)"),
+        ("rate", lambda z: z[:1], r"rate: expected an array of shape \(2, 30\), found \(1, 30\)"),
+        ("rate", lambda z: 0.0, r"rate: expected an array of shape \(2, 30\), found \(\)"),
+    ],
+)
+def test_arrays_that_do_not_fit_are_refused_with_the_adaptation_before_anything_runs(method, gives, says):
+    class Unfit(Leaky):
+        def bind(self, cell):
+            bound = super().bind(cell)
+            setattr(bound, method, lambda *z: gives(z[0] if z else cell.theta_hat0))
+            return bound
+
+    with pytest.raises(InputError, match=f"adaptation BoundLeaky, {says}"):
+        with_adaptation(a460_pair(), Unfit(0.3, 0.1))
+
+
+class Clipped(Leaky):
+    """Estimates that keep to their first values, whatever the rate is."""
+
+    def bind(self, cell):
+        bound = super().bind(cell)
+        bound.settle = lambda z: np.clip(z, bound.theta_hat0 - 1e-6, bound.theta_hat0 + 1e-6)
+        return bound
+
+
+@pytest.mark.parametrize("integrator", ["rk4", "RK45", "LSODA"])
+def test_every_integrator_lets_estimates_settle_where_steps_end(integrator):
+    experiment = with_adaptation(a460_pair(), Clipped(0.3, 0.1))
+    moved = np.abs((run := experiment.simulate(0.02, integrator=integrator)).theta_hat - run.theta_hat[0])
+    assert moved.max() == pytest.approx(1e-6)
 
 
 def test_maps_without_bodies_are_refused_by_name():

@@ -88,6 +88,7 @@ def test_every_event_before_the_end_happens_once(options):
     run = replace(a460_pair(friction=False), plant_type=Charging).simulate(0.01, dt=1e-3, **options)
     expected = np.searchsorted([0.0, 2e-3, 0.0045], run.t + 1e-9, side="right")
     np.testing.assert_array_equal(run.outputs["plant_state"][:, 0], expected)
+    assert run.info["events"] == [{"t": t, "part": "Charging"} for t in (0.0, 2e-3, 0.0045)]
 
 
 # -- the certificate --------------------------------------------------------------------------------------
@@ -191,12 +192,24 @@ class Timeless(BoundPosted):
         return [np.nan]
 
 
+class Wordy(BoundPosted):
+    def messages(self, start, end):
+        return ["soon"]
+
+
+class Silent(BoundPosted):
+    def messages(self, start, end):
+        return None
+
+
 @pytest.mark.parametrize(
     ("kind", "says"),
     [
         (Shifted, r"Shifted, messages: expected instants in order with 0 <= t < .* s, found"),
         (Backwards, "Backwards, messages: expected instants in order"),
-        (Timeless, "Timeless, messages: expected instants in order"),
+        (Timeless, "Timeless, messages: expected finite numbers, found nan"),
+        (Wordy, "Wordy, messages: expected numbers, found .*soon"),
+        (Silent, "Silent, messages: expected numbers, found None"),
         (Narrow, r"Narrow, meet: expected memory of shape \(5, 3\), found \(4, 3\)"),
     ],
 )

@@ -320,6 +320,32 @@ def test_a_law_that_gives_another_shape_is_refused_by_name_before_it_runs():
         replace(planar_four(), law=Wrong(1.0))
 
 
+@pytest.mark.parametrize("nothing", [None, (0.0, 0.0, 0.0)])
+def test_a_part_that_gives_something_of_another_kind_is_refused_by_name(nothing):
+    class Empty(Pulling):
+        def bind(self, cell, gains):
+            bound = super().bind(cell, gains)
+            bound.command = lambda errors: nothing
+            return bound
+
+    class Deaf(Lagging):
+        def bind(self, cell):
+            bound = super().bind(cell)
+            bound.exchange = lambda t, w, memory: nothing
+            return bound
+
+    class Untold(Pulling):
+        def as_dict(self):
+            return nothing
+
+    with pytest.raises(InputError, match="BoundPulling, command: expected an Asked"):
+        replace(planar_four(), law=Empty(1.0))
+    with pytest.raises(InputError, match="BoundLagging, exchange: expected a Received"):
+        replace(planar_four(), network=Deaf(0.1))
+    with pytest.raises(InputError, match="Untold, as_dict"):
+        replace(planar_four(), law=Untold(1.0))
+
+
 READY = {
     "A460 pair": a460_pair, "A460 with six joints": a460_full_pair, "planar four": planar_four,
     "Pandas": panda_four, "mixed four": mixed_four, "UR5": ur5_payload, "mobile robot": mobile_robot,

@@ -149,6 +149,12 @@ def test_a_rate_of_another_size_than_the_state_is_refused_before_the_run():
         lagging(Wrong).simulate(0.01)
 
 
+@pytest.mark.parametrize("start", [[0.0] * 8, None, 1.0, np.zeros((2, 4)), np.full(8, np.nan)], ids=repr)
+def test_a_state_that_is_no_row_of_finite_numbers_is_refused_by_name(start):
+    with pytest.raises(InputError, match="plant Started, hidden0: expected"):
+        lagging(type("Started", (LaggingMotors,), {"hidden0": start}))
+
+
 class Failing(LaggingMotors):
     """Motors that break."""
 
@@ -161,6 +167,42 @@ def test_a_plant_that_fails_ends_the_run_which_hands_over_what_it_has(options):
     with pytest.raises(SimulationError, match=r"Failing\.move.*broken") as stop:
         lagging(Failing).simulate(0.01, **options)
     assert stop.value.result.status.startswith("stopped")
+
+
+def over(time, *axes):
+    return np.zeros((len(time), *(2 for _ in axes))), "N", ("time", *axes)
+
+
+@pytest.mark.parametrize(
+    ("method", "account", "says"),
+    [
+        ("outputs", lambda hidden: 1 / 0, "ZeroDivisionError"),
+        ("outputs", lambda hidden: None, "outputs: expected entries by name, found None"),
+        ("outputs", lambda hidden: {"heat": 3}, "outputs, heat: expected an array of floats over 11"),
+        ("outputs", lambda hidden: {"heat": over(hidden[1:])}, "outputs, heat: expected an array"),
+        ("outputs", lambda hidden: {"heat": (*over(hidden)[:2], ("robot",))}, "outputs, heat: expected an"),
+        ("outputs", lambda hidden: {"heat": over(hidden, "robot")}, "outputs, heat: expected an array"),
+        ("outputs", lambda hidden: {"plant_state": over(hidden)}, "not taken, found 'plant_state'"),
+        ("outputs", lambda hidden: {"tau": over(hidden)}, "names that are not taken, found 'tau'"),
+        ("report", lambda hidden: 1 / 0, "ZeroDivisionError"),
+        ("report", lambda hidden: None, "report: expected entries by name, found None"),
+        ("report", lambda hidden: {"gains": 2}, "report: expected names that are not taken, found 'gains'"),
+        ("report", lambda hidden: {"dt": 2}, "report: expected names that are not taken, found 'dt'"),
+    ],
+)
+def test_a_plant_that_says_nothing_sensible_of_itself_loses_no_row(method, account, says):
+    kind = type("Talking", (LaggingMotors,), {method: lambda self, hidden: account(hidden)})
+    with pytest.raises((InputError, SimulationError), match=says) as stop:
+        lagging(kind).simulate(0.01)
+    whole = lagging().simulate(0.01)
+    np.testing.assert_array_equal(stop.value.result.q, whole.q)
+    np.testing.assert_array_equal(stop.value.result.outputs["plant_state"], whole.outputs["plant_state"])
+
+
+def test_a_run_that_stops_gives_its_own_reason_even_if_the_plant_fails_to_say_what_became_of_it():
+    kind = type("Twice", (Failing,), {"outputs": lambda self, hidden: 1 / 0})
+    with pytest.raises(SimulationError, match=r"Failing\.move.*broken"):
+        lagging(kind).simulate(0.01)
 
 
 def test_a_plant_without_a_state_of_its_own_adds_nothing_to_the_log():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -194,8 +194,19 @@ class Controller:
 
 
 def settings_of(part: Adaptation | Law | Network) -> dict[str, Any]:
-    """Name and settings of a part, by default the name of its type."""
-    return {"name": type(part).__name__, **part.as_dict()}
+    """Name and settings of a part, by default the name of its type.
+
+    Raises:
+        InputError: its `as_dict` gives no mapping.
+    """
+    settings = part.as_dict()
+    instance(
+        f"{type(part).__qualname__}, as_dict",
+        settings,
+        Mapping,
+        "names and settings, for example {'gain': 1.0}",
+    )
+    return {"name": type(part).__name__, **settings}
 
 
 def check_reference(reference: Reference, n: int, m: int) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import finite_array
 from ..coupling.cell import Cell, Reference
 from ..errors import InputError, NonFiniteError
 from .law import compute_weighted_errors
@@ -41,13 +42,13 @@ class Messages:
         """
         if not self.sent:
             return []
-        times = np.asarray(self._times(start, end), dtype=float)
+        where = f"network {type(self._network).__qualname__}, messages"
+        times = finite_array(where, self._times(start, end), (None,))
         slack = ROUNDING * max(abs(start), abs(end))
         inside = bool(((times >= start - slack) & (times <= end + slack)).all())
-        if times.ndim != 1 or not inside or (np.diff(times) < 0).any():
+        if not inside or (np.diff(times) < 0).any():
             raise InputError(
-                f"network {type(self._network).__qualname__}, messages: expected instants in order with "
-                f"{start:g} <= t < {end:g} s, found {times!s:.80}"
+                f"{where}: expected instants in order with {start:g} <= t < {end:g} s, found {times!s:.80}"
             )
         return times.tolist()
 

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import instance
 from ..errors import InputError, SynctrlError
-from .laws import BoundLaw, no_errors
-from .network import BoundNetwork
+from .laws import Asked, BoundLaw, no_errors
+from .network import BoundNetwork, Received
 
 
 def check_parts(law: BoundLaw, network: BoundNetwork, n: int, p: int, m: int) -> None:
@@ -30,6 +31,8 @@ def check_parts(law: BoundLaw, network: BoundNetwork, n: int, p: int, m: int) ->
         received = network.exchange(0.0, np.zeros((2, n, m)), memory)
     with _named("law", law):
         asked = law.command(no_errors(n, m))
+    instance(f"network {type(network).__qualname__}, exchange", received, Received, "a Received")
+    instance(f"law {type(law).__qualname__}, command", asked, Asked, "an Asked")
     _check_shapes("network", network, {
         "epsilon": (received.epsilon, (p, m)), "epsilon_dot": (received.epsilon_dot, (p, m)),
         "shares": (received.shares, (3, n, m)), "memory_dot": (received.memory_dot, np.shape(memory)),

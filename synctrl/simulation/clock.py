@@ -15,6 +15,8 @@ from ..checks import positive_number
 from ..errors import InputError
 
 MAX_STEPS = 100_000_000
+#: instants that are closer than this share of dt are one
+TIE = 1e-9
 
 
 class Stretch(NamedTuple):
@@ -215,7 +217,7 @@ def _before(clock: Clock, instant: float) -> int:
 
 
 def _close(t: float, to: float, dt: float) -> bool:
-    return abs(t - to) <= 1e-9 * dt
+    return abs(t - to) <= TIE * dt
 
 
 def before(t: float) -> float:

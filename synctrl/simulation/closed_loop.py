@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from ..checks import finite_array
+from ..checks import finite_array, instance
+from ..control.adaptation_check import check_adaptation
 from ..control.controller import Controller, Signals
 from ..control.messages import Messages
+from ..control.network import BoundNetwork
 from ..coupling.cell import Reference
 from ..errors import InputError, NonFiniteError
 from .plant import Plant
@@ -25,13 +29,17 @@ class ClosedLoop:
         messages: those of the network.
 
     Raises:
-        InputError: events that are no instants.
+        InputError: events that are no instants, or parts of one's own that start from no finite numbers or
+            give arrays that do not fit.
     """
 
     def __init__(self, controller: Controller, plant: Plant):
         self.controller, self.plant = controller, plant
         self.cell, self._law = controller.cell, controller.unchecked
-        self._z0, self._memory0 = controller.adaptation.start(), np.asarray(controller.network.start())
+        if not _is_ours(type(controller.adaptation)):
+            check_adaptation(controller)
+        self._z0, self._memory0 = controller.adaptation.start(), _memory_of(controller.network)
+        _check_own_state(plant)
         self._layout = Layout(self.cell, self._z0.shape, self._memory0.shape, plant.hidden0.size)
         self.size = self._layout.size
         self.events = finite_array(f"events of the plant {type(plant).__qualname__}", plant.events, (None,))
@@ -137,11 +145,22 @@ class ClosedLoop:
         if hidden_dot.size:
             rate.hidden[...] = hidden_dot
 
-    def settle(self, state: State) -> None:
-        """Let the adaptation make of its own state what it does after a step, for example project it."""
+    def settle(self, state: State) -> bool:
+        """Let the adaptation make of its own state what it does after a step, for example project it.
+
+        Returns:
+            Whether that moved the state.
+        """
         z = self.controller.adaptation.settle(state.z)
-        if z is not state.z:
+        moved = z is not state.z and not np.array_equal(z, state.z)
+        if moved:
             state.z[...] = z
+        return moved
+
+    def events_within(self, end: float) -> list[dict[str, Any]]:
+        """The plant's events of a run with 0 <= t < end, in order, as plain data: `t`, s, and `part`."""
+        part = type(self.plant).__qualname__
+        return [{"t": t, "part": part} for t in np.sort(self.events).tolist() if 0 <= t < end]
 
     def meet(self, t: float, state: State) -> None:
         """Make the state before the plant's event at time t the one after it.
@@ -186,6 +205,16 @@ class ClosedLoop:
                     robot=i,
                     cause="part",
                 )
+
+
+def _memory_of(network: BoundNetwork) -> np.ndarray:
+    return finite_array(f"network {type(network).__qualname__}, start", network.start())
+
+
+def _check_own_state(plant: Plant) -> None:
+    where = f"plant {type(plant).__qualname__}, hidden0"
+    instance(where, plant.hidden0, np.ndarray, "an array")
+    finite_array(where, plant.hidden0, (None,))
 
 
 def _is_ours(kind: type) -> bool:

@@ -54,6 +54,8 @@ class RungeKutta:
 class Scipy:
     """One of SciPy's methods with error control, restarted at every jump; its steps are its own.
 
+    An adaptation settles where the clock's steps end; where that moves its state, it is a jump.
+
     Args:
         loop: the closed loop.
         clock: its instants.
@@ -72,11 +74,14 @@ class Scipy:
         self._jumps = np.append(clock.jumps, clock.end)
         self._solver: Any = None
         self._output: Any = None
+        self._moved = False
 
     def carry(self, control: Control, step: Step, y: State, rate: State) -> State:
-        if not step.joined:
+        if self._moved or not step.joined:
             self._restart(control, step, y.flat)
-        return self._loop.state(self._at(step.t_next))
+        after = self._loop.state(self._at(step.t_next))
+        self._moved = self._loop.settle(after)
+        return after
 
     def _restart(self, control: Control, step: Step, y: np.ndarray) -> None:
         import scipy.integrate

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..checks import printable
 from ..control.controller import Signals
+from .account import NOTHING, Account, account_of
 from .advance import Sample
 from .clock import Clock
 from .closed_loop import ClosedLoop
@@ -18,7 +19,7 @@ from .damping import DampingLog
 from .limits import limit_report, torque_limits
 from .memory import check_fits
 from .result import LAYOUT, Result, unit_of
-from .saturation import applied_output, saturation_report
+from .saturation import APPLIED, applied_output, saturation_report
 from .state import State
 
 
@@ -46,7 +47,6 @@ class Recorder:
         numbers = sum(int(np.prod(shape[1:])) for shape in shapes.values())
         check_fits(clock, 8 * numbers)
         self._arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
-        self._rows = tuple(self._arrays[name] for name in LAYOUT)
         self._damping = DampingLog(instants, loop.cell.n)
         self.count, self.reached, self.state = 0, 0.0, loop.initial_state()
 
@@ -59,10 +59,6 @@ class Recorder:
         self._damping.add(self.count, sample.signals)
         self.count += 1
 
-    def rows_ahead(self) -> list[np.ndarray]:
-        """The part of every array not logged yet, in the order of `LAYOUT`, to be filled from outside."""
-        return [array[self.count :] for array in self._rows]
-
     def address_ahead(self, name: str) -> int | None:
         """Where the part of an array begins that is not logged yet; None if there is no such array."""
         array = {**self._arrays, **self._damping.arrays}.get(name)
@@ -70,7 +66,7 @@ class Recorder:
 
     def advance(self, times: np.ndarray) -> None:
         """Count rows that were filled from outside."""
-        self._rows[0][self.count : self.count + len(times)] = times
+        self._arrays["t"][self.count : self.count + len(times)] = times
         self.count += len(times)
 
     def last(self, name: str) -> np.ndarray:
@@ -82,8 +78,22 @@ class Recorder:
         """What was logged until now, by name."""
         return {name: array[: self.count] for name, array in self._arrays.items()}
 
-    def result(self, status: str, info: Mapping[str, Any], experiment: Any) -> Result:
-        """What was logged until now."""
+    def account(self, info: Mapping[str, Any]) -> Account:
+        """What the plant says of its own state until now, under names that `info` does not have.
+
+        Raises:
+            InputError: nothing that a result can hold.
+            Exception: what the plant raises.
+        """
+        loop, nothing = self._loop, np.zeros((self.count, 0))
+        taken = {*info, *describe(loop), *LAYOUT, *_STATE_AXES, *OF_EVERY_RUN}
+        hidden, lengths = self.logged().get(PLANT_STATE, nothing), {"time": self.count, **sizes(loop)}
+        return account_of(loop.plant, hidden, taken, lengths)
+
+    def result(
+        self, status: str, info: Mapping[str, Any], experiment: Any, account: Account = NOTHING
+    ) -> Result:
+        """What was logged until now, with what the plant says of it."""
         arrays = {name: _taken(array, self.count) for name, array in self._arrays.items()}
         states = {name: arrays.pop(name) for name in own_states(self._loop)}
         described = {"status": printable(status), **describe(self._loop), **info}
@@ -91,11 +101,10 @@ class Recorder:
         seen = (arrays[name] for name in ("t", "q", "v", "tau"))
         described["limits"] = limit_report(self._loop.cell, *seen)
         plant = self._loop.plant
-        hidden = states.get(PLANT_STATE, np.zeros((self.count, 0)))
-        described.update(plant.report(hidden))
+        described.update(account.report)
         described["saturation"] = saturation_report(plant, arrays)
         found = {name: (array, "SI", _STATE_AXES[name]) for name, array in states.items()}
-        found |= {**applied_output(plant, arrays["tau"]), **plant.outputs(hidden)}
+        found |= {**applied_output(plant, arrays["tau"]), **account.outputs}
         outputs = {name: array for name, (array, _, _) in found.items()}
         described["outputs"] = {n: {"unit": unit, "axes": list(axes)} for n, (_, unit, axes) in found.items()}
         return Result(**arrays, info=described, outputs=outputs, experiment=experiment)
@@ -112,6 +121,8 @@ class Instant(NamedTuple):
 
 #: outputs that have what an adaptation, a network and a plant have of their own in the state of the loop
 ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE = "adaptation_state", "network_state", "plant_state"
+#: further names of entries and outputs that a result gets from elsewhere
+OF_EVERY_RUN = "status", "outputs", "damping", "limits", "saturation", "step_error", "run", "format", APPLIED
 #: how every array is read from an instant
 ROW: dict[str, Callable[[Instant], Any]] = {
     "t": lambda at: at.sample.t,

@@ -132,6 +132,7 @@ INFO = entries(
         "decimated": whole(1),
         "disturbances": rows(_DISTURBANCE),
         "payloads": rows(_PAYLOAD),
+        "events": rows(entries({"t": number, "part": label})),
         "damping": rows(entries({**_WINDOW, "stop": number})),
         "limits": rows(_LEFT_LIMIT),
         "saturation": rows(_CUT_OFF),

@@ -11,6 +11,7 @@ import numpy as np
 from ..coupling.motion_checks import check_motions
 from ..coupling.reachability import SAMPLES, check_reachable
 from ..errors import RunInterrupted, SimulationError, SynctrlError
+from .account import NOTHING, Account
 from .advance import Sample, Solver, advance
 from .clock import Clock
 from .closed_loop import ClosedLoop
@@ -112,32 +113,43 @@ def collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> R
 def finish(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:
     """Let a run log itself; whatever ends it, while it is looked into too, takes along what was logged."""
 
-    def logged(status: str) -> Result:
+    def logged(status: str, account: Account) -> Result:
         run.info["step_error"] = step_report(run.step_error, run.loop, recorder.logged(), run.info)
-        return recorder.result(status, run.info, run.experiment)
+        return recorder.result(status, run.info, run.experiment, account)
+
+    def stopped(status: str) -> Result:
+        account = NOTHING
+        with suppress(Exception):  # why the run stopped is worth more than why the plant says nothing
+            account = recorder.account(run.info)
+        return logged(status, account)
+
+    def completed() -> Result:
+        log()
+        return logged("completed", recorder.account(run.info))
 
     with np.errstate(all="ignore"):  # overflow is found and named by the guard
         try:
-            return _made(run, recorder, log, logged)
+            return _made(run, recorder, completed, stopped)
         except KeyboardInterrupt:
-            raise _interrupted(recorder.reached, logged) from None
+            raise _interrupted(recorder.reached, stopped) from None
 
 
-def _made(run: Run, recorder: Recorder, log: Callable[[], None], logged: Callable[[str], Result]) -> Result:
+def _made(
+    run: Run, recorder: Recorder, completed: Callable[[], Result], stopped: Callable[[str], Result]
+) -> Result:
     """The result of a run that nobody interrupts; its error has the result of one that had to stop."""
     try:
-        log()
-        return logged("completed")
+        return completed()
     except SynctrlError as error:
         date(error, recorder.reached)
         told = _diagnosed(run, recorder, error)
-        told.result = logged(f"stopped: {told}")
+        told.result = stopped(f"stopped: {told}")
         if told is error:
             raise
         raise told from None
     except Exception as error:
         failure = user_failure(error, recorder.reached)
-        failure.result = logged(f"stopped: {failure}")
+        failure.result = stopped(f"stopped: {failure}")
         raise failure from error
 
 

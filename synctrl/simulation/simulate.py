@@ -16,7 +16,7 @@ from ..control.network import Network
 from ..coupling.cell import Cell
 from ..errors import InputError
 from ..renamed import names_elsewhere
-from .clock import make_clock
+from .clock import TIE, make_clock
 from .closed_loop import ClosedLoop
 from .disturbances import Disturbance, DisturbanceSchedule
 from .engines import Engine, find_engine
@@ -202,6 +202,7 @@ class Experiment:
         info["control_period"] = control_period
         info["disturbances"] = [_describe(d) for d in self.disturbances]
         info["payloads"] = [payload.as_dict() for payload in self.payloads]
+        info["events"] = loop.events_within(clock.end - TIE * dt)
         return Run(self, loop, clock, schedule, every, info, StepError(self.cell.n, self.cell.nv))
 
 

@@ -63,11 +63,11 @@ class BoundSunMills:
     def command(self, errors: Errors) -> Asked:
         x, Lambda, beta = errors, self.Lambda, self.beta
         c, c_dot, c_ddot, c_inv = x.weights
-        e = x.error[0]
-        e_star = x.weighted + beta * x.shares[:2]  # (10), (29), and the derivative
-        u = np.matvec(c, x.rates) + beta * x.shares[1:] + Lambda * e_star  # (11), (30), and the derivative
-        u[0] += np.matvec(c_dot, e)
-        u[1] += np.matvec(c_dot, x.rates[0] + x.error[1]) + np.matvec(c_ddot, e)
+        e, shares = x.error[0], beta * x.shares
+        e_star = x.weighted + shares[:2]  # (10), (29), and the derivative
+        u = np.matvec(c, x.rates) + shares[1:] + Lambda * e_star  # (11), (30), and the derivative
+        u += np.matvec(c_dot, np.array((e, x.rates[0] + x.error[1])))
+        u[1] += np.matvec(c_ddot, e)
         xref_dot = np.matvec(c_inv, u[0])
         turned = xref_dot if self.reference_acceleration == "exact" else x.x_dot  # (13) prints x'
         xref_ddot = np.matvec(c_inv, u[1] - np.matvec(c_dot, turned))
