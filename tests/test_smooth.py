@@ -41,6 +41,15 @@ def test_breaks_may_separate_pieces() -> None:
     np.testing.assert_allclose(found(1.3).x_ddot, known(1.3).x_ddot, atol=1e-6)  # from the right
 
 
+def test_a_motion_may_have_a_hundred_breaks() -> None:
+    corners = np.linspace(0, 2, 101)
+    heights = np.random.default_rng(0).uniform(-1, 1, 101)
+    found = SmoothTrajectory(lambda t: [np.interp(t, corners, heights)], 2.0, corners[1:-1])
+    middles = 0.5 * (corners[1:] + corners[:-1])
+    slopes = np.diff(heights) / np.diff(corners)
+    np.testing.assert_allclose(found(middles).x_dot[:, 0], slopes, rtol=0, atol=1e-6 * np.abs(slopes).max())
+
+
 def test_a_motion_that_jumps_itself_at_a_break_is_refused() -> None:
     with pytest.raises(TrajectoryError, match=r"the position cannot be found: near t = 0\.[67]"):
         SmoothTrajectory(lambda t: [float(t >= 0.7)], 2.0, breaks=(0.7,))

@@ -120,10 +120,11 @@ def certify(function: Function, duration: float, breaks: Iterable[float] = ()) -
     """
     edges = [0.0, *sorted({b for b in breaks if 0 < b < duration}), duration]
     pieces = [_piece(function, start, stop) for start, stop in pairwise(edges)]
+    shortest = min(piece.stop - piece.start for piece in pieces)
     checks = duration * np.modf((np.arange(CHECKS) + 0.5) * (np.sqrt(5) - 1) / 2)[0]
     expected = np.array([function(t) for t in checks])
     for _ in range(DEPTH):
-        allowed = tolerances(pieces, duration)
+        allowed = tolerances(pieces, shortest)
         pieces = _with_jumps(pieces, edges)
         missed = _missed(SmoothFunction(pieces), checks, expected, allowed[0])
         bad = [i in missed or bool((p.error > allowed).any()) for i, p in enumerate(pieces)]
@@ -134,18 +135,19 @@ def certify(function: Function, duration: float, breaks: Iterable[float] = ()) -
         pieces = [
             half for p, b in zip(pieces, bad, strict=True) for half in (_halves(function, p) if b else [p])
         ]
-    raise _not_smooth(_with_jumps(pieces, edges), tolerances(pieces, duration))
+    raise _not_smooth(_with_jumps(pieces, edges), tolerances(pieces, shortest))
 
 
-def tolerances(pieces: list[Piece], duration: float) -> np.ndarray:
+def tolerances(pieces: list[Piece], shortest: float) -> np.ndarray:
     """Largest error of c_i, c_i' and c_i'' that is accepted, (3, n).
 
     It is 1e-8 of the largest |c_i| of the run times the fastest rate of the weights: 1, max_j |c_j'| / |c_j|
-    or max_j |c_j''| / |c_j|, or that of a change over the whole run if they are slower.
+    or max_j |c_j''| / |c_j|, or that of a change over the shortest time between two breaks, in s, if they are
+    slower. A run without breaks counts as one such time.
     """
     largest = np.max([piece.largest for piece in pieces], axis=0)
     size = np.maximum(largest[0], np.finfo(float).tiny)
-    rates = np.maximum((largest / size).max(axis=1), duration ** -np.arange(3.0))
+    rates = np.maximum((largest / size).max(axis=1), shortest ** -np.arange(3.0))
     return ACCURACY * rates[:, None] * size
 
 
