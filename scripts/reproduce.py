@@ -16,7 +16,7 @@ import numpy as np
 from synctrl.analysis.identification import Identification, identify
 from synctrl.analysis.metrics import as_data, metrics, settling_bands, write_metrics
 from synctrl.errors import SynctrlError
-from synctrl.paper.batch import Job, run_all
+from synctrl.paper.batch import PlannedRun, run_all
 from synctrl.paper.claims import Claim
 from synctrl.paper.claims_a460 import a460_claims
 from synctrl.paper.claims_planar import own_findings, planar_four_claims
@@ -30,7 +30,7 @@ from synctrl.paper.paper_sections import (
 )
 from synctrl.paper.plant_sections import friction_section, full_a460_section, identification_section
 from synctrl.paper.report import Links, Section, write_page
-from synctrl.paper.reproduction import JOBS, judge_jobs, judged
+from synctrl.paper.reproduction import PLANNED, judge_runs, judged
 from synctrl.paper.step_section import step_section
 from synctrl.paper.theory import examine
 from synctrl.paper.theory_sections import baseline_section, certificate_section
@@ -56,11 +56,11 @@ def main() -> int:
     parser.add_argument("--workers", type=count, default=2, help="number of processes")
     parser.add_argument("--quick", action="store_true", help="no more than a second of every run, as a trial")
     options = parser.parse_args()
-    jobs = {**JOBS, **judge_jobs()}
+    planned = {**PLANNED, **judge_runs()}
     if options.quick:
-        jobs = {name: job.shortened(TRIAL) for name, job in jobs.items()}
+        planned = {name: run.shortened(TRIAL) for name, run in planned.items()}
     try:
-        page = reproduce(options.out, options.workers, jobs)
+        page = reproduce(options.out, options.workers, planned)
     except SynctrlError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
@@ -78,10 +78,10 @@ def count(text: str) -> int:
     return int(text)
 
 
-def reproduce(out: Path, workers: int, jobs: Mapping[str, Job]) -> Path:
+def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun]) -> Path:
     """Run everything and write it into a folder; returns the path of the page."""
-    every = run_all(out / "runs", workers, jobs)
-    runs = {name: every[name] for name in JOBS}
+    every = run_all(out / "runs", workers, planned)
+    runs = {name: every[name] for name in PLANNED}
     print("\nchecking the proof along every run, comparing controllers, drawing ...", flush=True)
     with ThreadPoolExecutor(1) as background:
         examined = background.submit(examine, out / "runs", out / "figures", workers)
@@ -117,7 +117,7 @@ def tell(runs: Mapping[str, Result], out: Path) -> tuple[list[Claim], list[Secti
     """The claims, and the sections that need nothing but the runs."""
     a460, planar = select(runs, "a460_pair_"), select(runs, "planar_four_")
     claims = [*a460_claims(a460), *planar_four_claims(planar), *own_findings(planar)]
-    layout, figures = JOBS["planar_four_synchronized"].make(), out / "figures"
+    layout, figures = PLANNED["planar_four_synchronized"].make(), out / "figures"
     return claims, [
         introduction(claims),
         a460_section(a460, figures, animations(runs, out, "a460_pair")),
@@ -137,7 +137,8 @@ def identified(runs: Mapping[str, Result]) -> dict[str, tuple[Identification, ..
     """What the synchronized runs say about parameters, by the title of the run; every 5 ms are enough."""
     names = [name for name in runs if name.endswith("_synchronized")]
     return {
-        str(runs[name].info["title"]): identify(runs[name].decimated(5), JOBS[name].make()) for name in names
+        str(runs[name].info["title"]): identify(runs[name].decimated(5), PLANNED[name].make())
+        for name in names
     }
 
 
@@ -154,7 +155,7 @@ def animations(runs: Mapping[str, Result], out: Path, cell: str) -> Links:
         if not name.startswith(cell):
             continue
         limit = max(float(np.linalg.norm(run.sync_error, axis=2).max()) for run in peers(runs, name))
-        scene = SCENES[cell](runs[name], JOBS[name].make(), limit)
+        scene = SCENES[cell](runs[name], PLANNED[name].make(), limit)
         path = scene.write(out / "animations" / f"{name}.html")
         links.append((path.relative_to(out).as_posix(), f"Animation: {runs[name].info['title']}"))
     return Links(tuple(links))

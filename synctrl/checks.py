@@ -24,21 +24,31 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | No
             raise TypeError
         array = np.array(value, dtype=float)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{name}: expected numbers, found {value!r}") from error
+        raise InputError(f"expected numbers, found {value!r}", subject=name) from error
     if shape is not None and not _fits(array.shape, shape):
-        raise InputError(f"{name}: expected shape {_show(shape)}, found {_show(array.shape)}")
+        expected, found = _show(shape), _show(array.shape)
+        raise InputError(f"expected shape {expected}, found {found}", subject=name, found=array.shape)
     if not np.isfinite(array).all():
         where = np.argwhere(~np.isfinite(array))[0]
         entry = f" at index {tuple(int(k) for k in where)}" if array.ndim else ""
-        raise InputError(f"{name}: expected finite numbers, found {array[tuple(where)]}{entry}")
+        found = array[tuple(where)]
+        raise InputError(f"expected finite numbers, found {found}{entry}", subject=name, found=float(found))
     array.flags.writeable = False
+    return array
+
+
+def symmetric_matrix(name: str, value: ArrayLike, size: int) -> np.ndarray:
+    """`value` as a read-only symmetric float array, (size, size)."""
+    array = finite_array(name, value, (size, size))
+    if not np.allclose(array, array.T, rtol=1e-12, atol=0):
+        raise InputError(f"expected a symmetric matrix, found {array.tolist()}", subject=name)
     return array
 
 
 def finite_number(name: str, value: object) -> float:
     """`value` as a finite float."""
     if isinstance(value, (bool, np.bool_)):
-        raise InputError(f"{name}: expected a number, found {value!r}")
+        raise InputError(f"expected a number, found {value!r}", subject=name)
     return float(finite_array(name, value, ()))  # type: ignore[arg-type]
 
 
@@ -46,7 +56,7 @@ def positive_number(name: str, value: object) -> float:
     """`value` as a finite float above zero."""
     number = finite_number(name, value)
     if number <= 0:
-        raise InputError(f"{name}: expected a number above 0, found {number:g}")
+        raise InputError(f"expected a number above 0, found {number:g}", subject=name, found=number)
     return number
 
 
@@ -54,7 +64,7 @@ def non_negative_number(name: str, value: object) -> float:
     """`value` as a finite float that is not below zero."""
     number = finite_number(name, value)
     if number < 0:
-        raise InputError(f"{name}: expected a number of at least 0, found {number:g}")
+        raise InputError(f"expected a number of at least 0, found {number:g}", subject=name, found=number)
     return number
 
 
@@ -62,14 +72,33 @@ def count(name: str, value: object, least: int = 1) -> int:
     """`value` as a whole number of at least `least`."""
     instance(name, value, int, "a whole number")
     if isinstance(value, bool) or value < least:  # type: ignore[operator]
-        raise InputError(f"{name}: expected a whole number of at least {least}, found {value!r}")
+        raise InputError(
+            f"expected a whole number of at least {least}, found {value!r}", subject=name, found=value
+        )
     return int(value)  # type: ignore[call-overload]
+
+
+def index(name: str, value: object, count: int) -> int:
+    """`value` as the index of one of so many things, counted from 0."""
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not whole or not 0 <= value < count:  # type: ignore[operator]
+        raise InputError(f"expected an index from 0 to {count - 1}, found {value!r}", subject=name)
+    return int(value)  # type: ignore[call-overload]
+
+
+def window(name: str, start: object, stop: object) -> tuple[float, float]:
+    """Two times, s, of which the second is later than the first; None stands for no end."""
+    first = finite_number(f"{name}, start", start)
+    last = np.inf if stop is None else finite_number(f"{name}, stop", stop)
+    if not 0 <= first < last:
+        raise InputError(f"expected 0 <= start < stop, found {first:g} and {last:g} s", subject=name)
+    return first, last
 
 
 def boolean(name: str, value: object) -> bool:
     """`value` if it is True or False."""
     if not isinstance(value, (bool, np.bool_)):
-        raise InputError(f"{name}: expected True or False, found {value!r}")
+        raise InputError(f"expected True or False, found {value!r}", subject=name)
     return bool(value)
 
 
@@ -80,13 +109,13 @@ def instance(name: str, value: object, kind: type | tuple[type, ...], expected: 
         InputError: `value` is no instance of `kind`.
     """
     if not isinstance(value, kind):
-        raise InputError(f"{name}: expected {expected}, found {type(value).__name__}")
+        raise InputError(f"expected {expected}, found {type(value).__name__}", subject=name)
 
 
 def choice(name: str, value: object, known: tuple[str, ...]) -> str:
     """`value` if it is one of the known words."""
     if not isinstance(value, str) or value not in known:
-        raise InputError(f"{name}: expected one of {', '.join(map(repr, known))}, found {value!r}")
+        raise InputError(f"expected one of {', '.join(map(repr, known))}, found {value!r}", subject=name)
     return str(value)
 
 
@@ -96,7 +125,7 @@ def label(name: str, value: object) -> str:
     line = str(value)
     if len(line) > LONGEST_LABEL or unprintable(line):
         raise InputError(
-            f"{name}: expected a text of one line, up to {LONGEST_LABEL} characters, found {line!a:.80}"
+            f"expected a text of one line, up to {LONGEST_LABEL} characters, found {line!a:.80}", subject=name
         )
     return line
 

@@ -11,6 +11,7 @@ import sys
 import warnings
 from collections.abc import Iterable
 from difflib import get_close_matches
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -29,11 +30,42 @@ class Portable(BaseException):
 class SynctrlError(Portable, Exception):
     """Base of all errors raised by synctrl.
 
+    Args:
+        message: what is wrong: what is expected, and what was found.
+        subject, found, file, line: see below; the message then begins with the subject.
+
     Attributes:
+        subject: the argument or part at fault, spelled and counted as in the API, for example "dt", "Lambda"
+            or "robot 2, trajectory"; None if the error is not about one part alone.
+        found: what was found in its place, if that is a plain value; else None.
+        file: the file or folder concerned, or None.
+        line: of that file, counted from 1, or None.
         result: a `Result` with what a run had computed until then; None if the error did not stop a run.
     """
 
+    subject: str | None = None
+    found: Any = None
+    file: str | None = None
+    line: int | None = None
     result: Any = None
+
+    def __init__(
+        self,
+        message: str = "",
+        *,
+        subject: str | None = None,
+        found: Any = None,
+        file: str | Path | None = None,
+        line: int | None = None,
+    ):
+        file = None if file is None else str(file)
+        data = {"subject": subject, "found": found, "file": file, "line": line or None}
+        vars(self).update({name: value for name, value in data.items() if value is not None})
+        super().__init__(self._whole(message))
+
+    def _whole(self, message: str) -> str:
+        """The message with what it begins with."""
+        return message if self.subject is None else f"{self.subject}: {message}"
 
 
 class InputError(SynctrlError, ValueError):
@@ -41,7 +73,16 @@ class InputError(SynctrlError, ValueError):
 
 
 class RobotError(SynctrlError):
-    """A robot description is missing, refused, or inconsistent."""
+    """A robot description is missing, refused, or inconsistent.
+
+    Its `subject` is the link, joint or element at fault, for example "joint 'elbow', limit". If a file is at
+    fault the message begins with the file and the line.
+    """
+
+    def _whole(self, message: str) -> str:
+        place = f"{self.file}:{self.line}" if self.line else self.file
+        message = super()._whole(message)
+        return message if place is None else f"{place}: {message}"
 
 
 class RobotWarning(UserWarning):
@@ -147,7 +188,7 @@ class StepWarning(UserWarning):
 
 
 class ResultError(SynctrlError):
-    """A result file that is missing, damaged, or of another kind."""
+    """A file of results that is missing, damaged, of another kind, or that cannot be written."""
 
 
 class SweepError(SynctrlError):
@@ -155,7 +196,7 @@ class SweepError(SynctrlError):
 
 
 class SweepFileError(SweepError, ResultError):
-    """A line in the folder of a sweep that cannot be of that sweep."""
+    """A line in the folder of a sweep that cannot be of that sweep; `file` and `line` say which."""
 
 
 class CompilationError(SynctrlError):
@@ -189,9 +230,10 @@ def failed(what: str, t: float, error: Exception, robot: int | None = None) -> S
         error: what it raised.
         robot: index of the robot concerned, counted from 0, or None.
     """
-    return SimulationError(
-        f"{what} failed at t = {t:g} s with {type(error).__name__}: {error}", time=t, robot=robot
-    )
+    message = f"{what} failed at t = {t:g} s with {type(error).__name__}: {error}"
+    stop = SimulationError(message, time=t, robot=robot)
+    stop.subject = what
+    return stop
 
 
 def _remade(kind: type[BaseException], args: tuple) -> BaseException:

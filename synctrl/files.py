@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
+from .errors import ResultError
+
 
 @contextlib.contextmanager
 def whole_file(path: str | Path) -> Iterator[BinaryIO]:
@@ -63,6 +65,23 @@ def write_whole(path: str | Path, content: str | bytes) -> None:
         raise OSError(errno.EILSEQ, f"expected text that UTF-8 can hold, found {found!r} in it") from None
     with whole_file(path) as file:
         file.write(data)
+
+
+@contextlib.contextmanager
+def reported(doing: str, path: str | Path) -> Iterator[None]:
+    """Turn an `OSError` in the block into what users are told.
+
+    Args:
+        doing: what cannot be done if it fails, for example "write the page".
+        path: of the file or folder concerned.
+
+    Raises:
+        ResultError: what cannot be done to which file, and the system's reason.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise ResultError(f"cannot {doing} '{path}': {error.strerror or error}", file=path) from error
 
 
 def _target(path: str | Path) -> Path:

@@ -23,12 +23,11 @@ _MOVES = (
         "synchronization weight_checks weights",
     ),
     ("analysis", "paper", "baselines claims claims_a460 claims_planar judge matching trials"),
-    ("experiments", "paper", "batch judged reproduction theory"),
+    ("experiments", "paper", "batch reproduction theory"),
     (
         "show",
         "paper",
-        "formulas judge_plots judge_section paper_sections plant_sections report step_section "
-        "theory_sections",
+        "formulas judge_section paper_sections plant_sections report step_section theory_sections",
     ),
     ("simulation", "sweep", "prepared"),
 )

@@ -1,4 +1,9 @@
-"""Tune: values of factors, such as gains, that make a measure as small as possible under a torque limit."""
+"""Tune: values of factors, such as gains, that make a measure as small as possible under a torque limit.
+
+A run that exceeds the torque limit counts as worse than every run that does not, and one that stops as worse
+still; among them the smaller excess and the later end are better. The same seed gives the same search,
+whatever the number of workers.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +11,7 @@ import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -16,12 +21,12 @@ from .errors import InputError, SweepError
 from .simulation.simulate import Experiment
 from .sweep.distributions import LogUniform, Uniform
 from .sweep.draws import Generations
-from .sweep.evaluation import Evaluation, progress_bar
+from .sweep.evaluation import CrewOptions, Evaluation, progress_bar
 from .sweep.factors import Factor, gain
 from .sweep.journal import Journal
 from .sweep.measures import MEASURES
 from .sweep.rows import COMPLETED, columns
-from .sweep.study import Study
+from .sweep.study import Study, StudyOptions
 from .sweep.worker import Job, Task
 
 Range = Uniform | LogUniform
@@ -64,23 +69,14 @@ def tune(
     torque_limit: float | None = None,
     generations: int = 20,
     population: int = 24,
-    seed: int = 0,
-    duration: float | None = None,
-    dt: float = 1e-3,
-    engine: str = "compiled",
-    control_period: float | None = None,
-    bands: Mapping[str, float] | None = None,
     folder: str | Path | None = None,
+    progress: bool = True,
     workers: int = 2,
     backend: str = "joblib",
     client: Any = None,
-    progress: bool = True,
+    **options: Unpack[StudyOptions],
 ) -> Tuned:
     """Search by differential evolution, a generation of runs at a time.
-
-    A run that exceeds the torque limit counts as worse than every run that does not, and one that stops as
-    worse still; among them the smaller excess and the later end are better. The same seed gives the same
-    search, whatever the number of workers.
 
     Args:
         experiment: where to start: everything that is not searched stays as it is.
@@ -90,38 +86,17 @@ def tune(
         torque_limit: largest |tau| allowed on any joint, N·m.
         generations: how often the population is renewed.
         population: runs per generation, at least 5.
-        seed: whole number from 0.
-        duration, dt, engine, control_period, bands: see `Sweep`.
         folder: write every run there, and read runs made there before instead of making them again.
-        workers, backend, client, progress: see `Sweep.run`.
+        progress, workers, backend, client: see `Sweep.run`, also for errors and warnings.
+        options: `seed`, `duration`, `dt`, `engine`, `control_period` and `bands`, see `Study`.
 
     Raises:
         InputError: a value of the wrong kind.
-        ResultError: another process has the folder, or it holds another search, is damaged, or cannot be
-            written.
-        SweepFileError: a line in the folder cannot be of this search.
         SweepError: no run stayed below the torque limit and ran to its end.
-
-    Warns:
-        StepWarning, SaturationWarning: see `Sweep.run`.
     """
-    study = Study(experiment, _factors(search), seed, duration, dt, engine, control_period, bands)
-    finder = _Search(study, minimize, torque_limit, population)
-    count("generations", generations)
-    with contextlib.ExitStack() as stack:
-        journal = None if folder is None else stack.enter_context(Journal(folder))
-        job = study.job(None if journal is None else journal.known())
-        if journal is not None:
-            journal.begin(finder.about(job), finder.runs)
-        evaluation = Evaluation(job, journal, workers, backend, client)
-        stack.enter_context(evaluation.open())
-        runs = population * (1 + generations)
-        bar = stack.enter_context(progress_bar(runs, 0, progress))
-        finder.run(generations, evaluation, bar)
-        if journal is not None:
-            journal.finish()
-    evaluation.doubts.warn("tune", study.base.dt)
-    return finder.best()
+    finder = _Search(Study(experiment, _factors(search), **options), minimize, torque_limit, population)
+    crew = CrewOptions(workers=workers, backend=backend, client=client)
+    return finder.find(count("generations", generations), folder, progress, crew)
 
 
 class _Search:
@@ -140,6 +115,23 @@ class _Search:
         limit = self.limit if np.isfinite(self.limit) else None
         more = {"minimize": self.minimize, "torque_limit": limit, "population": self.population}
         return self.study.about(job, search=more)
+
+    def find(self, generations: int, folder: str | Path | None, progress: bool, crew: CrewOptions) -> Tuned:
+        """Make all runs, in a folder if there is one, and return the best."""
+        with contextlib.ExitStack() as stack:
+            journal = None if folder is None else stack.enter_context(Journal(folder))
+            job = self.study.job(None if journal is None else journal.known())
+            if journal is not None:
+                journal.begin(self.about(job), self.runs)
+            evaluation = Evaluation(job, journal, **crew)
+            stack.enter_context(evaluation.open())
+            runs = self.population * (1 + generations)
+            bar = stack.enter_context(progress_bar(runs, 0, progress))
+            self.run(generations, evaluation, bar)
+            if journal is not None:
+                journal.finish()
+        evaluation.doubts.warn("tune", self.study.base.dt)
+        return self.best()
 
     def run(self, generations: int, evaluation: Evaluation, bar: Any) -> None:
         """Make the runs of the first population and of all further ones."""
@@ -185,8 +177,9 @@ class _Search:
             torques = [row["peak_torque"] for row in self.history if row["peak_torque"] is not None]
             least = f"the smallest peak torque was {min(torques):.4g} N·m" if torques else "all runs stopped"
             raise SweepError(
-                f"tune: none of {len(self.history)} runs stayed within a torque of {self.limit:g} N·m to its "
-                f"end; {least}; search other ranges, or allow more torque"
+                f"none of {len(self.history)} runs stayed within a torque of {self.limit:g} N·m to its "
+                f"end; {least}; search other ranges, or allow more torque",
+                subject="tune",
             )
         values = {factor.name: best[factor.name] for factor in self.study.factors}
         experiment = self.study.base.experiment
@@ -220,7 +213,7 @@ def _factors(search: Mapping[str, Range] | Sequence[Factor]) -> list[Factor]:
         instance("search", factor, Factor, "ranges of gains by name, or Factor objects")
         instance(f"search, {factor.name}", factor.values, (Uniform, LogUniform), "Uniform or LogUniform")
         if type(factor) is not Factor:
-            raise InputError(f"search: '{factor.name}' belongs to the run and cannot be searched")
+            raise InputError(f"'{factor.name}' belongs to the run and cannot be searched", subject="search")
     return factors
 
 

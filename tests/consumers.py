@@ -14,7 +14,7 @@ from synctrl.analysis.lyapunov import lyapunov
 from synctrl.analysis.metrics import as_data, metrics, row_names, settling_bands
 from synctrl.errors import SynctrlError
 from synctrl.paper.judge import compare_runs
-from synctrl.paper.judge_plots import differences
+from synctrl.paper.judge_section import differences
 from synctrl.paper.step_section import step_section
 from synctrl.show.animation import payload_pair_scene, planar_scene
 from synctrl.show.layout import cell_layout

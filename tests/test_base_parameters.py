@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from machines import random_robot, rod_arm, seeds
+from refusals import refused
 
 from synctrl import (
     BaseParameters,
@@ -95,7 +96,7 @@ def test_a_rank_that_is_not_clear_is_refused() -> None:
     Y = rng.normal(size=(40, 4)) @ np.diag([1, 1, 1, 1.0])
     Y[:, 3] = Y[:, 0] + 3e-9 * rng.normal(size=40)
     Y[:, 2] = Y[:, 1] + 3e-6 * rng.normal(size=40)
-    with pytest.raises(RobotError, match="clear gap"):
+    with refused(RobotError, "robot 'wobbly'"):
         group_columns(Y, "wobbly")
 
 
@@ -108,7 +109,7 @@ def test_parameters_by_name() -> None:
     robot = load_robot("a460")
     assert isinstance(parameters_of("full", robot), FullParameters)
     assert isinstance(parameters_of("base", robot), BaseParameters)
-    with pytest.raises(InputError, match="'full', 'base'"):
+    with refused(InputError, "parameters"):
         parameters_of("few", robot)
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from refusals import refused
 from theory_cells import GAINS, coupling, experiment
 
 from synctrl.errors import InputError, SimulationError
@@ -77,9 +78,9 @@ def test_gains_under_which_a_run_has_to_stop_count_as_too_much_torque() -> None:
 
 
 def test_a_peak_torque_that_no_factor_gives_is_refused() -> None:
-    with pytest.raises(InputError, match="found none"):
+    with refused(InputError, "gains"):
         match_peak_torque(Bench(planar_four(), {"duration": 0.01}), 1e3)
-    with pytest.raises(InputError, match="target"):
+    with refused(InputError, "target"):
         match_peak_torque(Bench(small(), SHORT), -1.0)
 
 
@@ -159,9 +160,9 @@ def test_gravity_takes_most_of_the_peak_torque_of_the_a460_and_nothing_of_the_pl
 
 def test_a_comparison_needs_a_synchronized_controller_and_known_gains() -> None:
     run = small()
-    with pytest.raises(InputError, match="beta = K_eps = 0"):
+    with refused(InputError, "experiment"):
         compare(replace(run, gains=GAINS.independent()))
-    with pytest.raises(InputError, match="scaled"):
+    with refused(InputError, "scaled"):
         compare(run, ("gain",), **SHORT)
 
 

@@ -6,19 +6,20 @@ import os
 from functools import partial
 
 import pytest
+from refusals import refused
 
 from synctrl.errors import ResultError, SimulationError
 from synctrl.experiments import a460_pair, planar_four
 from synctrl.experiments.planar_four import GAINS
-from synctrl.paper.batch import Job, run_all
+from synctrl.paper.batch import PlannedRun, run_all
 from synctrl.simulation.result import LAYOUT, Result
 
 
 def test_runs_are_those_of_one_process_and_every_one_shows_its_progress(tmp_path, capsys):
-    jobs = {"pair": Job(a460_pair, 0.05), "arms": Job(planar_four, 0.04)}
-    runs = run_all(tmp_path, 2, jobs)
-    for name, job in jobs.items():
-        alone = job.make().simulate(job.duration)
+    planned = {"pair": PlannedRun(a460_pair, 0.05), "arms": PlannedRun(planar_four, 0.04)}
+    runs = run_all(tmp_path, 2, planned)
+    for name, run in planned.items():
+        alone = run.make().simulate(run.duration)
         for array in LAYOUT:
             assert getattr(runs[name], array).tobytes() == getattr(alone, array).tobytes()
         assert Result.load(tmp_path / f"{name}.npz").status == "completed"
@@ -28,30 +29,30 @@ def test_runs_are_those_of_one_process_and_every_one_shows_its_progress(tmp_path
 
 
 def test_a_run_that_stops_does_not_take_the_others_along(tmp_path):
-    jobs = {
-        "unstable": Job(partial(planar_four, gains=GAINS.replace(Gamma=1e9)), 0.05),
-        "fine": Job(planar_four, 0.05),
+    planned = {
+        "unstable": PlannedRun(partial(planar_four, gains=GAINS.replace(Gamma=1e9)), 0.05),
+        "fine": PlannedRun(planar_four, 0.05),
     }
-    with pytest.raises(SimulationError, match="robot"):
-        run_all(tmp_path, workers=1, jobs=jobs)
+    with refused(SimulationError, cause="Gamma"):
+        run_all(tmp_path, workers=1, planned=planned)
     assert Result.load(tmp_path / "fine.npz").status == "completed"
     assert Result.load(tmp_path / "unstable.npz").status.startswith("stopped")
 
 
 def test_a_process_that_is_killed_is_a_clear_error_and_what_was_saved_stays(tmp_path):
-    jobs = {"fine": Job(planar_four, 0.02), "killed": Job(partial(os._exit, 9))}
+    planned = {"fine": PlannedRun(planar_four, 0.02), "killed": PlannedRun(partial(os._exit, 9))}
     with pytest.raises(SimulationError, match="'killed' ended without a result"):
-        run_all(tmp_path, workers=1, jobs=jobs)
+        run_all(tmp_path, workers=1, planned=planned)
     assert Result.load(tmp_path / "fine.npz").status == "completed"
 
 
 def test_a_folder_that_cannot_be_written_is_an_error_before_anything_runs(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(ResultError, match="cannot write into the folder"):
-        run_all(tmp_path / "file" / "runs", 1, {"killed": Job(partial(os._exit, 9))})
+    with refused(ResultError, file=str(tmp_path / "file" / "runs")):
+        run_all(tmp_path / "file" / "runs", 1, {"killed": PlannedRun(partial(os._exit, 9))})
 
 
 def test_a_shortened_run_is_never_longer_than_it_was():
-    assert Job(planar_four).shortened(1.0).duration == 1.0
-    assert Job(planar_four, 0.4).shortened(1.0).duration == 0.4
-    assert Job(planar_four).shortened(100.0).duration == planar_four().duration
+    assert PlannedRun(planar_four).shortened(1.0).duration == 1.0
+    assert PlannedRun(planar_four, 0.4).shortened(1.0).duration == 0.4
+    assert PlannedRun(planar_four).shortened(100.0).duration == planar_four().duration

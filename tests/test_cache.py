@@ -17,6 +17,7 @@ from time import monotonic
 
 import pytest
 import test_imports
+from refusals import refused
 
 from synctrl.compiled import build, cache, compiler, elf
 from synctrl.errors import CompilationError, InputError, MissingDependencyError
@@ -114,7 +115,7 @@ def test_what_this_user_has_put_there_is_run(folder, tmp_path):
 def test_a_file_that_others_may_write_is_refused(folder, tmp_path, name, bits):
     plant(folder, tmp_path / "ran")
     (folder / name).chmod(bits)
-    with pytest.raises(CompilationError, match=rf"{name}' can be written by others .*mode {bits:04o}"):
+    with refused(CompilationError, file=str(folder / name), found="can be written by others"):
         fetch()
     assert not (tmp_path / "ran").exists()
 
@@ -124,9 +125,8 @@ def test_a_file_that_others_may_write_is_refused(folder, tmp_path, name, bits):
 def test_what_belongs_to_another_user_is_refused(folder, tmp_path, name):
     plant(folder, tmp_path / "ran")
     os.chown(folder / name, OTHER, OTHER)
-    with pytest.raises(CompilationError, match=f"belongs to another user .owner {OTHER}") as caught:
+    with refused(CompilationError, file=str(folder / name), found="belongs to another user"):
         fetch()
-    assert str(folder / name) in str(caught.value)
     assert not (tmp_path / "ran").exists()
 
 
@@ -142,7 +142,7 @@ def test_a_folder_that_others_could_exchange_is_refused(folder):
     folder.mkdir()
     folder.chmod(0o777)
     os.environ["SYNCTRL_CACHE"] = str(folder / "own")
-    with pytest.raises(CompilationError, match=rf"'{folder}' can be written by others"):
+    with refused(CompilationError, file=str(folder), found="can be written by others"):
         fetch()
     folder.chmod(0o1777)  # as /tmp: there nobody can rename what belongs to others
     assert fetch().answer() == 42
@@ -153,7 +153,7 @@ def test_a_folder_in_that_of_another_user_is_refused(folder):
     folder.mkdir()
     os.chown(folder, OTHER, OTHER)
     os.environ["SYNCTRL_CACHE"] = str(folder / "own")
-    with pytest.raises(CompilationError, match=rf"'{folder}' belongs to another user"):
+    with refused(CompilationError, file=str(folder), found="belongs to another user"):
         fetch()
 
 
@@ -169,7 +169,7 @@ def test_a_link_of_another_user_is_refused(folder, tmp_path):
     (tmp_path / "far").mkdir(mode=0o700)
     folder.symlink_to("far")
     os.chown(folder, OTHER, OTHER, follow_symlinks=False)
-    with pytest.raises(CompilationError, match="belongs to another user"):
+    with refused(CompilationError, file=str(folder), found="belongs to another user"):
         fetch()
 
 
@@ -178,14 +178,14 @@ def test_a_link_into_a_folder_that_others_may_write_is_refused(folder, tmp_path)
     (tmp_path / "open").chmod(0o777)
     (tmp_path / "open" / "far").mkdir(mode=0o700)
     folder.symlink_to(tmp_path / "open" / "far")
-    with pytest.raises(CompilationError, match="open' can be written by others"):
+    with refused(CompilationError, file=str(tmp_path / "open"), found="can be written by others"):
         fetch()
 
 
 def test_links_that_lead_to_each_other_are_refused(folder, tmp_path):
     folder.symlink_to(tmp_path / "back")
     (tmp_path / "back").symlink_to(folder)
-    with pytest.raises(CompilationError, match=os.strerror(errno.ELOOP)):
+    with refused(CompilationError, file=str(folder), found=os.strerror(errno.ELOOP)):
         fetch()
 
 
@@ -212,7 +212,7 @@ def test_what_is_no_plain_file_is_refused_and_not_waited_for(folder, name, kind)
     fetch()
     (folder / name).unlink()
     STRANGE[kind](folder / name)
-    with pytest.raises(CompilationError, match=f"{name}' is {kind}, expected a plain file"):
+    with refused(CompilationError, file=str(folder / name), found=f"is {kind}, expected a plain file"):
         fetch()
 
 
@@ -220,7 +220,7 @@ def test_a_link_to_a_good_library_is_refused(folder, tmp_path):
     fetch()
     (folder / "key.so").rename(tmp_path / "elsewhere.so")
     (folder / "key.so").symlink_to(tmp_path / "elsewhere.so")
-    with pytest.raises(CompilationError, match="is a link, expected a plain file"):
+    with refused(CompilationError, file=str(folder / "key.so"), found="is a link, expected a plain file"):
         fetch()
 
 
@@ -524,23 +524,23 @@ def test_the_folder_may_be_named_in_any_way(tmp_path, monkeypatch, named):
 
 def test_a_home_that_is_not_known_is_said(monkeypatch):
     monkeypatch.setenv("SYNCTRL_CACHE", "~no-such-user-here/x")
-    with pytest.raises(InputError, match="no-such-user-here"):
+    with refused(InputError, "SYNCTRL_CACHE"):
         fetch()
 
 
 def test_a_file_in_the_place_of_the_folder_is_said(folder):
     folder.write_text("a file")
-    with pytest.raises(CompilationError, match=os.strerror(errno.ENOTDIR)) as caught:
+    with refused(CompilationError, found=os.strerror(errno.ENOTDIR)) as caught:
         fetch()
     assert str(folder) in str(caught.value)
     os.environ["SYNCTRL_CACHE"] = str(folder / "below")
-    with pytest.raises(CompilationError, match=os.strerror(errno.ENOTDIR)):
+    with refused(CompilationError, found=os.strerror(errno.ENOTDIR)):
         fetch()
 
 
 def test_a_name_that_is_too_long_is_said(folder):
     os.environ["SYNCTRL_CACHE"] = str(folder / ("x" * 300))
-    with pytest.raises(CompilationError, match=os.strerror(errno.ENAMETOOLONG)):
+    with refused(CompilationError, found=os.strerror(errno.ENAMETOOLONG)):
         fetch()
 
 
@@ -549,7 +549,7 @@ def test_a_working_folder_that_was_removed_is_said(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path / "gone")
     (tmp_path / "gone").rmdir()
     monkeypatch.setenv("SYNCTRL_CACHE", "here")
-    with pytest.raises(CompilationError, match="working folder"):
+    with refused(CompilationError, "SYNCTRL_CACHE"):
         fetch()
 
 

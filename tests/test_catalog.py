@@ -8,6 +8,7 @@ from importlib import metadata
 import numpy as np
 import pinocchio as pin
 import pytest
+from refusals import refused
 
 from synctrl.errors import InputError, MissingDependencyError, RobotError, RobotWarning
 from synctrl.robots.catalog import CATALOG, catalog_names, load_description
@@ -172,13 +173,13 @@ def test_the_planar_arm_feels_no_gravity_and_reaches_with_the_paper_s_lengths():
 
 
 def test_an_unknown_name_lists_the_near_ones():
-    with pytest.raises(RobotError, match=r"did you mean 'panda'.*the catalogue has: planar2r, .*a460"):
+    with refused(RobotError, "robot", found="pandas"):
         load_description("pandas")
 
 
 @pytest.mark.parametrize("path", ["no/such/robot", "robot.urdf"])
 def test_a_text_that_looks_like_a_path_is_one(path):
-    with pytest.raises(RobotError, match="no such file"):
+    with refused(RobotError, None, file=path, line=None):
         load_description(path)
 
 
@@ -188,7 +189,7 @@ def test_a_path_is_read_as_a_file():
 
 
 def test_what_is_neither_name_nor_path_is_refused():
-    with pytest.raises(InputError, match="expected a name or a path, found int"):
+    with refused(InputError, "robot"):
         load_description(5)
 
 
@@ -198,5 +199,5 @@ def test_without_example_robot_data_the_own_robots_load_and_the_others_say_what_
 
     monkeypatch.setattr(metadata, "distribution", missing)
     assert load_description("a460").model.nv == 3
-    with pytest.raises(MissingDependencyError, match="example-robot-data, which is not installed"):
+    with refused(MissingDependencyError, "robot 'ur5'"):
         load_description("ur5")

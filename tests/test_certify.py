@@ -7,6 +7,7 @@ from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
+from refusals import refused
 from theory_cells import GAINS, coupling, experiment
 
 from synctrl import Cell, Disturbance, Friction, Result
@@ -110,7 +111,7 @@ def test_a_loaded_result_is_certified_with_its_experiment(tmp_path) -> None:
     run = experiment(coupling("pair", 2, 2))
     result = run.simulate(0.01, 1e-3)
     loaded = Result.load(result.save(tmp_path / "run.npz"))
-    with pytest.raises(InputError, match="experiment"):
+    with refused(InputError, "experiment"):
         certify(loaded)
     assert certify(loaded, run).as_dict() == certify(result).as_dict()
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cells import SMALL_GAINS, small_cell
+from refusals import refused
 
 from synctrl import (
     CartesianSpace,
@@ -99,7 +100,7 @@ def test_what_makes_use_of_gains_takes_rows() -> None:
 
 def test_damping_in_task_space_has_as_many_entries_for_every_robot() -> None:
     mixed(([20.0, 15.0], [30.0, 40.0]), k_r_space="task")
-    with pytest.raises(InputError, match=r"^K_r: .*of 2, 2 entries, found rows of 2, 3"):
+    with refused(InputError, "K_r"):
         mixed(k_r_space="task")
 
 
@@ -123,7 +124,7 @@ def test_rows_that_do_not_fit_the_robots_are_told_what_does(K_r, says: str) -> N
 
 @pytest.mark.parametrize("name", ["Lambda", "beta", "K_eps"])
 def test_gains_that_are_the_same_for_all_robots_take_no_rows(name: str) -> None:
-    with pytest.raises(InputError, match=f"^{name}: expected numbers"):
+    with refused(InputError, name):
         Gains(**{**GAINS, "K_r": 1.0, "Gamma": 0.1, name: ([1.0], [1.0, 2.0])})
 
 
@@ -158,7 +159,7 @@ def test_evaluate_refuses_what_is_not_finite(name: str, bad: float) -> None:
     given = arguments(CONTROLLER)
     given[name] = given[name].copy()
     given[name].ravel()[-1] = bad
-    with pytest.raises(InputError, match=f"^{name}: expected finite numbers"):
+    with refused(InputError, name):
         CONTROLLER.evaluate(**given)
 
 
@@ -167,7 +168,7 @@ def test_evaluate_refuses_what_is_not_finite(name: str, bad: float) -> None:
 def test_evaluate_refuses_other_sizes(name: str, wrong) -> None:
     given = arguments(CONTROLLER)
     given[name] = wrong(given[name])
-    with pytest.raises(InputError, match=f"^{name}: expected"):
+    with refused(InputError, name):
         CONTROLLER.evaluate(**given)
 
 

@@ -13,6 +13,7 @@ import pytest
 from cells import SMALL_GAINS, random_experiment, small_cell
 from hypothesis import given
 from hypothesis import strategies as st
+from refusals import refused
 from seams.leaky_adaptation import BoundLeaky, Leaky
 from seams.posted_network import Posted
 
@@ -366,7 +367,7 @@ def test_a_time_that_is_none_is_refused_always(faults, t):
     controller, q, v = started(faults)
     controller.step(0.0, q, v)
     known = controller.state
-    with pytest.raises(InputError, match=r"^t: expected"):
+    with refused(InputError, "t"):
         controller.step(t, q, v)
     assert all((controller.state[name] == array).all() for name, array in known.items())
 
@@ -378,13 +379,13 @@ def test_a_time_that_is_none_is_refused_always(faults, t):
 def test_arrays_of_another_shape_or_kind_are_refused_always(faults, bad):
     controller, q, v = started(faults)
     controller.step(0.0, q, v)
-    for arguments in ((bad, v), (q, bad)):
-        with pytest.raises(InputError, match=r"^[qv]: expected"):
+    for name, arguments in {"q": (bad, v), "v": (q, bad)}.items():
+        with refused(InputError, name):
             controller.step(PERIOD, *arguments)
     if bad is not None:
-        with pytest.raises(InputError, match=r"^desired: expected"):
+        with refused(InputError, "desired"):
             controller.step(PERIOD, q, v, bad)
-    with pytest.raises(InputError, match=r"^q: expected"):
+    with refused(InputError, "q"):
         controller.reset(0.0, bad, v)
     controller.step(PERIOD, q, v)
 
@@ -404,9 +405,9 @@ def test_arrays_of_another_shape_or_kind_are_refused_always(faults, bad):
 )
 def test_options_that_mean_nothing_are_refused_by_name(options):
     controller = small().closed_loop().controller
-    with pytest.raises(InputError, match=rf"^{next(iter(options))}: expected"):
+    with refused(InputError, next(iter(options))):
         DiscreteController(controller, **{"period": PERIOD, **options})
-    with pytest.raises(InputError, match=r"^controller: expected a Controller"):
+    with refused(InputError, "controller"):
         DiscreteController(small(), PERIOD)
 
 
@@ -418,9 +419,8 @@ def test_a_singular_jacobian_is_an_error_as_in_a_simulation():
     for angle in (1e-3, 0.0):  # nearly stretched out, and quite
         stretched = q.copy()
         stretched[1, 1] = angle
-        with pytest.raises(SingularJacobianError, match=r"robot 2 is singular at t = 0\.004 s") as stop:
+        with refused(SingularJacobianError, robot=1, time=PERIOD):
             controller.step(PERIOD, stretched, v)
-        assert (stop.value.robot, stop.value.time) == (1, PERIOD)
     assert all((controller.state[name] == array).all() for name, array in known.items())
 
 
@@ -428,9 +428,8 @@ def test_a_torque_that_is_not_finite_is_an_error_and_changes_nothing():
     controller, q, v = started()
     controller.step(0.0, q, v)
     known = controller.state
-    with pytest.raises(NonFiniteError, match=r"no finite torque .* t = 0\.004 s") as stop:
+    with refused(NonFiniteError, time=PERIOD):
         controller.step(PERIOD, q, np.full(v.shape, 1e300))
-    assert stop.value.time == PERIOD
     assert all((controller.state[name] == array).all() for name, array in known.items())
 
 
@@ -520,8 +519,9 @@ WRONG = {
 def test_a_state_of_something_else_is_refused_whole(name):
     (controller, q, v), (other, _, _) = started(), started()
     controller.step(0.0, q, v), other.step(0.0, q, v)
-    with pytest.raises(InputError, match=r"^state"):
+    with refused(InputError) as caught:
         controller.state = WRONG[name]()
+    assert caught.value.subject.split(",")[0] == "state"
     assert_same_state(controller, other)
 
 
@@ -562,12 +562,12 @@ def test_a_file_that_holds_anything_else_is_refused_and_changes_nothing(tmp_path
     (controller, q, v), (other, _, _) = started(), started()
     controller.step(0.0, q, v), other.step(0.0, q, v)
     for name, path in files(tmp_path).items():
-        with pytest.raises(ResultError) as refused:
+        with pytest.raises(ResultError) as caught:
             controller.load(path)
-        assert str(path) in str(refused.value), name
+        assert str(path) in str(caught.value), name
         assert_same_state(controller, other)
     assert not Path("exploded").exists()
-    with pytest.raises(InputError, match=r"^path"):
+    with refused(InputError, "path"):
         controller.load(3)
 
 
@@ -594,7 +594,7 @@ def test_a_damaged_file_is_refused_or_is_the_state(data, tmp_path_factory):
 def test_a_state_that_cannot_be_written_is_an_error_and_leaves_nothing(tmp_path):
     controller, _, _ = started()
     for path in (tmp_path, tmp_path / "no\0name"):
-        with pytest.raises(ResultError, match="cannot write the controller's state"):
+        with refused(ResultError, file=str(path)):
             controller.save(path)
     assert not list(tmp_path.iterdir())
 

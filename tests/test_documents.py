@@ -8,6 +8,7 @@ import pytest
 import yourdfpy
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 from urdf_corpus import GOOD, write
 
 from synctrl.errors import FrameNotFound, InputError, RobotError
@@ -145,71 +146,72 @@ def test_another_reader_understands_what_is_written(folder):
 
 
 @pytest.mark.parametrize(
-    ("lengths", "masses", "words"),
+    ("lengths", "masses", "subject"),
     [
-        ([], [], "at least 1"),
-        ([0.3], [1, 1], "found 1 and 2"),
-        ([0.3, -0.3], [1, 1], r"lengths\[1\]: expected a number above 0"),
-        ([0.3, 0.3], [1, 0], r"masses\[1\]: expected a number above 0"),
-        ([0.3, float("nan")], [1, 1], "lengths: expected finite numbers"),
-        ("ab", [1], "lengths: expected"),
-        ([[0.3]], [1], "expected shape"),
+        ([], [], "lengths, masses"),
+        ([0.3], [1, 1], "lengths, masses"),
+        ([0.3, -0.3], [1, 1], "lengths[1]"),
+        ([0.3, 0.3], [1, 0], "masses[1]"),
+        ([0.3, float("nan")], [1, 1], "lengths"),
+        ("ab", [1], "lengths"),
+        ([[0.3]], [1], "lengths"),
     ],
 )
-def test_numbers_that_make_no_arm_are_refused(lengths, masses, words):
-    with pytest.raises(InputError, match=words):
+def test_numbers_that_make_no_arm_are_refused(lengths, masses, subject):
+    with refused(InputError, subject):
         planar_arm(lengths, masses)
 
 
 @pytest.mark.parametrize(
-    ("values", "words"),
+    ("values", "subject"),
     [
-        ({"mass": -1.0}, "mass: expected a number above 0"),
-        ({"mass": float("inf")}, "mass: expected finite"),
-        ({"com": (0, 0)}, "com: expected shape"),
-        ({"size": (0.1, 0.1, 0)}, r"size\[2\]: expected a number above 0"),
-        ({"inertia": np.diag([1.0, 1.0, 3.0])}, "no principal moment exceeds"),
-        ({"inertia": np.diag([1.0, 1.0, -1.0])}, "positive definite"),
-        ({"inertia": [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]}, "symmetric"),
-        ({"rpy": (0, 0, float("nan"))}, "rpy: expected finite"),
-        ({"name": "<b>"}, "name: expected 1 to 128 letters"),
-        ({"name": "tip"}, "does not have yet"),
+        ({"mass": -1.0}, "mass"),
+        ({"mass": float("inf")}, "mass"),
+        ({"com": (0, 0)}, "com"),
+        ({"size": (0.1, 0.1, 0)}, "size[2]"),
+        ({"inertia": np.diag([1.0, 1.0, 3.0])}, "inertia"),
+        ({"inertia": np.diag([1.0, 1.0, -1.0])}, "inertia"),
+        ({"inertia": [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]}, "inertia"),
+        ({"rpy": (0, 0, float("nan"))}, "rpy"),
+        ({"name": "<b>"}, "name"),
+        ({"name": "tip"}, "name"),
     ],
 )
-def test_a_payload_that_no_body_can_be_is_refused(values, words):
-    with pytest.raises(InputError, match=words):
+def test_a_payload_that_no_body_can_be_is_refused(values, subject):
+    with refused(InputError, subject):
         weld("planar2r", "tip", **{"mass": 1.0, **values})
 
 
 def test_a_payload_on_a_link_that_is_not_there_lists_the_links():
-    with pytest.raises(FrameNotFound, match="did you mean 'tip'"):
+    with refused(FrameNotFound, robot="planar2r", frame="tpi", available=("base", "link1", "link2", "tip")):
         weld("planar2r", "tpi", 1.0)
 
 
 def test_a_name_with_markup_makes_no_robot():
-    with pytest.raises(InputError, match="letters"):
+    with refused(InputError, "name"):
         planar_arm([1], [1], name="<script>")
 
 
 def test_a_joint_that_is_not_there_cannot_be_locked():
-    with pytest.raises(RobotError, match=r"did you mean .*'joint1'"):
+    with refused(RobotError, found="joint"):
         lock("planar2r", {"joint": 0.0})
 
 
 def test_an_arm_with_every_joint_locked_is_no_robot(folder):
-    with pytest.raises(RobotError, match="joints that move, found 0"):
+    with refused(RobotError, found=0):
         write_urdf(lock("planar2r", {"joint1": 0.0, "joint2": 0.0}), folder / "stiff.urdf")
 
 
 def test_a_file_that_cannot_be_written_is_said(folder):
-    with pytest.raises(InputError, match="expected a file that can be written"):
-        write_urdf(planar_arm([1], [1]), folder / "none" / "arm.urdf")
+    file = folder / "none" / "arm.urdf"
+    with refused(InputError, str(file)):
+        write_urdf(planar_arm([1], [1]), file)
 
 
 def test_meshes_named_by_plain_paths_keep_a_document_in_its_folder(folder, tmp_path):
     description = read_urdf(write(tmp_path, GOOD))
     assert write_urdf(description.document, tmp_path / "again.urdf").is_file()
-    with pytest.raises(RobotError, match=r"mesh 'meshes/fore\.stl': expected to write into its folder"):
+    with refused(RobotError, "link 'fore'", file=str(tmp_path / "robot.urdf")):
         write_urdf(description.document, folder / "elsewhere.urdf")
 
 

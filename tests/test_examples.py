@@ -12,6 +12,7 @@ import pytest
 from browser import open_page
 from hypothesis import given
 from hypothesis import strategies as st
+from refusals import refused
 
 from synctrl import load_robot
 from synctrl.errors import InputError
@@ -159,7 +160,7 @@ def test_the_vehicle_drives_its_path_in_a_browser(tmp_path):
 def test_only_a_run_of_two_wheels_moves_a_vehicle():
     with pytest.raises(InputError, match="expected two wheels with one angle each, found 2 robots with 2"):
         vehicle_animation(rigid_object().simulate(0.01), WHEEL_RADIUS, TRACK)
-    with pytest.raises(InputError, match=r"angles: expected shape \(any, 2\)"):
+    with refused(InputError, "angles"):
         vehicle_path(np.zeros((4, 3)), WHEEL_RADIUS, TRACK)
 
 

@@ -7,13 +7,14 @@ import inspect
 import numpy as np
 import paper_model as paper
 import pytest
+from refusals import refused
 from seams.lagging_network import Lagging
 from seams.leaky_adaptation import Leaky
 from seams.pulling_law import Pulling
 
 from synctrl import Disturbance, Experiment, Gains, experiments
 from synctrl.errors import InputError
-from synctrl.experiments import a460_pair, planar_four
+from synctrl.experiments import a460_pair, panda_four, planar_four
 
 SHAPES = {
     "t": (),
@@ -249,17 +250,17 @@ def test_friction_leaves_small_offsets_on_both_a460(a460_run):
 
 
 @pytest.mark.parametrize(
-    ("make", "says"),
+    ("make", "subject"),
     [
         (lambda: planar_four(phi="wide"), "phi"),
         (lambda: planar_four(phi=np.nan), "phi"),
         (lambda: planar_four(phi=[0.1, 0.2]), "phi"),
-        (lambda: planar_four(radii="own"), r"radii: expected one of 'text', 'table'"),
+        (lambda: planar_four(radii="own"), "radii"),
         (lambda: planar_four(disturbance="force"), "disturbance"),
         (lambda: planar_four(disturbance=3.0), "disturbance"),
         (lambda: planar_four(disturbance=np.zeros(3)), "disturbance"),
-        (lambda: planar_four(disturbance=Disturbance(4, 1.0, 0.0, 1.0)), "index from 0 to 3"),
-        (lambda: planar_four(disturbance=["torque"]), "Disturbance objects"),
+        (lambda: planar_four(disturbance=Disturbance(4, 1.0, 0.0, 1.0)), "disturbance, robot"),
+        (lambda: planar_four(disturbance=["torque"]), "disturbances"),
         (lambda: planar_four(gains=7.0), "gains"),
         (lambda: planar_four(synchronized=False, gains=7.0), "gains"),
         (lambda: planar_four(gains=Gains(1, 1, (1, 1, 1), 1, 1)), "K_r"),
@@ -270,19 +271,20 @@ def test_friction_leaves_small_offsets_on_both_a460(a460_run):
         (lambda: a460_pair(gains=Gains(1, 1, 1, 1, np.ones(29))), "Gamma"),
     ],
 )
-def test_wrong_arguments_are_refused_at_once(make, says):
-    with pytest.raises(InputError, match=says):
+def test_wrong_arguments_are_refused_at_once(make, subject):
+    with refused(InputError, subject):
         make()
 
 
 @pytest.mark.parametrize(
-    "make",
+    ("make", "name", "value"),
     [
-        lambda: planar_four(synchronized="no"),
-        lambda: a460_pair(friction=1),
-        lambda: a460_pair(adapt_friction="yes"),
+        (planar_four, "synchronized", "no"),
+        (panda_four, "synchronized", 0),
+        (a460_pair, "friction", 1),
+        (a460_pair, "adapt_friction", "yes"),
     ],
 )
-def test_a_switch_is_true_or_false(make):
-    with pytest.raises(InputError, match="expected True or False"):
-        make()
+def test_a_switch_is_true_or_false(make, name, value):
+    with refused(InputError, name):
+        make(**{name: value})

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from machines import random_robot, seeds
+from refusals import refused
 
 from synctrl import Cell, Friction, FrictionParameters, LinearParameters, load_robot
 from synctrl.errors import InputError
@@ -131,9 +132,9 @@ def test_friction_goes_with_few_parameters_of_the_rigid_bodies() -> None:
 
 def test_friction_that_does_not_fit_is_refused() -> None:
     robot = load_robot("a460")
-    with pytest.raises(InputError, match=r"friction, viscous: expected a number or shape \(3,\)"):
+    with refused(InputError, "friction, viscous"):
         FrictionParameters(robot, Friction(viscous=(1.0, 2.0)))
-    with pytest.raises(InputError, match="rigid bodies"):
+    with refused(InputError, "base"):
         FrictionParameters(robot, FRICTION, base=FrictionParameters(robot, FRICTION))
 
 
@@ -142,5 +143,5 @@ def test_rotors_add_to_the_diagonal_of_the_mass_matrix() -> None:
     q = np.ones(robot.nv)
     difference = robot.with_armature(0.4).mass_matrix(q) - robot.mass_matrix(q)
     np.testing.assert_allclose(difference, 0.4 * np.eye(robot.nv), atol=1e-12)
-    with pytest.raises(InputError, match="armature"):
+    with refused(InputError, "armature"):
         robot.with_armature(-0.1)

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from refusals import refused
 from theory_cells import GAINS, coupling, experiment, planar_arm
 
 from synctrl import Cell, Coupling, Experiment, FunctionTrajectory, Member
@@ -163,12 +164,12 @@ def test_no_random_configuration_is_much_worse_than_what_the_box_search_found() 
 
 def test_a_box_of_the_wrong_size_or_upside_down_is_refused() -> None:
     run = experiment(coupling("pair", 2, 2))
-    with pytest.raises(InputError, match="lower: expected shape"):
+    with refused(InputError, "lower"):
         gain_condition_in_box(run, [0.0], [1.0, 1.0])
-    with pytest.raises(InputError, match="lower <= upper"):
+    with refused(InputError, "lower, upper"):
         gain_condition_in_box(run, [1.0, 1.0], [0.0, 2.0])
-    with pytest.raises(InputError, match="duration"):
+    with refused(InputError, "duration"):
         gain_condition_in_box(run, *BOX, duration=-1.0)
     for samples in (0, -1, 2.5, "many"):
-        with pytest.raises(InputError, match="samples"):
+        with refused(InputError, "samples"):
             gain_condition_in_box(run, *BOX, samples=samples)

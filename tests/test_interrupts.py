@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusals import refused
 
 from synctrl import (
     CartesianSpace,
@@ -115,7 +116,7 @@ def whole():
 @pytest.mark.parametrize("engine", ENGINES)
 def test_an_exception_in_a_desired_motion_keeps_all_steps_before_it(engine, control_period, whole):
     cause = Strike("on strike")
-    with pytest.raises(SimulationError, match=r"motion of robot 2 .*t = 0.0205 s.*Strike: on strike") as stop:
+    with refused(SimulationError, "the desired motion of robot 2", robot=1) as stop:
         experiment(raising(cause)).simulate(engine=engine, control_period=control_period)
     assert stop.value.__cause__ is cause
     assert (stop.value.robot, stop.value.time) == (1, pytest.approx(FAULT))
@@ -134,7 +135,7 @@ def test_an_error_of_our_own_in_a_desired_motion_stays_what_it_is(engine, whole)
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_desired_motion_that_is_no_number_is_named(engine, whole):
-    with pytest.raises(NonFiniteError, match=r"motion of robot 2 is not finite.*velocity") as stop:
+    with refused(NonFiniteError, cause="motion") as stop:
         experiment(undefined).simulate(engine=engine)
     assert (stop.value.robot, stop.value.time) == (1, pytest.approx(FAULT))
     assert_begins(stop.value.result, whole(engine), 20)
@@ -208,12 +209,12 @@ def ceasing_weights(error):
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize(
-    ("make", "says"),
+    ("make", "subject"),
     [(ceasing_motion, "the desired motion of robot 2"), (ceasing_weights, "the weights of the coupling")],
 )
-def test_a_function_that_fails_for_good_loses_nothing_that_came_before(make, says, way):
+def test_a_function_that_fails_for_good_loses_nothing_that_came_before(make, subject, way):
     cause = ZeroDivisionError("no more")
-    with pytest.raises(SimulationError, match=f"{says} failed at t = .*ZeroDivisionError: no more") as stop:
+    with refused(SimulationError, subject) as stop:
         make(cause).simulate(**WAYS[way])
     assert stop.value.__cause__ is cause
     kept = stop.value.result
@@ -262,15 +263,16 @@ def under(law: type[Law]) -> Experiment:
 
 
 def test_an_exception_in_a_law_names_its_function_and_keeps_all_steps(whole):
-    with pytest.raises(SimulationError, match=r"'Striking.fail' \(.*t = 0.02 s.*no torque today") as stop:
+    with refused(SimulationError) as stop:
         under(Striking).simulate()
+    assert "'Striking.fail' (" in stop.value.subject
     assert isinstance(stop.value.__cause__, Strike)
     assert stop.value.time == pytest.approx(0.02)
     assert_begins(stop.value.result, whole("pinocchio"), 21)
 
 
 def test_a_law_that_gives_no_number_is_named_and_not_its_gains(whole):
-    with pytest.raises(NonFiniteError, match=r"Undefined gives robot 2 .*nan.* torque.*t = 0.02 s") as stop:
+    with refused(NonFiniteError, cause="part") as stop:
         under(Undefined).simulate()
     assert stop.value.robot == 1 and stop.value.time == pytest.approx(0.02)
     assert_begins(stop.value.result, whole("pinocchio"), 21)
@@ -282,8 +284,9 @@ def test_solvers_take_no_exception_of_a_law_for_their_own(method):
         def fail(self, signals):
             raise ValueError("not with me")
 
-    with pytest.raises(SimulationError, match=r"'.*Picky.fail' .*ValueError: not with me") as stop:
+    with refused(SimulationError) as stop:
         under(Picky).simulate(integrator=method)
+    assert "Picky.fail'" in stop.value.subject
     assert isinstance(stop.value.__cause__, ValueError)
     assert len(stop.value.result.t) >= 1
 
@@ -298,8 +301,9 @@ class Stuck(Plant):
 
 
 def test_an_exception_in_a_plant_names_its_function():
-    with pytest.raises(SimulationError, match=r"'Stuck.move'.*ZeroDivisionError: stuck") as stop:
+    with refused(SimulationError) as stop:
         experiment(plant_type=Stuck).simulate()
+    assert "'Stuck.move'" in stop.value.subject and isinstance(stop.value.__cause__, ZeroDivisionError)
     assert np.abs(stop.value.result.v).max() <= 0.01 < 0.011
     assert len(stop.value.result.t) > 1
 
@@ -326,7 +330,7 @@ def test_a_progress_function_that_fails_loses_nothing(engine, error, whole):
 @pytest.mark.parametrize("control_period", [None, 4e-3])
 @pytest.mark.parametrize("engine", ENGINES)
 def test_an_interrupt_hands_over_what_was_computed(engine, control_period, whole):
-    with pytest.raises(RunInterrupted, match="interrupted at t = ") as stop:
+    with pytest.raises(RunInterrupted) as stop:
         experiment(raising(KeyboardInterrupt)).simulate(engine=engine, control_period=control_period)
     assert isinstance(stop.value, KeyboardInterrupt)
     assert stop.value.result.status == f"stopped: {stop.value}"
@@ -398,7 +402,7 @@ def test_an_interrupt_while_a_failure_is_looked_into_does_not_lose_its_rows(engi
 @pytest.mark.parametrize("error", [np.linalg.LinAlgError("singular"), Strike("no plant")])
 def test_an_error_whose_cause_cannot_be_found_is_told_as_it_is(engine, error, whole, monkeypatch):
     failing_once(monkeypatch, "diagnosed", error)
-    with pytest.raises(NonFiniteError, match=r"motion of robot 2 is not finite") as stop:
+    with refused(NonFiniteError, robot=1, cause="motion") as stop:
         experiment(undefined).simulate(engine=engine)
     assert stop.value.result.status == f"stopped: {stop.value}"
     assert_begins(stop.value.result, whole(engine), 20)

@@ -186,7 +186,7 @@ def written(name: str, folder: Path) -> None:
     certificate = certify(ours)
     draw_certificate(name, certificate, folder)
     sections = [
-        Section("A run", (Text(("Words.",)), *metrics_tables(ours, theirs), Verdicts(claims))),
+        Section("A run", (Text("Words."), *metrics_tables(ours, theirs), Verdicts(claims))),
         certificate_section({name: certificate}, folder),
         identification_section({name: identify(ours)}),
     ]

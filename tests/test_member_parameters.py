@@ -11,6 +11,7 @@ import pytest
 from cells import SMALL_GAINS
 from hypothesis import given, settings
 from machines import random_robot, seeds
+from refusals import refused
 
 from synctrl import (
     BaseParameters,
@@ -75,13 +76,13 @@ def test_parameters_made_for_the_robot_are_taken_whatever_it_is_called(kind: str
 @given(seed=seeds)
 def test_parameters_of_another_robot_with_as_many_joints_are_refused(kind: str, seed: int) -> None:
     robot, other = (random_robot(seed + k, 3, chain=True) for k in range(2))
-    with pytest.raises(InputError, match=r"^robot 2, parameters: Y theta differs .* by [\d.e+]+ N·m"):
+    with refused(InputError, "robot 2, parameters"):
         cell_of(robot, KINDS[kind](other))
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_parameters_of_the_robot_placed_differently_are_refused(kind: str) -> None:
-    with pytest.raises(InputError, match="robot 'a460', as it is placed"):
+    with refused(InputError, "robot 2, parameters"):
         cell_of(A460.placed(rpy=(0.4, 0.0, 0.0)), KINDS[kind](A460))
 
 
@@ -94,19 +95,19 @@ def test_a_place_that_changes_no_torque_changes_nothing(kind: str) -> None:
 def test_parameters_with_other_true_masses_are_refused(kind: str) -> None:
     pi = A460.inertial_parameters.reshape(-1, 10)
     pi[2] *= 1.001
-    with pytest.raises(InputError, match="Y theta differs"):
+    with refused(InputError, "robot 2, parameters"):
         cell_of(A460.with_parameters(pi.ravel()), KINDS[kind](A460))
 
 
 def test_few_parameters_of_an_arm_in_the_plane_are_refused_for_one_that_leans() -> None:
     cell_of(ARM.placed((1.0, 2.0, 0.0), (0.0, 0.0, 2.0)), planar_two_link_parameters(ARM))
-    with pytest.raises(InputError, match="Y theta differs"):
+    with refused(InputError, "robot 2, parameters"):
         cell_of(ARM.placed(rpy=(0.1, 0.0, 0.0)), planar_two_link_parameters(ARM))
 
 
 def test_a_balanced_wheel_has_one_torque_in_every_place_but_not_one_regressor() -> None:
     wheel = load_robot("wheel")
-    with pytest.raises(InputError, match="whose regressor is another one"):
+    with refused(InputError, "robot 2, parameters"):
         cell_of(wheel.placed(rpy=(0.7, 0.0, 0.0)), FullParameters(wheel))
 
 
@@ -132,30 +133,30 @@ class OwnKind:
 def test_a_kind_of_ones_own_may_leave_friction_and_rotors_out_but_nothing_of_the_bodies(shares) -> None:
     robot = A460.with_armature(0.4)
     cell_of(robot, OwnKind(robot, shares), RUBBING)
-    with pytest.raises(InputError, match="Y theta differs"):
+    with refused(InputError, "robot 2, parameters"):
         cell_of(robot, OwnKind(robot, shares, factor=1.01), RUBBING)
 
 
 @pytest.mark.parametrize(
-    ("change", "says"),
+    ("change", "subject"),
     [
-        ({"theta": np.array([np.nan])}, "theta: expected finite"),
-        ({"theta": np.ones((1, 1))}, "theta: expected shape"),
-        ({"names": ("one", "two")}, "a name for each of 1 values, found 2"),
-        ({"regressor": lambda *state: np.full((3, 1), np.nan)}, "finite regressor"),
-        ({"regressor": lambda *state: np.ones((3, 2))}, r"regressor of shape \(3, 1\) .* found \(3, 2\)"),
+        ({"theta": np.array([np.nan])}, "robot 2, parameters, theta"),
+        ({"theta": np.ones((1, 1))}, "robot 2, parameters, theta"),
+        ({"names": ("one", "two")}, "robot 2, parameters"),
+        ({"regressor": lambda *state: np.full((3, 1), np.nan)}, "robot 2, parameters"),
+        ({"regressor": lambda *state: np.ones((3, 2))}, "robot 2, parameters"),
     ],
 )
-def test_a_kind_of_ones_own_that_is_malformed_is_named(change, says) -> None:
+def test_a_kind_of_ones_own_that_is_malformed_is_named(change, subject) -> None:
     own = OwnKind(A460, (0, 0, 0))
     vars(own).update(change)
-    with pytest.raises(InputError, match=f"^robot 2, parameters.*{says}"):
+    with refused(InputError, subject):
         cell_of(A460, own)
 
 
 @pytest.mark.parametrize("given_", [FullParameters, 3, ["m"], "most"])
 def test_what_are_no_parameters_is_refused(given_) -> None:
-    with pytest.raises(InputError, match=r"^robot 2, parameters: expected"):
+    with refused(InputError, "robot 2, parameters"):
         cell_of(A460, given_)
 
 
@@ -164,7 +165,7 @@ def test_what_are_no_parameters_is_refused(given_) -> None:
 
 def test_friction_among_the_parameters_is_that_of_the_member() -> None:
     parameters = FrictionParameters(A460)
-    with pytest.raises(InputError, match="give these parameters to a member"):
+    with refused(InputError, "friction"):
         _ = parameters.theta
     cell = cell_of(A460, parameters, RUBBING)
     np.testing.assert_array_equal(cell.parameters[1].theta[30:], [1, 2, 3, 0.5, 0, 2])
@@ -185,7 +186,7 @@ def test_friction_among_the_parameters_is_that_of_the_member() -> None:
 )
 def test_friction_that_is_stated_twice_with_different_values_is_refused(other: Friction) -> None:
     for stated, true in ((RUBBING, other), (other, RUBBING)):
-        with pytest.raises(InputError, match=r"^robot 2, parameters: .*stated once, as Member"):
+        with refused(InputError, "robot 2, parameters"):
             cell_of(A460, FrictionParameters(A460, stated), true)
 
 
@@ -201,7 +202,7 @@ def test_friction_that_is_stated_twice_alike_is_taken_with_a_word() -> None:
 
 
 def test_friction_of_a_robot_with_other_joints_is_named() -> None:
-    with pytest.raises(InputError, match=r"^robot 2, parameters: friction, viscous: expected .*\(2,\)"):
+    with refused(InputError, "robot 2, parameters"):
         cell_of(A460, FrictionParameters(ARM), RUBBING)
 
 
@@ -231,5 +232,5 @@ def test_a_sweep_does_not_put_a_ready_kind_in_the_place_of_a_users_own() -> None
 
     member = Member(ARM, Hold([0.0, 0.0]), parameters=Own(ARM))
     experiment = Experiment(Cell([member, replace(member)], Coupling.pair()), SMALL_GAINS, 1.0)
-    with pytest.raises(InputError, match="found Own for robot"):
+    with refused(InputError, "true parameters"):
         with_scaled_bodies(experiment, 1.2)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from cells import SMALL_GAINS, small_cell
 from memory_use import memory_use, size
+from refusals import refused
 
 from synctrl import Experiment, simulate
 from synctrl.errors import InputError, SynctrlError
@@ -29,11 +30,11 @@ def suggested(error: InputError) -> float:
 def test_a_log_that_will_not_fit_is_refused_before_the_run_with_one_that_would(engine, monkeypatch):
     monkeypatch.setattr(memory, "available_memory", lambda: 100_000)
     experiment, told = Experiment(small_cell(), SMALL_GAINS, 1.0), []
-    with pytest.raises(InputError, match=r"log of 1001 instants takes \d+ bytes, and 100000 ") as refused:
+    with refused(InputError, "log_dt") as caught:
         experiment.simulate(engine=engine, progress=told.append)
     assert told == []
-    log_dt = suggested(refused.value)
-    with pytest.raises(InputError, match="log_dt"):
+    log_dt = suggested(caught.value)
+    with refused(InputError, "log_dt"):
         experiment.simulate(engine=engine, log_dt=log_dt - 1e-3)
     run = experiment.simulate(engine=engine, log_dt=log_dt)
     assert size(run) <= 100_000
@@ -44,7 +45,7 @@ def test_runs_that_were_prepared_are_held_to_the_same(monkeypatch):
     prepared = Prepared(experiment, dt=1e-3, engine="pinocchio")
     thin = Prepared(experiment, dt=1e-3, engine="pinocchio", log_dt=0.1)
     monkeypatch.setattr(memory, "available_memory", lambda: 100_000)
-    with pytest.raises(InputError, match="log_dt"):
+    with refused(InputError, "log_dt"):
         prepared.simulate(experiment)
     run = thin.simulate(experiment)
     assert len(run.t) == 11
@@ -53,7 +54,7 @@ def test_runs_that_were_prepared_are_held_to_the_same(monkeypatch):
 
 def test_a_log_of_which_not_even_the_ends_fit_says_so(monkeypatch):
     monkeypatch.setattr(memory, "available_memory", lambda: 100)
-    with pytest.raises(InputError, match="not even its two ends would"):
+    with refused(InputError, "log_dt"):
         simulate(small_cell(), SMALL_GAINS, 0.1)
 
 
@@ -133,5 +134,5 @@ def test_a_run_takes_little_beyond_the_arrays_of_its_result():
 
 
 def test_too_many_steps_are_refused():
-    with pytest.raises(SynctrlError, match="more than 100000000 steps"):
+    with refused(SynctrlError, "dt"):
         make_clock(1e6, 1e-3, [])

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cells import small_cell
+from refusals import refused
 
 from synctrl import (
     CartesianSpace,
@@ -199,10 +200,10 @@ def test_arrays_of_another_kind_are_refused_and_nothing_is_written(bad):
     model, joints = mujoco_model(small_cell())
     data = mujoco.MjData(model)
     good = np.ones((2, 2))
-    for arguments in ((bad, good), (good, bad)):
-        with pytest.raises(InputError, match=r"^[qv]: expected"):
+    for name, arguments in {"q": (bad, good), "v": (good, bad)}.items():
+        with refused(InputError, name):
             joints.write(data, *arguments)
-    with pytest.raises(InputError, match=r"^tau: expected"):
+    with refused(InputError, "tau"):
         joints.command(data, bad)
     assert not data.qpos.any() and not data.qvel.any() and not data.ctrl.any()
 
@@ -210,15 +211,15 @@ def test_arrays_of_another_kind_are_refused_and_nothing_is_written(bad):
 def test_a_cell_that_mujoco_cannot_have_is_refused():
     arm = load_robot("a460")
     other = arm.with_parameters(1.1 * arm.inertial_parameters)
-    with pytest.raises(InputError, match=r"robot 'a460' has none that describes it"):
+    with refused(InputError, "plant='mujoco', robot 'a460'"):
         mujoco_model(holding(other))
     changed = Robot(other.model, other.tip, document=arm.document)
-    with pytest.raises(InputError, match=r"robot 'a460' has another mass matrix"):
+    with refused(InputError, "plant='mujoco', robot 'a460'"):
         mujoco_model(holding(changed))
     model = arm.model.copy()
     model.gravity.linear = np.array([0.0, 0.0, -1.62])
     moon = Robot(model, arm.tip, document=arm.document)
-    with pytest.raises(InputError, match=r"one gravity .* robot 1, .* for robot 2 as well, found .*-1\.62"):
+    with refused(InputError, "cell"):
         mujoco_model(holding(arm, moon))
 
 
@@ -230,9 +231,9 @@ def holding(*robots: Robot) -> Cell:
 
 @pytest.mark.parametrize("timestep", [0.0, -1e-3, np.nan, "1 ms"])
 def test_a_timestep_that_is_none_is_refused(timestep):
-    with pytest.raises(InputError, match="timestep: expected"):
+    with refused(InputError, "timestep"):
         mujoco_model(small_cell(), timestep)
-    with pytest.raises(InputError, match="cell: expected a Cell"):
+    with refused(InputError, "cell"):
         mujoco_model([small_cell()])
 
 

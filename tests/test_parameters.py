@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import rod_arm, seeds
+from refusals import refused
 
 from synctrl import FullParameters, LinearParameters, load_robot
 from synctrl.errors import InputError
@@ -101,17 +102,17 @@ def not_finite():
 
 
 @pytest.mark.parametrize(
-    ("make", "says"),
+    ("make", "subject"),
     [
-        (wrong_length, "differs from the torque"),
-        (wrong_mass, "differs from the torque"),
-        (under_gravity, "differs from the torque"),
-        (missing_rows, r"matrix: expected shape \(20, 3\), found \(19, 3\)"),
-        (too_many_columns, r"matrix: expected shape \(20, 3\), found \(20, 4\)"),
-        (too_few_names, "expected 3 names, found 2"),
-        (not_finite, "finite"),
+        (wrong_length, "matrix"),
+        (wrong_mass, "matrix"),
+        (under_gravity, "matrix"),
+        (missing_rows, "matrix"),
+        (too_many_columns, "matrix"),
+        (too_few_names, "names"),
+        (not_finite, "matrix"),
     ],
 )
-def test_a_map_that_does_not_describe_the_robot_is_refused(make, says):
-    with pytest.raises(InputError, match=says):
+def test_a_map_that_does_not_describe_the_robot_is_refused(make, subject):
+    with refused(InputError, subject):
         make()

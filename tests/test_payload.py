@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from machines import random_robot, seeds
+from refusals import refused
 
 from synctrl import Cell, Coupling, Cubic, Experiment, Gains, Member, Payload, Result, Robot, load_robot
 from synctrl.errors import FrameNotFound, InputError
@@ -163,26 +164,26 @@ def test_a_result_says_what_was_carried(tmp_path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "subject"),
     [
-        (lambda: Payload(0, -1.0), "mass"),
-        (lambda: Payload(0, 1.0, start=0.3, stop=0.2), "start < stop"),
-        (lambda: Payload(0, 1.0, start=np.nan), "start"),
-        (lambda: Payload(0, 1.0, inertia=(1.0, 1.0, 3.0)), "principal moments"),
-        (lambda: Payload(0, 1.0, inertia=np.triu(np.ones((3, 3)))), "symmetric"),
-        (lambda: Payload(0, 1.0, com=(0, 0)), "com"),
-        (lambda: Payload(0, 1.0, inertia="round"), "payload, inertia: expected numbers"),
-        (lambda: Payload(0, 1.0, frame=3), "payload, frame: expected the name"),
-        (lambda: pair(load_robot("a460"), Payload(2, 1.0)), "index from 0 to 1"),
-        (lambda: pair(load_robot("a460"), Payload(0, 1.0, frame="base")), "moves"),
-        (lambda: pair(load_robot("a460"), "box"), "Payload objects"),
+        (lambda: Payload(0, -1.0), "payload, mass"),
+        (lambda: Payload(0, 1.0, start=0.3, stop=0.2), "payload"),
+        (lambda: Payload(0, 1.0, start=np.nan), "payload, start"),
+        (lambda: Payload(0, 1.0, inertia=(1.0, 1.0, 3.0)), "payload, inertia"),
+        (lambda: Payload(0, 1.0, inertia=np.triu(np.ones((3, 3)))), "payload, inertia"),
+        (lambda: Payload(0, 1.0, com=(0, 0)), "payload, com"),
+        (lambda: Payload(0, 1.0, inertia="round"), "payload, inertia"),
+        (lambda: Payload(0, 1.0, frame=3), "payload, frame"),
+        (lambda: pair(load_robot("a460"), Payload(2, 1.0)), "payload, robot"),
+        (lambda: pair(load_robot("a460"), Payload(0, 1.0, frame="base")), "payload, frame"),
+        (lambda: pair(load_robot("a460"), "box"), "payloads"),
     ],
 )
-def test_impossible_payloads_are_refused(make, said: str) -> None:
-    with pytest.raises(InputError, match=said):
+def test_impossible_payloads_are_refused(make, subject: str) -> None:
+    with refused(InputError, subject):
         make()
 
 
 def test_an_unknown_frame_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(FrameNotFound, match="wrist"):
+    with refused(FrameNotFound, robot="a460", frame="wirst"):
         pair(load_robot("a460"), Payload(0, 1.0, frame="wirst"))

@@ -11,13 +11,11 @@ import pytest
 from synctrl.analysis.identification import identify
 from synctrl.errors import InputError
 from synctrl.experiments import a460_full_pair, a460_pair
-from synctrl.paper.judge import AGREEMENT, compare_runs
-from synctrl.paper.judge_plots import differences
-from synctrl.paper.judge_section import judge_section
-from synctrl.paper.judged import joint_pair
+from synctrl.paper.judge import AGREEMENT, compare_runs, joint_pair
+from synctrl.paper.judge_section import differences, judge_section
 from synctrl.paper.plant_sections import friction_section, full_a460_section, identification_section
-from synctrl.paper.report import Row, write_page
-from synctrl.paper.reproduction import JOBS, judge_jobs, judged
+from synctrl.paper.report import SideBySide, write_page
+from synctrl.paper.reproduction import PLANNED, judge_runs, judged
 from synctrl.show.plots import joint_trajectories, save
 
 
@@ -46,7 +44,7 @@ def test_the_page_shows_three_and_six_joints_side_by_side(runs, tmp_path) -> Non
         save(joint_trajectories(runs[kind], robot), tmp_path / f"figure_{figure:02d}")
     section = full_a460_section(runs, tmp_path)
     page = write_page(tmp_path / "index.html", "page", [section]).read_text("utf-8")
-    rows = [block for block in section.blocks if isinstance(block, Row)]
+    rows = [block for block in section.blocks if isinstance(block, SideBySide)]
     assert len(rows) == 6
     for figure, row in enumerate(rows, start=2):
         for picture, joints in zip(row.blocks, ("three", "six"), strict=True):
@@ -61,7 +59,7 @@ def test_the_page_shows_three_and_six_joints_side_by_side(runs, tmp_path) -> Non
 def test_the_page_compares_friction_unknown_and_adapted_at_equal_times(runs, tmp_path) -> None:
     page = write_page(tmp_path / "index.html", "page", [friction_section(runs, tmp_path)]).read_text("utf-8")
     assert "friction adapted" in page
-    assert JOBS["a460_pair_friction_unknown"].duration == JOBS["a460_pair_friction_adapted"].duration
+    assert PLANNED["a460_pair_friction_unknown"].duration == PLANNED["a460_pair_friction_adapted"].duration
 
 
 def test_the_page_says_what_was_learned(runs, tmp_path) -> None:
@@ -96,15 +94,15 @@ def test_the_judges_section_has_a_line_and_a_row_per_cell(runs, tmp_path) -> Non
 
 def test_without_mujoco_the_page_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
     monkeypatch.setattr("synctrl.paper.reproduction.find_spec", lambda name: None)
-    assert judge_jobs() == {}
+    assert judge_runs() == {}
     page = write_page(tmp_path / "index.html", "page", [judge_section(judged({}), tmp_path)])
     assert "MuJoCo is not installed" in page.read_text("utf-8")
 
 
 def test_runs_of_the_judge_are_found_in_pairs() -> None:
     pytest.importorskip("mujoco", reason="MuJoCo is an extra: pip install 'synctrl[mujoco]'")
-    jobs = judge_jobs()
-    assert {jobs[name].plant for name in jobs} == {"pinocchio", "mujoco"}
+    planned = judge_runs()
+    assert {planned[name].plant for name in planned} == {"pinocchio", "mujoco"}
     experiment = joint_pair("planar2r")
     pair = {
         "judge_x": experiment.simulate(0.02),

@@ -10,15 +10,16 @@ from pathlib import Path
 
 import pytest
 from browser import open_page, require_browser
+from refusals import refused
 
 from synctrl.errors import InputError, ResultError
-from synctrl.paper.claims import Claim, Quantity
+from synctrl.paper.claims import Claim, Finding
 from synctrl.paper.report import (
     Formulas,
     Links,
     Picture,
-    Row,
     Section,
+    SideBySide,
     Table,
     Text,
     Verdicts,
@@ -38,12 +39,12 @@ def page_of(tmp_path, *blocks):
 
 
 def test_words_from_data_never_become_markup(tmp_path):
-    claim = Claim(NASTY, NASTY, False, (Quantity(NASTY, 1.0, NASTY),), NASTY)
+    claim = Claim(NASTY, NASTY, False, (Finding(NASTY, 1.0, NASTY),), NASTY)
     svg = tmp_path / "f.svg"
     svg.write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")
-    blocks = [Text((NASTY,)), Table((NASTY,), ((NASTY,),), NASTY), Verdicts((claim,)), Picture(svg, NASTY)]
+    blocks = [Text(NASTY), Table((NASTY,), ((NASTY,),), NASTY), Verdicts((claim,)), Picture(svg, NASTY)]
     blocks += [Formulas((("x", NASTY, NASTY),)), Table(("", ""), (), groups=((NASTY, 1),))]
-    text = page_of(tmp_path, *blocks, Row((Text((NASTY,)),)), Links(((NASTY, NASTY),)))
+    text = page_of(tmp_path, *blocks, SideBySide((Text(NASTY),)), Links(((NASTY, NASTY),)))
     assert "<script" not in text
     assert "<img src=x" not in text
     assert text.count("&lt;script&gt;") >= 10
@@ -55,14 +56,14 @@ def test_a_claim_that_does_not_hold_says_so(tmp_path):
 
 
 def test_a_row_that_does_not_fit_its_table_is_refused(tmp_path):
-    with pytest.raises(InputError, match="rows of 2 cells"):
+    with refused(InputError, "table", found=1):
         page_of(tmp_path, Table(("a", "b"), (("1",),)))
 
 
 def test_groups_that_do_not_cover_the_columns_are_refused(tmp_path):
     text = page_of(tmp_path, Table(("", "b", "c"), (("1", "2", "3"),), groups=(("both", 2),)))
     assert "<th colspan='2'>both</th>" in text
-    with pytest.raises(InputError, match="groups over 2 columns, found 3"):
+    with refused(InputError, "table", found=3):
         page_of(tmp_path, Table(("", "b", "c"), (), groups=(("too wide", 3),)))
 
 
@@ -84,16 +85,17 @@ def test_formulas_are_pictures_with_their_text(tmp_path):
     text = page_of(tmp_path, Formulas((row,)))
     assert f'alt="{row[0]}" src="data:image/svg+xml;base64,' in text
     assert text == page_of(tmp_path, Formulas((row,))), "the same formula, the same bytes"
-    with pytest.raises(InputError, match="expected TeX"):
+    with refused(InputError, "formula '\\nonsense{'"):
         page_of(tmp_path, Formulas(((r"\nonsense{", "", ""),)))
 
 
 def test_a_missing_figure_and_an_unwritable_page_are_clear_errors(tmp_path):
-    with pytest.raises(ResultError, match="cannot read the figure"):
+    with refused(ResultError, file=str(tmp_path / "none.svg")):
         page_of(tmp_path, Picture(tmp_path / "none.svg", ""))
     (tmp_path / "file").write_text("")
-    with pytest.raises(ResultError, match="cannot write the page"):
-        write_page(tmp_path / "file" / "page.html", "t", [])
+    page = tmp_path / "file" / "page.html"
+    with refused(ResultError, file=str(page)):
+        write_page(page, "t", [])
 
 
 @pytest.mark.parametrize(

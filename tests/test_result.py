@@ -13,6 +13,7 @@ import pytest
 from cells import SMALL_GAINS, small_cell
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 
 from synctrl import Disturbance, Result, SynctrlError, simulate
 from synctrl.errors import InputError, ResultError
@@ -141,7 +142,7 @@ def test_the_same_result_gives_the_same_bytes(result, tmp_path):
 def test_places_where_nothing_can_be_written_are_named(result, tmp_path):
     (tmp_path / "file").write_text("in the way")
     for place in (tmp_path, tmp_path / "file" / "run.npz"):
-        with pytest.raises(ResultError, match="cannot write the result to"):
+        with refused(ResultError, None, file=str(place)):
             result.save(place)
     with pytest.raises(SynctrlError):
         result.save(None)
@@ -190,7 +191,7 @@ def test_outputs_are_thinned_with_the_other_arrays(with_output):
     "outputs", [{"unknown": np.zeros(21)}, {"applied_torque": np.zeros((20, 2, 2))}], ids=["name", "instants"]
 )
 def test_outputs_that_do_not_fit_their_description_are_refused(with_output, outputs):
-    with pytest.raises(InputError, match="outputs"):
+    with refused(InputError, "outputs"):
         replace(with_output, outputs=outputs)
 
 
@@ -199,9 +200,9 @@ def test_outputs_that_do_not_fit_their_description_are_refused(with_output, outp
 
 def test_a_missing_file_is_named(tmp_path):
     for place in (tmp_path / "none.npz", tmp_path):
-        with pytest.raises(ResultError, match="no result file at"):
+        with refused(ResultError, None, file=str(place)):
             Result.load(place)
-    with pytest.raises(InputError, match="path"):
+    with refused(InputError, "path"):
         Result.load(None)
 
 
@@ -210,7 +211,7 @@ def test_a_truncated_file_is_refused(saved, tmp_path, left):
     data = saved.read_bytes()
     path = tmp_path / "short.npz"
     path.write_bytes(data[: left if isinstance(left, int) else int(left * len(data))])
-    with pytest.raises(ResultError, match=r"short\.npz"):
+    with refused(ResultError, file=str(path)):
         Result.load(path)
 
 
@@ -225,14 +226,15 @@ def test_a_file_with_flipped_bytes_is_refused_or_harmless(saved, result, tmp_pat
     try:
         assert Result.load(path) == result
     except ResultError as error:
-        assert "flipped.npz" in str(error)
+        assert error.file == str(path)
 
 
 @pytest.mark.parametrize("name", [*LAYOUT, "info"])
 def test_a_file_without_one_of_its_arrays_is_refused(content, tmp_path, name):
     del content[name]
-    with pytest.raises(ResultError, match=name):
+    with refused(ResultError) as caught:
         Result.load(write(tmp_path / "lacks.npz", content))
+    assert (caught.value.subject, caught.value.found) in ((f"array '{name}'", None), ("arrays", name))
 
 
 @pytest.mark.parametrize("name", ["x", "theta_hat", "info"])
@@ -280,7 +282,7 @@ def test_a_pickle_in_the_file_is_not_opened(content, tmp_path, name):
 )
 def test_content_that_does_not_fit_together_is_refused(content, tmp_path, spoil):
     spoil(content)
-    with pytest.raises(ResultError, match=r"spoilt\.npz"):
+    with refused(ResultError, file=str(tmp_path / "spoilt.npz")):
         Result.load(write(tmp_path / "spoilt.npz", content))
 
 
@@ -292,7 +294,7 @@ def test_other_kinds_of_files_are_refused(tmp_path):
         archive.writestr("x.npy", b"not an array")
     (tmp_path / "empty.npz").touch()
     for name in ("array.npy", "text.npz", "pickle.npz", "other.npz", "empty.npz"):
-        with pytest.raises(ResultError, match=name):
+        with refused(ResultError, file=str(tmp_path / name)):
             Result.load(tmp_path / name)
 
 
@@ -300,7 +302,7 @@ def test_a_file_that_would_swell_in_memory_is_refused(content, tmp_path):
     content["theta_hat"] = np.zeros((20_000, 2, 20))
     np.savez_compressed(tmp_path / "bomb.npz", **content)
     assert (tmp_path / "bomb.npz").stat().st_size < 0.01 * content["theta_hat"].nbytes
-    with pytest.raises(ResultError, match="uncompressed"):
+    with refused(ResultError, None, file=str(tmp_path / "bomb.npz")):
         Result.load(tmp_path / "bomb.npz")
 
 
@@ -311,7 +313,7 @@ def test_an_array_that_claims_more_numbers_than_there_are_is_refused(saved, tmp_
     with zipfile.ZipFile(saved) as good, zipfile.ZipFile(path, "w") as bad:
         for entry in good.namelist():
             bad.writestr(entry, header.getvalue() if entry == "t.npy" else good.read(entry))
-    with pytest.raises(ResultError, match=r"claims\.npz"):
+    with refused(ResultError, "'t.npy'", file=str(path)):
         Result.load(path)
 
 
@@ -321,5 +323,5 @@ def test_an_encrypted_file_is_refused(saved, tmp_path):
     data[central + 8] |= 1
     data[6] |= 1
     (tmp_path / "secret.npz").write_bytes(data)
-    with pytest.raises(ResultError, match=r"secret\.npz"):
+    with refused(ResultError, file=str(tmp_path / "secret.npz")):
         Result.load(tmp_path / "secret.npz")

@@ -14,6 +14,7 @@ from consumers import CONSUMERS, consume
 from damage import HOSTILE_HEADERS, archive_of, array_of, damaged, info_of, members, npy, put, with_header
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 
 from synctrl import Cell, Disturbance, Experiment, Result
 from synctrl.errors import InputError, ResultError, SimulationError
@@ -110,10 +111,10 @@ def test_numbers_are_the_same_in_any_byte_order_and_layout(data, result, load, o
 @pytest.mark.parametrize("version", [1, 2, 3])
 @pytest.mark.parametrize("k", range(len(HOSTILE_HEADERS)))
 @pytest.mark.parametrize("name", ["t", "q", "info", "outputs/applied"])
-def test_a_header_that_numpy_does_not_write_is_refused(data, load, name, k, version):
+def test_a_header_that_numpy_does_not_write_is_refused(data, load, tmp_path, name, k, version):
     entry = members(data)[f"{name}.npy"]
     hostile = with_header(HOSTILE_HEADERS[k], entry[128:] if k % 2 else b"", version)
-    with pytest.raises(ResultError, match=r"some\.npz"):
+    with refused(ResultError, file=str(tmp_path / "some.npz")):
         load(with_entry(data, f"{name}.npy", hostile))
 
 
@@ -143,8 +144,8 @@ def test_a_size_that_the_file_does_not_have_is_refused_before_memory_is_asked_fo
         lambda found: [],
     ],
 )
-def test_an_archive_with_other_entries_is_refused(data, load, change):
-    with pytest.raises(ResultError, match=r"some\.npz"):
+def test_an_archive_with_other_entries_is_refused(data, load, tmp_path, change):
+    with refused(ResultError, file=str(tmp_path / "some.npz")):
         load(archive_of(change([*members(data).items()])))
 
 
@@ -234,11 +235,11 @@ WRONG_INFO = [
 
 
 @pytest.mark.parametrize(("where", "value"), WRONG_INFO)
-def test_info_that_would_mislead_a_reader_is_refused(data, load, where, value):
+def test_info_that_would_mislead_a_reader_is_refused(data, load, tmp_path, where, value):
     info = info_of(members(data)["info.npy"])
     if where != ("sizes", "time"):
         put(info, where, lambda holder, key: holder.__setitem__(key, value))
-        with pytest.raises(ResultError, match=r"some\.npz") as caught:
+        with refused(ResultError, file=str(tmp_path / "some.npz")) as caught:
             load(with_info(data, info))
         assert len(str(caught.value)) < 800 and str(caught.value).isprintable()
     else:  # the length of the log is that of its arrays, whatever else is said
@@ -253,8 +254,9 @@ NEEDED = ["status", "title", "robots", "axes", "pairs", "sizes", "gains", "versi
 def test_info_without_an_entry_that_is_read_later_is_refused(data, load, where):
     info = info_of(members(data)["info.npy"])
     put(info, where, remove)
-    with pytest.raises(ResultError, match=where[-1] if where[-1] != "format" else "format"):
+    with refused(ResultError) as caught:
         load(with_info(data, info))
+    assert where[-1] in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -272,8 +274,8 @@ def test_info_without_an_entry_that_is_read_later_is_refused(data, load, where):
         "\ufeff{}",
     ],
 )
-def test_a_text_that_is_no_info_is_refused(data, load, text):
-    with pytest.raises(ResultError, match=r"some\.npz"):
+def test_a_text_that_is_no_info_is_refused(data, load, tmp_path, text):
+    with refused(ResultError, file=str(tmp_path / "some.npz")):
         load(with_info(data, text))
 
 
@@ -290,7 +292,7 @@ def test_a_text_that_is_no_info_is_refused(data, load, text):
     ],
 )
 def test_numbers_that_no_run_has_are_refused(data, load, name, where, value):
-    with pytest.raises(ResultError, match=f"'{name}'"):
+    with refused(ResultError, f"array '{name}'"):
         load(with_array(data, name, where, value))
 
 
@@ -304,7 +306,7 @@ def test_what_load_would_refuse_is_not_saved(result, tmp_path):
         replace(result, info={**result.info, "axes": ["x"]}),
     ]
     for run in wrong:
-        with pytest.raises(ResultError, match="cannot write the result to"):
+        with refused(ResultError, file=str(tmp_path / "run.npz")):
             run.save(tmp_path / "run.npz")
     assert [*tmp_path.iterdir()] == []
 
@@ -314,12 +316,12 @@ def test_what_load_would_refuse_is_not_saved(result, tmp_path):
 
 @pytest.mark.parametrize("name", ["half a pair \ud800", "bell \x07", "two\nlines", "x" * 5000, 7])
 def test_names_that_files_and_figures_cannot_hold_are_refused_before_a_run(name):
-    with pytest.raises(InputError, match="name"):
+    with refused(InputError, "name"):
         small_cell(name=name)
     cell = small_cell()
-    with pytest.raises(InputError, match="name"):
+    with refused(InputError, "name"):
         Cell([replace(cell.members[0], name=name), cell.members[1]], cell.coupling, cell.space)
-    with pytest.raises(InputError, match="title"):
+    with refused(InputError, "title"):
         Experiment(cell, SMALL_GAINS, 1.0, title=name)
 
 
@@ -411,7 +413,7 @@ def test_limits_that_are_none_are_refused(result, limits):
 
 
 def test_limits_of_nothing_are_refused(result):
-    with pytest.raises(InputError, match="kind"):
+    with refused(InputError, "kind"):
         common_limits("speed", result)
     with pytest.raises(InputError, match="at least one run"):
         common_limits("sync_error")

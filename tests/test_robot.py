@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import placement, random_robot, rate, seeds
+from refusals import refused
 
 from synctrl import Robot, load_robot
 from synctrl.errors import FrameNotFound, InputError, RobotError
@@ -249,25 +250,21 @@ def test_a_payload_in_the_hand_needs_more_torque_than_none():
 
 
 @pytest.mark.parametrize(
-    ("index", "value", "says"),
-    [
-        (0, 0.0, "mass above 0"),
-        (0, -1.0, "mass above 0"),
-        (19, 0.0, "positive definite"),
-        (11, 50.0, "positive definite"),
-    ],
+    ("index", "value", "joint"),
+    [(0, 0.0, "joint1"), (0, -1.0, "joint1"), (19, 0.0, "joint2"), (11, 50.0, "joint2")],
 )
-def test_parameters_of_no_real_body_are_refused(index, value, says):
+def test_parameters_of_no_real_body_are_refused(index, value, joint):
     robot = ROBOTS["planar2r"]
     pi = robot.inertial_parameters
     pi[index] = value
-    with pytest.raises(RobotError, match=says):
+    with refused(RobotError, f"robot 'planar2r', body of '{joint}'") as caught:
         robot.with_parameters(pi)
+    assert caught.value.found <= 0
 
 
 def test_an_unknown_frame_is_named_with_those_there_are():
     robot = ROBOTS["planar2r"]
-    with pytest.raises(FrameNotFound, match=r"'tipp'.*did you mean 'tip'") as caught:
+    with refused(FrameNotFound, robot="planar2r", frame="tipp") as caught:
         robot.with_tip("tipp")
     assert {"tip", "link1", "link2"} <= set(caught.value.available)
 
@@ -288,7 +285,7 @@ def test_a_joint_with_several_velocities_is_refused(joint):
     model.addJoint(0, joint, pin.SE3.Identity(), "loose")
     model.appendBodyToJoint(1, pin.Inertia.Random(), pin.SE3.Identity())
     model.addFrame(pin.Frame("tip", 1, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    with pytest.raises(RobotError, match=r"'loose' has [36] degrees of freedom"):
+    with refused(RobotError, "robot ''", found="loose"):
         Robot(model, "tip")
 
 
@@ -297,7 +294,7 @@ def test_joints_that_are_not_numbered_branch_after_branch_are_refused():
     for name, parent in (("trunk", 0), ("left", 1), ("right", 1), ("left hand", 2)):
         joint = model.addJoint(parent, pin.JointModelRY(), pin.SE3.Random(), name)
         model.appendBodyToJoint(joint, pin.Inertia.Random(), pin.SE3.Identity())
-    with pytest.raises(RobotError, match=r"'left' to carry the joints \[2, 4\]"):
+    with refused(RobotError, "robot ''", found="left"):
         Robot(model, "left hand")
 
 
@@ -359,7 +356,7 @@ def test_the_a460_has_the_masses_of_its_description():
 def test_numbers_that_are_not_finite_are_refused_where_a_robot_is_made():
     robot = ROBOTS["planar2r"]
     for bad in ((np.nan, 0, 0), (0, 0), "here", (0, np.inf, 0)):
-        with pytest.raises(InputError, match="xyz"):
+        with refused(InputError, "xyz"):
             robot.placed(bad)
 
 
@@ -370,14 +367,14 @@ def test_states_that_do_not_fit_are_refused_with_their_name(name, bad):
     bad = bad[: robot.nv] if isinstance(bad, np.ndarray) else bad
     good = np.zeros(robot.nv)
     for method in (robot.mass_matrix, robot.gravity, robot.tip_pose, robot.jacobian, robot.configuration):
-        with pytest.raises(InputError, match="q: expected"):
+        with refused(InputError, "q"):
             method(bad)
     for method in (robot.coriolis_matrix, robot.jacobian_dot):
-        with pytest.raises(InputError, match="v: expected"):
+        with refused(InputError, "v"):
             method(good, bad)
-    with pytest.raises(InputError, match="a: expected"):
+    with refused(InputError, "a"):
         robot.inverse_dynamics(good, good, bad)
-    with pytest.raises(InputError, match="tau: expected"):
+    with refused(InputError, "tau"):
         robot.forward_dynamics(good, good, bad)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusals import refused
 from sweeps import DT, base, begun, interrupted_once, quiet, small_sweep, take
 
 from synctrl.errors import InputError, ResultError, SweepError, SweepFileError
@@ -66,8 +67,9 @@ def test_a_pipe_instead_of_a_file_is_refused_and_not_waited_for(name, made, tmp_
     (tmp_path / name).unlink()
     os.mkfifo(tmp_path / name)
     for read in (load, lambda folder: quiet(mixed_sweep(), folder, backend="serial")):
-        with pytest.raises(ResultError, match="expected a regular file, found a folder, a pipe"):
+        with refused(ResultError) as caught:
             read(tmp_path)
+        assert caught.value.file in (str(tmp_path), str(tmp_path / name))
 
 
 def rewritten(made: Path, folder: Path, change) -> None:
@@ -130,7 +132,7 @@ def test_a_line_that_cannot_be_of_this_sweep_is_refused_with_file_and_line(name,
     rewritten(made, tmp_path, change)
     before = (tmp_path / "runs.jsonl").read_bytes()
     for read in (lambda: load(tmp_path), lambda: quiet(mixed_sweep(), tmp_path, backend="serial")):
-        with pytest.raises(SweepFileError, match=rf"runs\.jsonl', line {line + 1}: "):
+        with refused(SweepFileError, file=str(tmp_path / "runs.jsonl"), line=line + 1):
             read()
     assert (tmp_path / "runs.jsonl").read_bytes() == before
 
@@ -148,7 +150,7 @@ def test_a_folder_of_format_1_is_read_and_not_mixed_with_new_rows(made, tmp_path
     new, old = load(made), load(tmp_path)
     assert list(new.columns) == [*old.columns, "saturation", "step_error"]
     assert new[old.columns].equals(old)
-    with pytest.raises(ResultError, match=r"format is .*1.* there and .*2.* here"):
+    with refused(ResultError, file=str(tmp_path)):
         quiet(mixed_sweep(), tmp_path, backend="serial")
 
 
@@ -161,7 +163,7 @@ def test_a_stopped_run_stops_within_its_duration(tmp_path):
     for wrong in (-0.01, 0.2, "late", True):
         row[4] = wrong
         path.write_text(json.dumps(row) + "\n")
-        with pytest.raises(SweepFileError, match=r"line 1: stop_time: expected a time from 0 to 0\.1"):
+        with refused(SweepFileError, file=str(path), line=1):
             load(tmp_path)
 
 
@@ -170,11 +172,13 @@ BANDS = {"tracking_error": 1e-3, "sync_error": 1e-3}
 
 def test_a_run_written_twice_is_refused_and_says_whether_the_lines_agree(made, tmp_path):
     rewritten(made, tmp_path, lambda rows: [*rows, rows[1]])
-    with pytest.raises(SweepFileError, match=r"line 7: .* found run 1 again; line 2 has the same"):
+    with refused(SweepFileError, file=str(tmp_path / "runs.jsonl"), line=7) as caught:
         load(tmp_path)
+    assert "line 2 has the same" in str(caught.value)
     rewritten(made, tmp_path, lambda rows: [*rows, [*rows[1][:-1], 2.0 * rows[1][-1]]])
-    with pytest.raises(SweepFileError, match=r"line 7: .* found run 1 again; line 2 has other values"):
+    with refused(SweepFileError, file=str(tmp_path / "runs.jsonl"), line=7) as caught:
         load(tmp_path)
+    assert "line 2 has other values" in str(caught.value)
 
 
 def test_a_line_that_is_taken_out_is_made_again(made, tmp_path):
@@ -234,11 +238,11 @@ def test_what_follows_values_of_the_users_own_is_compared_when_they_are_at_hand(
     rows[1][3] += 1.0
     path.write_text("".join(json.dumps(row) + "\n" for row in rows))
     assert len(load(tmp_path)) == 3, "a table alone does not know what a user's own values draw"
-    with pytest.raises(SweepFileError, match="line 2: run 1, beta: expected"):
+    with refused(SweepFileError, file=str(path), line=2):
         quiet(dice_sweep(), tmp_path, backend="serial")
     rows[1][1] += 1.0
     path.write_text("".join(json.dumps(row) + "\n" for row in rows))
-    with pytest.raises(SweepFileError, match="line 2: run 1, model_error: expected"):
+    with refused(SweepFileError, file=str(path), line=2):
         load(tmp_path)
 
 
@@ -248,12 +252,12 @@ def test_what_a_users_own_values_draw_has_to_be_a_number_or_a_word(value):
         def draw(self, rng):
             return value
 
-    with pytest.raises(InputError, match="factor 'dice', a value that Wrong has drawn: expected"):
+    with refused(InputError, "factor 'dice', a value that Wrong has drawn"):
         dice_sweep(Wrong(6)).values(0)
 
 
 def test_words_that_no_file_can_hold_are_refused_or_replaced(tmp_path):
-    with pytest.raises(InputError, match="a word that can be written"):
+    with refused(InputError, "Choice"):
         Choice(["a", "\ud800"])
     refuse = Factor("own", Grid([1]), half_a_letter)
     quiet(Sweep(base(), [refuse], dt=DT, engine="pinocchio"), tmp_path, backend="serial")
@@ -282,7 +286,7 @@ def test_a_description_that_contradicts_itself_is_refused_with_its_file(key, val
     about = json.loads((tmp_path / "sweep.json").read_text())
     (tmp_path / "sweep.json").write_text(json.dumps({**about, key: value}))
     for read in (load, lambda folder: trajectories(folder, 0)):
-        with pytest.raises(ResultError, match=r"sweep\.json"):
+        with refused(ResultError, file=str(tmp_path / "sweep.json")):
             read(tmp_path)
 
 
@@ -290,10 +294,10 @@ def test_trajectories_of_another_run_are_refused(tmp_path):
     quiet(small_sweep(samples=2), tmp_path, backend="serial", keep_every=2)
     kept = tmp_path / "runs"
     (kept / "000000.npz").rename(kept / "000001.npz")
-    with pytest.raises(ResultError, match=r"000001\.npz': expected run 1, found run 0"):
+    with refused(ResultError, file=str(kept / "000001.npz"), found=0):
         trajectories(tmp_path, 1)
     for wrong in ("../0", -1, 1.5):
-        with pytest.raises(InputError, match="run"):
+        with refused(InputError, "run"):
             trajectories(tmp_path, wrong)
 
 
@@ -307,22 +311,22 @@ def searched(folder, generations=2):
 
 
 @pytest.mark.parametrize(
-    ("line", "column", "value", "said"),
+    ("line", "column", "value"),
     [
-        (0, "run", 99999, "line 1: expected runs of the generation before, 99990 to 99994, found 99999"),
-        (6, "beta", 1000.0, "line 7: run 6, beta: expected a number from 1 to 100"),
-        (6, "K_r", "high", "line 7: run 6, K_r: expected a number from 0.1 to 10"),
-        (6, "status", "fine", "line 7: status"),
+        (0, "run", 99999),
+        (6, "beta", 1000.0),
+        (6, "K_r", "high"),
+        (6, "status", "fine"),
     ],
 )
-def test_a_line_that_cannot_be_of_this_search_is_refused(line, column, value, said, tmp_path):
+def test_a_line_that_cannot_be_of_this_search_is_refused(line, column, value, tmp_path):
     searched(tmp_path)
     path = tmp_path / "runs.jsonl"
     rows = [json.loads(line) for line in path.read_text().splitlines()]
     rows[line][json.loads((tmp_path / "sweep.json").read_text())["columns"].index(column)] = value
     path.write_text("".join(json.dumps(row) + "\n" for row in rows))
     for read in (lambda: load(tmp_path), lambda: searched(tmp_path)):
-        with pytest.raises(SweepFileError, match=said):
+        with refused(SweepFileError, file=str(path), line=line + 1):
             read()
 
 
@@ -332,7 +336,7 @@ def test_a_search_goes_on_only_from_runs_that_it_would_have_made(tmp_path):
     rows = [json.loads(line) for line in path.read_text().splitlines()]
     rows[7][1] = 0.5 * (rows[7][1] + 50)
     path.write_text("".join(json.dumps(row) + "\n" for row in rows))
-    with pytest.raises(SweepFileError, match="line 8: run 7, beta: expected"):
+    with refused(SweepFileError, file=str(path), line=8):
         searched(tmp_path)
     path.write_text("".join(json.dumps(row) + "\n" for row in (*rows[:7], *rows[8:])))
     again = searched(tmp_path)
@@ -349,7 +353,7 @@ def test_a_folder_that_another_process_has_is_neither_read_nor_written(tmp_path)
         (tmp_path / "sweep.json").write_text("half a descr")
         before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
         for start in (lambda: quiet(small_sweep(), tmp_path, backend="serial"), lambda: searched(tmp_path)):
-            with pytest.raises(ResultError, match="another process has it"):
+            with refused(ResultError, file=str(tmp_path)):
                 start()
         assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
@@ -369,7 +373,7 @@ def test_a_folder_with_runs_and_no_description_is_refused(tmp_path):
     begun(small_sweep(), tmp_path).close()
     (tmp_path / "runs.jsonl").write_text("[0]\n")
     (tmp_path / "sweep.json").unlink()
-    with pytest.raises(ResultError, match=r"has runs but no sweep\.json"):
+    with refused(ResultError, file=str(tmp_path)):
         quiet(small_sweep(), tmp_path, backend="serial")
 
 

@@ -14,6 +14,7 @@ import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusals import refused
 from urdf_corpus import CORPUS, GOOD, TRIANGLE, write
 
 from synctrl.errors import FrameNotFound, InputError, RobotError, RobotWarning
@@ -85,7 +86,9 @@ def test_a_file_that_is_no_urdf_is_refused(content, words, tmp_path):
 def test_a_line_number_is_that_of_the_defect(tmp_path):
     broken = GOOD.replace('value="2.5"', 'value="abc"')
     line = broken[: broken.index("abc")].count("\n") + 1
-    assert f"robot.urdf:{line}: link 'upper', inertial, mass" in refusal(write(tmp_path, broken))
+    file = write(tmp_path, broken)
+    with refused(RobotError, "link 'upper', inertial, mass", file=str(file), line=line):
+        read_urdf(file)
 
 
 def test_a_missing_file_is_said_with_the_near_ones(tmp_path):
@@ -93,7 +96,7 @@ def test_a_missing_file_is_said_with_the_near_ones(tmp_path):
     assert "did you mean 'robot.urdf'" in refusal(tmp_path / "robto.urdf")
     assert "robot.urdf" in refusal(tmp_path / "else.urdf")
     assert "a folder" in refusal(tmp_path)
-    with pytest.raises(InputError, match="expected a path, found int"):
+    with refused(InputError, "path"):
         existing_file(3)
 
 
@@ -103,13 +106,14 @@ def test_a_path_that_cannot_be_is_refused_in_printable_words(path):
 
 
 def test_an_unknown_tip_lists_the_frames(tmp_path):
-    with pytest.raises(FrameNotFound, match="did you mean 'tool'"):
+    with refused(FrameNotFound, robot="good", frame="tol"):
         read_urdf(write(tmp_path, GOOD), tip="tol")
 
 
 def test_the_reason_of_the_parser_is_in_the_error_and_not_on_the_screen(capfd):
-    with pytest.raises(RobotError, match="link 'a' is not unique"):
+    with refused(RobotError, file="a.urdf") as caught:
         model_from_xml("a.urdf", '<robot name="x"><link name="a"/><link name="a"/></robot>')
+    assert "link 'a' is not unique" in caught.value.found
     assert capfd.readouterr().err == ""
 
 
@@ -347,13 +351,13 @@ def test_a_joint_that_cannot_be_locked_is_refused(locked, words, tmp_path):
 
 
 def test_a_position_that_is_no_number_cannot_be_locked(tmp_path):
-    with pytest.raises(InputError, match="position of joint 'elbow'"):
+    with refused(InputError, "position of joint 'elbow'"):
         read_urdf(write(tmp_path, GOOD), locked={"elbow": float("nan")})
 
 
 @pytest.mark.parametrize("options", [{"locked": ("elbow",)}, {"package_dirs": 3}, {"package_dirs": [None]}])
 def test_options_of_another_type_are_refused(options, tmp_path):
-    with pytest.raises(InputError, match=f"{next(iter(options))}: expected"):
+    with refused(InputError, next(iter(options))):
         read_urdf(write(tmp_path, GOOD), **options)
 
 
@@ -361,10 +365,10 @@ def test_a_model_that_is_not_the_document_is_refused(tmp_path):
     description = read_urdf(write(tmp_path, GOOD))
     lighter = pin.Model(description.model)
     lighter.inertias[2].mass *= 0.999
-    with pytest.raises(RobotError, match="joint 'elbow': expected a model with the inertial parameters"):
+    with refused(RobotError, "joint 'elbow'"):
         check_model(description.document, lighter)
     fewer = pin.buildReducedModel(description.model, [2], pin.neutral(description.model))
-    with pytest.raises(RobotError, match="a model with the joints"):
+    with refused(RobotError, None, found=", ".join(map(repr, fewer.names[1:]))):
         check_model(description.document, fewer)
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from ..simulation.plant import Plant
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .convergence import Convergence, convergence_of
-from .gain_condition import GainCondition, gain_condition_of
-from .lyapunov import OUTSIDE, Growth, Lyapunov, first_growth, lyapunov_of
+from .convergence import Convergence, convergence
+from .gain_condition import GainCondition, gain_condition
+from .lyapunov import OUTSIDE, Growth, Lyapunov, first_growth, lyapunov
 from .metrics import finite_or_none
 from .proofs import unproven_parts
 from .replay import Replay, replay
@@ -93,7 +93,7 @@ def certify(result: Result, experiment: Experiment | None = None) -> Certificate
         InputError: no experiment, or another than the one that made the result.
     """
     run = replay(result, experiment)
-    record, condition, errors = lyapunov_of(run), gain_condition_of(run), convergence_of(run)
+    record, condition, errors = lyapunov(run), gain_condition(run), convergence(run)
     growth = first_growth(record)
     unproven = unproven_parts(run)
     found = (*_outside(run, record, condition), *unproven)

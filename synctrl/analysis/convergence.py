@@ -42,24 +42,20 @@ class Convergence:
         return self.identity <= self.identity_rounding
 
 
-def convergence(result: Result, experiment: Experiment | None = None) -> Convergence:
+def convergence(result: Result | Replay, experiment: Experiment | None = None) -> Convergence:
     """Errors at the end of a run, and w = N e* + S+ epsilon at every instant.
 
     w = c e; S+ is the pseudo-inverse of the coupling matrix and N = 1 - S+ S projects on its null space. As
     N S^T = 0, e* -> 0 and epsilon -> 0 give w -> 0, for any coupling; see docs/theory.md.
 
     Args:
-        result: the run.
+        result: the run; or its replay, where one has been made already.
         experiment: what made it; needed for a result loaded from a file.
 
     Raises:
         InputError: no experiment, or another than the one that made the result.
     """
-    return convergence_of(replay(result, experiment))
-
-
-def convergence_of(run: Replay) -> Convergence:
-    """`convergence` of a run that has been gone through already."""
+    run = replay(result, experiment)
     result, x, at = run.result, run.rows, run.logged
     errors = {
         "tracking error": result.tracking_error,

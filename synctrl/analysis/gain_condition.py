@@ -92,21 +92,17 @@ def margins(B: np.ndarray, K_r: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.
     )
 
 
-def gain_condition(result: Result, experiment: Experiment | None = None) -> GainCondition:
+def gain_condition(result: Result | Replay, experiment: Experiment | None = None) -> GainCondition:
     """The gain condition along a run, where it is tightest.
 
     Args:
-        result: the run.
+        result: the run; or its replay, where one has been made already.
         experiment: what made it; needed for a result loaded from a file.
 
     Raises:
         InputError: no experiment, or another than the one that made the result.
     """
-    return gain_condition_of(replay(result, experiment))
-
-
-def gain_condition_of(run: Replay) -> GainCondition:
-    """The gain condition along a run that has been gone through already."""
+    run = replay(result, experiment)
     x, loop = run.rows, run.loop
     found = []
     for i, robot in enumerate(loop.cell.robots):
@@ -149,7 +145,9 @@ def gain_condition_in_box(
     cell = experiment.cell
     low, high = (_corner(name, corner, cell) for name, corner in (("lower", lower), ("upper", upper)))
     if (low > high).any():
-        raise InputError(f"lower, upper: expected lower <= upper, found {low.tolist()} and {high.tolist()}")
+        raise InputError(
+            f"expected lower <= upper, found {low.tolist()} and {high.tolist()}", subject="lower, upper"
+        )
     span = positive_number("duration", experiment.duration if duration is None else duration)
     found = []
     for i, robot in enumerate(cell.robots):
@@ -243,5 +241,5 @@ def _corner(name: str, corner: ArrayLike, cell: object) -> np.ndarray:
     shape = cell.n, cell.nv  # type: ignore[attr-defined]
     array = finite_array(name, corner)
     if array.shape not in (shape, shape[1:]):
-        raise InputError(f"{name}: expected shape {shape[1:]} or {shape}, found {array.shape}")
+        raise InputError(f"expected shape {shape[1:]} or {shape}, found {array.shape}", subject=name)
     return np.broadcast_to(array, shape)

@@ -128,7 +128,9 @@ def _gamma(run: Replay) -> np.ndarray:
     adaptation = run.loop.controller.adaptation
     if not isinstance(adaptation, BoundGradient):
         found = run.result.info.get("adaptation", {}).get("name", "another")
-        raise InputError(f"result: expected a run with the adaptation Gradient, eq. (14), found {found}")
+        raise InputError(
+            f"expected a run with the adaptation Gradient, eq. (14), found {found}", subject="result"
+        )
     return adaptation.Gamma
 
 

@@ -113,7 +113,7 @@ class Growth:
     term: str
 
 
-def lyapunov(result: Result, experiment: Experiment | None = None) -> Lyapunov:
+def lyapunov(result: Result | Replay, experiment: Experiment | None = None) -> Lyapunov:
     """V and V' at every logged instant of a run.
 
     The adaptation has its storage in V and powers of its own in V'. Entries of theta that the paper's does
@@ -121,17 +121,13 @@ def lyapunov(result: Result, experiment: Experiment | None = None) -> Lyapunov:
     s_q^T Y tilde.
 
     Args:
-        result: the run.
+        result: the run; or its replay, where one has been made already.
         experiment: what made it; needed for a result loaded from a file.
 
     Raises:
         InputError: no experiment, or another than the one that made the result.
     """
-    return lyapunov_of(replay(result, experiment))
-
-
-def lyapunov_of(run: Replay) -> Lyapunov:
-    """V and V' of a run that has been gone through already."""
+    run = replay(result, experiment)
     proof = proof_of(run)
     energy, power = _energy(run, proof), _power(run, proof)
     V, V_dot = (np.sum(list(terms.values()), axis=0) for terms in (energy, power))

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from ..checks import instance, non_negative_number
-from ..errors import InputError, ResultError
-from ..files import write_whole
+from ..errors import InputError
+from ..files import reported, write_whole
 from ..simulation.result import Result
 
 FORMAT = "synctrl metrics 1"
@@ -116,12 +116,12 @@ def settling_bands(*results: Result, fraction: float = SETTLING_FRACTION) -> dic
         InputError: no run, or one without instants.
     """
     if not results:
-        raise InputError("settling bands: expected at least one run, found none")
+        raise InputError("expected at least one run, found none", subject="settling bands")
     for result in results:
         instance("run", result, Result, "a Result")
         if not len(result.t):
             raise InputError(
-                f"run '{result.info['title']}': expected at least one logged instant, found none"
+                "expected at least one logged instant, found none", subject=f"run '{result.info['title']}'"
             )
     return {kind: fraction * max(float(np.abs(getattr(r, kind)).max()) for r in results) for kind in ERRORS}
 
@@ -201,13 +201,10 @@ def write_metrics(path: str | Path, runs: Mapping[str, Mapping], claims: list[Ma
     try:
         text = json.dumps(content, ensure_ascii=False, indent=1, allow_nan=False)
     except ValueError as error:
-        raise InputError(f"metrics: expected finite numbers only ({error})") from error
-    path = Path(path)
-    try:
+        raise InputError(f"expected finite numbers only ({error})", subject="metrics") from error
+    with reported("write the metrics to", path):
         write_whole(path, text + "\n")
-    except OSError as error:
-        raise ResultError(f"cannot write the metrics to '{path}': {error.strerror or error}") from error
-    return path
+    return Path(path)
 
 
 def finite_or_none(value: float | None) -> float | None:

@@ -111,17 +111,19 @@ class Replay:
     learning: tuple[str, ...]
 
 
-def replay(result: Result, experiment: Experiment | None = None) -> Replay:
+def replay(result: Result | Replay, experiment: Experiment | None = None) -> Replay:
     """Evaluate the closed loop at every logged state of a run.
 
     Args:
-        result: the run.
+        result: the run; its replay, where one has been made already, is returned as it is.
         experiment: what made it; may be left out while the result still knows.
 
     Raises:
         InputError: no experiment for a result loaded from a file, another than the one that made it, numbers
             that have no squares, or a state of adaptation or plant that is not in the result.
     """
+    if isinstance(result, Replay):
+        return result
     instance("result", result, Result, "a Result")
     experiment = experiment_of(result, experiment)
     loop = experiment.closed_loop(result.info.get("plant", "pinocchio"))
@@ -149,8 +151,9 @@ def experiment_of(result: Result, experiment: Experiment | None) -> Experiment:
     experiment = result.experiment if experiment is None else experiment
     if experiment is None:
         raise InputError(
-            "experiment: this result was loaded from a file and does not know the closed loop that made it; "
-            "pass the experiment, for example certify(result, experiment=planar_four())"
+            "this result was loaded from a file and does not know the closed loop that made it; "
+            "pass the experiment, for example certify(result, experiment=planar_four())",
+            subject="experiment",
         )
     instance("experiment", experiment, Experiment, "an Experiment")
     return experiment
@@ -248,28 +251,16 @@ def _friction(
 
 
 def _check_sizes(result: Result, loop: ClosedLoop) -> None:
-    cell = loop.cell
-    expected = {
-        "q": (cell.n, cell.nv),
-        "theta_hat": cell.theta.shape,
-        "sync_error": (cell.coupling.pairs, cell.m),
-    }
-    for name, shape in expected.items():
-        found = getattr(result, name).shape[1:]
+    """Compare shapes, also those of the states that adaptation, network and plant have for themselves."""
+    cell, own = loop.cell, own_states(loop)
+    errors = {"theta_hat": cell.theta.shape, "sync_error": (cell.coupling.pairs, cell.m)}
+    for name, shape in {"q": (cell.n, cell.nv), **errors, **own}.items():
+        array = result.outputs.get(name) if name in own else getattr(result, name)
+        found = None if array is None else array.shape[1:]
         if found != shape:
-            raise InputError(
-                f"experiment: expected the one that made the result; its {name} has the shape {shape} at an "
-                f"instant, but the result's has {found}"
-            )
+            raise _another(f"its {name} has the shape {shape} at an instant, but the result's has {found}")
     if not len(result.t):
-        raise InputError("result: expected at least one logged instant, found none")
-    for name, shape in own_states(loop).items():
-        found = result.outputs[name].shape[1:] if name in result.outputs else None
-        if found != shape:
-            raise InputError(
-                f"experiment: expected the one that made the result, with the whole state in the log; its "
-                f"output '{name}' has the shape {shape} at an instant, but the result's has {found}"
-            )
+        raise InputError("expected at least one logged instant, found none", subject="result")
 
 
 def _check_numbers(result: Result) -> None:
@@ -278,8 +269,9 @@ def _check_numbers(result: Result) -> None:
         if len(large):
             found = getattr(result, name)[tuple(large[0])]
             raise InputError(
-                f"result, {name}: expected numbers up to {LARGEST:g}, found {found:g} at "
-                f"t = {result.t[large[0][0]]:g} s; the run went astray, and nothing can be said of it"
+                f"expected numbers up to {LARGEST:g}, found {found:g} at "
+                f"t = {result.t[large[0][0]]:g} s; the run went astray, and nothing can be said of it",
+                subject=f"result, {name}",
             )
 
 
@@ -288,7 +280,12 @@ def _check_same(result: Result, rows: Row) -> None:
     wrong = ~(difference <= MISMATCH * (np.abs(rows.v_ref) + np.abs(rows.v)).max(axis=(1, 2)))
     if wrong.any():
         k = int(np.argmax(wrong))
-        raise InputError(
-            f"experiment: expected the one that made the result; at t = {result.t[k]:g} s it gives a "
-            f"velocity error of {rows.s_q[k].tolist()}, but the result has {result.v_error[k].tolist()}"
+        raise _another(
+            f"at t = {result.t[k]:g} s it gives a velocity error of {rows.s_q[k].tolist()}, but the result "
+            f"has {result.v_error[k].tolist()}"
         )
+
+
+def _another(reason: str) -> InputError:
+    """The error about an experiment that is another one than that of the result."""
+    return InputError(f"expected the one that made the result; {reason}", subject="experiment")

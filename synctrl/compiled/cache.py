@@ -61,10 +61,11 @@ def cache_folder() -> Path:
     try:
         return Path(chosen).expanduser().absolute()
     except RuntimeError as error:
-        raise InputError(f"SYNCTRL_CACHE: expected a folder, found {chosen!r}: {error}") from error
+        raise InputError(f"expected a folder, found {chosen!r}: {error}", subject="SYNCTRL_CACHE") from error
     except OSError as error:
         raise CompilationError(
-            f"SYNCTRL_CACHE: {chosen!r} is relative to a working folder that cannot be found: {error}"
+            f"{chosen!r} is relative to a working folder that cannot be found: {error}",
+            subject="SYNCTRL_CACHE",
         ) from error
 
 
@@ -80,7 +81,9 @@ def open_cache() -> Path:
         check_writers(folder, os.stat(folder))
     except OSError as error:
         raise CompilationError(
-            f"the cache of compiled code, '{folder}', cannot be used: {error}; correct that, {_WAY_OUT}"
+            f"the cache of compiled code, '{folder}', cannot be used: {error}; correct that, {_WAY_OUT}",
+            file=folder,
+            found=error.strerror,
         ) from error
     return folder
 
@@ -178,7 +181,9 @@ def _refusal(place: Path, found: os.stat_result, fault: str, remedy: str) -> Com
     who = f"owner {owner}, mode {stat.S_IMODE(found.st_mode):04o}"
     return CompilationError(
         f"the cache of compiled code: '{place}' {fault} ({who}); "
-        f"code is only run from where nobody else can have put it: {remedy}, {_WAY_OUT}"
+        f"code is only run from where nobody else can have put it: {remedy}, {_WAY_OUT}",
+        file=place,
+        found=fault,
     )
 
 
@@ -262,7 +267,9 @@ def _executable_place(cache: Path) -> Path:
     if not _is_executable(other):
         raise CompilationError(
             f"nothing may be written and executed in the cache '{cache}', nor in '{other}' (mounted noexec, "
-            "or read-only?): name a folder where it may by SYNCTRL_CACHE or TMPDIR, or use engine='pinocchio'"
+            "or read-only?): name a folder where it may by SYNCTRL_CACHE or TMPDIR, or use "
+            "engine='pinocchio'",
+            file=cache,
         )
     _check_way(other)
     return other

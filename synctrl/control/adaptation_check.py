@@ -44,4 +44,4 @@ def _first_rate(controller: Controller, z: np.ndarray) -> Any:
 
 def _check_shape(where: str, found: Any, expected: tuple[int, ...]) -> None:
     if np.shape(found) != expected:
-        raise InputError(f"{where}: expected an array of shape {expected}, found {np.shape(found)}")
+        raise InputError(f"expected an array of shape {expected}, found {np.shape(found)}", subject=where)

@@ -177,12 +177,11 @@ class DiscreteController:
         kept = self.state
         if not isinstance(state, Mapping) or set(state) != set(kept):
             found = list(map(str, state)) if isinstance(state, Mapping) else type(state).__name__
-            raise InputError(f"state: expected arrays called {', '.join(sorted(kept))}, found {found}")
+            raise InputError(f"expected arrays {', '.join(sorted(kept))}, found {found}", subject="state")
         new = {name: finite_array(f"state, {name}", state[name], kept[name].shape) for name in kept}
         if new["period"] != self.period:
-            raise InputError(
-                f"state, period: expected that of the controller, {self.period:g} s, found {new['period']:g}"
-            )
+            own = f"expected that of the controller, {self.period:g} s"
+            raise InputError(f"{own}, found {new['period']:g}", subject="state, period")
         samples, held = (_count(name, float(new[name])) for name in ("samples", "held"))
         self.z, self.memory, self._tau = (new[k].copy() for k in ("z", self._memory_name, "tau"))
         self._t0, self._samples, self.held = float(new["start"]), samples, held
@@ -232,7 +231,8 @@ class DiscreteController:
     def _time(self, t: float) -> float:
         time = finite_number("t", t)
         if not abs(time / self.period - self._t0 / self.period) < LONGEST:
-            raise InputError(f"t: expected a time near the start at {self._t0:g} s, found {time:g} s")
+            near = f"expected a time near the start at {self._t0:g} s"
+            raise InputError(f"{near}, found {time:g} s", subject="t")
         return time
 
     def _missed(self, t: float) -> int:
@@ -295,5 +295,5 @@ class DiscreteController:
 
 def _count(name: str, value: float) -> int:
     if not 0 <= value < LONGEST or value != int(value):
-        raise InputError(f"state, {name}: expected a whole number of at least 0, found {value:g}")
+        raise InputError(f"expected a whole number of at least 0, found {value:g}", subject=f"state, {name}")
     return int(value)

@@ -48,7 +48,7 @@ class Gains:
             low = gain.min() if gain.size else 0.0
             if low < 0 or (positive and low == 0):
                 bound = "above 0" if positive else "of at least 0"
-                raise InputError(f"{name}: expected entries {bound}, found {low:g}")
+                raise InputError(f"expected entries {bound}, found {low:g}", subject=name)
             object.__setattr__(self, name, gain)
 
     def independent(self) -> Self:
@@ -64,7 +64,7 @@ class Gains:
         unknown = set(changes) - set(_SIGNS)
         if unknown:
             known, found = ", ".join(_SIGNS), ", ".join(sorted(unknown))
-            raise InputError(f"gains: expected some of {known}, found {found}")
+            raise InputError(f"expected some of {known}, found {found}", subject="gains")
         return replace(self, **changes)
 
     def as_dict(self) -> dict[str, Any]:
@@ -102,7 +102,7 @@ def spread(name: str, gain: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         InputError: the gain has other dimensions.
     """
     if not _fits(gain, shape):
-        raise InputError(f"{name}: expected a shape of {_shapes(shape)}, found {gain.shape}")
+        raise InputError(f"expected a shape of {_shapes(shape)}, found {gain.shape}", subject=name)
     return np.broadcast_to(gain, shape).copy()
 
 
@@ -121,13 +121,14 @@ def spread_rows(name: str, gain: np.ndarray | RaggedGain, lengths: Sequence[int]
     if isinstance(gain, RaggedGain):
         if gain.lengths != own:
             raise InputError(
-                f"{name}: expected a row for each robot, of {_listed(own)} entries, "
-                f"found rows of {_listed(gain.lengths)}"
+                f"expected a row for each robot, of {_listed(own)} entries, "
+                f"found rows of {_listed(gain.lengths)}",
+                subject=name,
             )
         return gain.padded()
     if not _fits(gain, shape):
         rows = "" if len(set(own)) == 1 else f", or a row for each robot, of {_listed(own)} entries"
-        raise InputError(f"{name}: expected a shape of {_shapes(shape)}{rows}, found {gain.shape}")
+        raise InputError(f"expected a shape of {_shapes(shape)}{rows}, found {gain.shape}", subject=name)
     return np.broadcast_to(gain, shape).copy()
 
 

@@ -32,7 +32,9 @@ def check_limits(limits: ArrayLike | None, shape: tuple[int, int]) -> np.ndarray
         return np.full(shape, np.inf)
     array = _numbers("torque_limits", limits, shape).copy()
     if not (array >= 0).all():
-        raise InputError(f"torque_limits: expected numbers of at least 0, found {array[~(array >= 0)][0]:g}")
+        raise InputError(
+            f"expected numbers of at least 0, found {array[~(array >= 0)][0]:g}", subject="torque_limits"
+        )
     return array
 
 
@@ -75,9 +77,9 @@ def _numbers(name: str, value: ArrayLike, shape: tuple[int, int]) -> np.ndarray:
             raise TypeError
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{name}: expected numbers, found {value!r}") from error
+        raise InputError(f"expected numbers, found {value!r}", subject=name) from error
     if array.shape != shape:
-        raise InputError(f"{name}: expected shape {shape}, one row per robot, found {array.shape}")
+        raise InputError(f"expected shape {shape}, one row per robot, found {array.shape}", subject=name)
     return array
 
 

@@ -48,7 +48,8 @@ class Messages:
         inside = bool(((times >= start - slack) & (times <= end + slack)).all())
         if not inside or (np.diff(times) < 0).any():
             raise InputError(
-                f"{where}: expected instants in order with {start:g} <= t < {end:g} s, found {times!s:.80}"
+                f"expected instants in order with {start:g} <= t < {end:g} s, found {times!s:.80}",
+                subject=where,
             )
         return times.tolist()
 
@@ -81,7 +82,7 @@ class Messages:
         found = np.asarray(network.meet(t, w, memory), dtype=float)
         where = f"network {type(network).__qualname__}, meet"
         if found.shape != memory.shape:
-            raise InputError(f"{where}: expected memory of shape {memory.shape}, found {found.shape}")
+            raise InputError(f"expected memory of shape {memory.shape}, found {found.shape}", subject=where)
         sound = np.isfinite(memory).all() and np.isfinite(w).all()
         if sound and not np.isfinite(found).all():
             raise NonFiniteError(

@@ -116,5 +116,5 @@ def connected(network: Network | None) -> Network:
     if network is None:
         return Ideal()
     if not hasattr(network, "bind") or isinstance(network, type):
-        raise InputError(f"network: expected, for example, Ideal(), found {network!r}")
+        raise InputError(f"expected, for example, Ideal(), found {network!r}", subject="network")
     return network

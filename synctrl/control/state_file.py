@@ -15,7 +15,7 @@ import numpy as np
 
 from ..checks import instance
 from ..errors import ResultError
-from ..files import whole_file
+from ..files import reported, whole_file
 
 #: bytes of an archive beside its arrays, per array: names, sizes and numpy's header
 OVERHEAD = 1024
@@ -33,11 +33,8 @@ def write_state(path: str | Path, state: Mapping[str, np.ndarray]) -> Path:
         ResultError: the file cannot be written.
     """
     instance("path", path, (str, Path), "a path")
-    try:
-        with whole_file(path) as file:
-            np.savez(file, **state)  # type: ignore[arg-type]
-    except OSError as error:
-        raise ResultError(f"cannot write the controller's state to '{path}': {error}") from error
+    with reported("write the controller's state to", path), whole_file(path) as file:
+        np.savez(file, **state)  # type: ignore[arg-type]
     return Path(path)
 
 
@@ -62,7 +59,7 @@ def read_state(path: str | Path, like: Mapping[str, np.ndarray]) -> dict[str, np
         with zipfile.ZipFile(BytesIO(data)) as archive:
             return _arrays(archive, like)
     except Exception as error:  # whatever a damaged archive makes its readers raise
-        raise ResultError(f"'{path}' has no state of this controller: {error}") from error
+        raise ResultError(f"'{path}' has no state of this controller: {error}", file=path) from error
 
 
 def _arrays(archive: zipfile.ZipFile, like: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -116,7 +116,7 @@ class Cell:
         instance("coupling", coupling, Coupling, "a Coupling")
         if coupling.robots != len(self.members):
             raise InputError(
-                f"coupling: made for {coupling.robots} robots, but the cell has {len(self.members)}"
+                f"made for {coupling.robots} robots, but the cell has {len(self.members)}", subject="coupling"
             )
         self.robots = tuple(member.robot for member in self.members)
         self.names = tuple(m.name or f"robot {i}" for i, m in enumerate(self.members, start=1))
@@ -213,7 +213,7 @@ class Cell:
             return member.q0
         if hasattr(self.space, "start"):
             return self.space.start(member.robot, member.trajectory(0.0).x)
-        raise InputError(f"{name}, q0: expected joint positions to start from, found none")
+        raise InputError("expected joint positions to start from, found none", subject=f"{name}, q0")
 
     def _check_members(self) -> None:
         for name, member in zip(self.names, self.members, strict=True):

@@ -111,7 +111,7 @@ class Coupling:
         """Differences of one robot and each other one; by default c = 1. The leader feels all of them."""
         instance("leader", leader, (int, np.integer), "the number of a robot")
         if not 0 <= leader < _count(n):
-            raise CouplingError(f"leader: expected a robot from 0 to {n - 1}, found {leader}")
+            raise CouplingError(f"expected a robot from 0 to {n - 1}, found {leader}", subject="leader")
         return cls._differences(n, graphs.star(n, leader), c, "star", unit)
 
     @classmethod
@@ -161,7 +161,8 @@ class Coupling:
         if a.min() <= 0:
             k = int(np.argmin(a))
             raise InputError(
-                f"edge_weights: expected numbers above 0, found {a[k]:g} at index {k}; leave that pair out"
+                f"expected numbers above 0, found {a[k]:g} at index {k}; leave that pair out",
+                subject="edge_weights",
             )
         return self._again(self.signs * a[:, None], self._source, self.unit)
 
@@ -281,7 +282,7 @@ class Coupling:
 def _count(n: int) -> int:
     instance("robots", n, (int, np.integer), "a number of robots")
     if isinstance(n, bool) or n < 2:
-        raise CouplingError(f"robots: a coupling compares at least 2 robots, found {n}")
+        raise CouplingError(f"a coupling compares at least 2 robots, found {n}", subject="robots")
     return int(n)
 
 

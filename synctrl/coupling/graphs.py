@@ -49,9 +49,11 @@ def read_graph(graph: Any) -> tuple[int, np.ndarray, np.ndarray]:
     elif isinstance(graph, Iterable):
         rows, n = [_row(edge) for edge in graph], None
     else:
-        raise InputError(f"graph: expected pairs of robots or a networkx graph, found {type(graph).__name__}")
+        raise InputError(
+            f"expected pairs of robots or a networkx graph, found {type(graph).__name__}", subject="graph"
+        )
     if not rows:
-        raise CouplingError("graph: expected at least one pair of robots, found none")
+        raise CouplingError("expected at least one pair of robots, found none", subject="graph")
     table = finite_array("graph", rows, (len(rows), 3))
     edges = indices("graph", table[:, :2])
     return int(edges.max()) + 1 if n is None else n, edges, table[:, 2]
@@ -65,7 +67,9 @@ def indices(name: str, value: np.ndarray) -> np.ndarray:
     """
     whole = value.astype(int)
     if (whole != value).any():
-        raise InputError(f"{name}: expected whole numbers of robots, found {value[whole != value][0]:g}")
+        raise InputError(
+            f"expected whole numbers of robots, found {value[whole != value][0]:g}", subject=name
+        )
     return whole
 
 
@@ -75,7 +79,9 @@ def check_rows(name: str, n: int, edges: np.ndarray, signs: np.ndarray) -> None:
     Raises, warns: see `Coupling`.
     """
     if not len(edges) or (edges.shape[1] != 2 and edges.shape != (1, n)):
-        raise CouplingError(f"edges: expected shape (p, 2) with p > 0, or (1, {n}), found {edges.shape}")
+        raise CouplingError(
+            f"expected shape (p, 2) with p > 0, or (1, {n}), found {edges.shape}", subject="edges"
+        )
     _find("robots 0 to {last}", np.any((edges < 0) | (edges >= n), axis=1), edges, n)
     ordered = np.sort(edges, axis=1)
     _find("different robots", (ordered[:, 1:] == ordered[:, :-1]).any(axis=1), edges, n)
@@ -92,7 +98,7 @@ def _find(expected: str, wrong: np.ndarray, edges: np.ndarray, n: int) -> None:
     if wrong.any():
         k = int(np.argmax(wrong))
         expected = expected.format(last=n - 1)
-        raise CouplingError(f"edge {k}, of robots {edges[k].tolist()}: expected {expected}")
+        raise CouplingError(f"expected {expected}", subject=f"edge {k}, of robots {edges[k].tolist()}")
 
 
 def _check_connected(w: np.ndarray) -> None:
@@ -155,23 +161,25 @@ def fits_all(edges: np.ndarray, signs: np.ndarray, w: np.ndarray) -> bool:
 def _networkx_rows(graph: Any) -> tuple[list[tuple[Any, Any, Any]], int]:
     if graph.is_directed():
         raise CouplingError(
-            "graph: expected an undirected graph, because a synchronization error acts on both its robots; "
-            "found a directed one, which to_undirected() converts"
+            "expected an undirected graph, because a synchronization error acts on both its robots; "
+            "found a directed one, which to_undirected() converts",
+            subject="graph",
         )
     n = graph.number_of_nodes()
     if set(graph.nodes) != set(range(n)):
         found = ", ".join(map(repr, list(graph.nodes)[:5]))
         raise CouplingError(
-            f"graph: expected the nodes 0 to {n - 1}, found {found}{', ...' if n > 5 else ''}; "
-            "networkx.convert_node_labels_to_integers renames them"
+            f"expected the nodes 0 to {n - 1}, found {found}{', ...' if n > 5 else ''}; "
+            "networkx.convert_node_labels_to_integers renames them",
+            subject="graph",
         )
     return [(i, j, weight) for i, j, weight in graph.edges(data="weight", default=1.0)], n
 
 
 def _row(edge: Any) -> tuple[Any, Any, Any]:
     if not isinstance(edge, Iterable) or isinstance(edge, str):
-        raise InputError(f"graph: expected pairs (i, j) or triples (i, j, weight), found {edge!r}")
+        raise InputError(f"expected pairs (i, j) or triples (i, j, weight), found {edge!r}", subject="graph")
     parts = tuple(edge)
     if len(parts) not in (2, 3):
-        raise InputError(f"graph: expected pairs (i, j) or triples (i, j, weight), found {edge!r}")
+        raise InputError(f"expected pairs (i, j) or triples (i, j, weight), found {edge!r}", subject="graph")
     return (*parts, 1.0)[:3]

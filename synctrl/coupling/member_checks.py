@@ -29,7 +29,7 @@ def check_names(cell: str, names: Sequence[str]) -> None:
         label("name", name)
     twice = [name for name, count in Counter(names).items() if count > 1]
     if twice:
-        raise InputError(f"name: expected another one for each robot, found {twice[0]!r} twice")
+        raise InputError(f"expected another one for each robot, found {twice[0]!r} twice", subject="name")
 
 
 def check_labels(cell: Any) -> None:
@@ -44,9 +44,13 @@ def check_labels(cell: Any) -> None:
     for axis in cell.labels:
         label("space: name of a coordinate", axis)
         if not axis.strip():
-            raise InputError(f"space: expected a word as the name of every coordinate, found {axis!r}")
+            raise InputError(
+                f"expected a word as the name of every coordinate, found {axis!r}", subject="space"
+            )
     if len({*cell.labels}) < len(cell.labels):
-        raise InputError(f"space: expected coordinates of different names, found {', '.join(cell.labels)}")
+        raise InputError(
+            f"expected coordinates of different names, found {', '.join(cell.labels)}", subject="space"
+        )
     for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True):
         for word in (robot.name, *robot.joint_names, *parameters.names):
             label(f"{name}: name of a joint or parameter", word)
@@ -59,7 +63,9 @@ def check_space(space: Any) -> None:
         InputError: no object with `labels`, `unit` and `bind`.
     """
     if isinstance(space, type) or not all(hasattr(space, part) for part in ("labels", "unit", "bind")):
-        raise InputError(f"space: expected a space, for example CartesianSpace('xy'), found {space!r}")
+        raise InputError(
+            f"expected a space, for example CartesianSpace('xy'), found {space!r}", subject="space"
+        )
 
 
 def check_trajectory(name: str, trajectory: Any, labels: tuple[str, ...]) -> None:
@@ -74,17 +80,19 @@ def check_trajectory(name: str, trajectory: Any, labels: tuple[str, ...]) -> Non
         InputError: no trajectory, another dimension, or a motion at t = 0 that is not finite.
     """
     if not callable(trajectory) or not hasattr(trajectory, "dimension") or not hasattr(trajectory, "breaks"):
-        raise InputError(f"{name}, trajectory: expected a trajectory such as Hold, found {trajectory!r}")
+        raise InputError(
+            f"expected a trajectory such as Hold, found {trajectory!r}", subject=f"{name}, trajectory"
+        )
     m = len(labels)
     if trajectory.dimension != m:
         raise InputError(
-            f"{name}, trajectory: expected {m} coordinates ({', '.join(labels)}), "
-            f"found {trajectory.dimension}"
+            f"expected {m} coordinates ({', '.join(labels)}), found {trajectory.dimension}",
+            subject=f"{name}, trajectory",
         )
     motion = trajectory(np.zeros(1))
     if not isinstance(motion, tuple) or len(motion) != 3:
         raise InputError(
-            f"{name}, trajectory: expected position, velocity and acceleration, found {motion!r}"
+            f"expected position, velocity and acceleration, found {motion!r}", subject=f"{name}, trajectory"
         )
     for part, value in zip(MOTION_PARTS, motion, strict=True):
         finite_array(f"{name}, trajectory, {part} at t = 0 s", value, (1, m))
@@ -100,6 +108,6 @@ def check_friction(name: str, friction: Any, robot: Robot) -> None:
     for part, coefficients in (("viscous", friction.viscous), ("coulomb", friction.coulomb)):
         if coefficients.shape not in ((), (robot.nv,)):
             raise InputError(
-                f"{name}, friction, {part}: expected a number or shape ({robot.nv},), "
-                f"found {coefficients.shape}"
+                f"expected a number or shape ({robot.nv},), found {coefficients.shape}",
+                subject=f"{name}, friction, {part}",
             )

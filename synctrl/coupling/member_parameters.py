@@ -43,11 +43,15 @@ def member_parameters(name: str, robot: Robot, friction: Friction, given: Any) -
         try:
             return parameters_of("full" if given is None else given, robot)
         except InputError as error:
-            raise InputError(f"{name}, {error}") from None
+            unknown = InputError(f"{name}, {error}")
+            unknown.subject = f"{name}, {error.subject}"
+            raise unknown from None
     parameters = _with_friction(name, friction, given)
     parts = ("names", "theta", "regressor")
     if isinstance(parameters, type) or not all(hasattr(parameters, part) for part in parts):
-        raise InputError(f"{name}, parameters: expected, for example, FullParameters, found {given!r}")
+        raise InputError(
+            f"expected, for example, FullParameters, found {given!r}", subject=f"{name}, parameters"
+        )
     _check_sizes(name, parameters, robot)
     _check_truth(name, parameters, robot, friction)
     _check_map(name, parameters, robot)
@@ -62,7 +66,7 @@ def _with_friction(name: str, friction: Friction, given: Any) -> Any:
         try:
             return given.with_friction(friction)
         except InputError as error:
-            raise InputError(f"{name}, parameters: {error}") from None
+            raise InputError(f"{error}", subject=f"{name}, parameters") from None
     if given.friction is not friction:
         _check_agreement(name, friction, given.friction)
     return given
@@ -71,8 +75,9 @@ def _with_friction(name: str, friction: Friction, given: Any) -> Any:
 def _check_agreement(name: str, friction: Friction, stated: Friction) -> None:
     if not friction.equals(stated):
         raise InputError(
-            f"{name}, parameters: FrictionParameters say {stated}, but the member's friction is {friction}; "
-            "expected the true friction stated once, as Member(friction=...)"
+            f"FrictionParameters say {stated}, but the member's friction is {friction}; "
+            "expected the true friction stated once, as Member(friction=...)",
+            subject=f"{name}, parameters",
         )
     warn(
         f"{name}: its friction is stated twice; give it to the member alone, FrictionParameters(robot) takes "
@@ -86,16 +91,17 @@ def _check_sizes(name: str, parameters: Any, robot: Robot) -> None:
     expected, still = (robot.nv, len(theta)), np.zeros(robot.nv)
     if len(parameters.names) != len(theta):
         raise InputError(
-            f"{name}, parameters: expected a name for each of {len(theta)} values, "
-            f"found {len(parameters.names)}"
+            f"expected a name for each of {len(theta)} values, found {len(parameters.names)}",
+            subject=f"{name}, parameters",
         )
     try:
         found = np.shape(parameters.regressor(still, still, still, still))
     except ValueError as error:
-        raise InputError(f"{name}, parameters: they belong to another robot: {error}") from error
+        raise InputError(f"they belong to another robot: {error}", subject=f"{name}, parameters") from error
     if found != expected:
         raise InputError(
-            f"{name}, parameters: expected a regressor of shape {expected} for '{robot.name}', found {found}"
+            f"expected a regressor of shape {expected} for '{robot.name}', found {found}",
+            subject=f"{name}, parameters",
         )
 
 
@@ -104,12 +110,13 @@ def _check_truth(name: str, parameters: Any, robot: Robot, friction: Friction) -
     states = _states(robot)
     found = np.array([parameters.regressor(q, v, v, a) @ parameters.theta for q, v, a in states])
     if not np.isfinite(found).all():
-        raise InputError(f"{name}, parameters: expected a finite regressor, found one that is not")
+        raise InputError("expected a finite regressor, found one that is not", subject=f"{name}, parameters")
     off = min((_difference(found, torque) for torque in _torques(robot, friction, states)), key=max)
     if off[0] > 1:
         raise InputError(
-            f"{name}, parameters: Y theta differs from the torque of robot '{robot.name}', as it is placed, "
-            f"by {off[1]:.3g} N·m; expected parameters made for this robot, with its true values"
+            f"Y theta differs from the torque of robot '{robot.name}', as it is placed, "
+            f"by {off[1]:.3g} N·m; expected parameters made for this robot, with its true values",
+            subject=f"{name}, parameters",
         )
 
 
@@ -122,8 +129,9 @@ def _check_map(name: str, parameters: Any, robot: Robot) -> None:
         here, there = (made.regressor(q, v, 0.5 * v, a) for made in (robot, rigid.robot))
         if here.shape != there.shape or np.abs(here - there).max() > 1e-9 * np.abs(here).max():
             raise InputError(
-                f"{name}, parameters: made for robot '{rigid.robot.name}', whose regressor is another one; "
-                f"expected parameters made for robot '{robot.name}', as it is placed"
+                f"made for robot '{rigid.robot.name}', whose regressor is another one; "
+                f"expected parameters made for robot '{robot.name}', as it is placed",
+                subject=f"{name}, parameters",
             )
 
 

@@ -68,8 +68,9 @@ def _error(cell: Cell, name: str, order: int, misfit: Misfit) -> TrajectoryError
     per = ("/s", "/s^2")[order - 1]
     function, derivative = MOTION_PARTS[order - 1 : order + 1]
     return TrajectoryError(
-        f"{name}, trajectory: its {derivative} along {label} does not fit its {function}: near "
+        f"its {derivative} along {label} does not fit its {function}: near "
         f"t = {misfit.time:.6g} s found {misfit.found:.6g} {unit}{per}, but the {function} changes by "
         f"{misfit.expected:.6g} {unit}{per}; expected its derivative, which SmoothTrajectory finds by "
-        "itself, or `breaks` where it jumps"
+        "itself, or `breaks` where it jumps",
+        subject=f"{name}, trajectory",
     )

@@ -79,7 +79,7 @@ def inverse_kinematics(
     instance("robot", robot, Robot, "a Robot, for example from load_robot")
     if isinstance(space, type) or not hasattr(space, "miss"):
         raise InputError(
-            f"space: expected a CartesianSpace, a PoseSpace or another with `miss`, found {space!r}"
+            f"expected a CartesianSpace, a PoseSpace or another with `miss`, found {space!r}", subject="space"
         )
     target, q = finite_array("target", target, (_dimension(space, robot),)), finite_array("q", q, (robot.nv,))
     rng = np.random.default_rng(0)

@@ -59,7 +59,7 @@ class ConstantWeights:
     def __init__(self, c: ArrayLike):
         self.c = finite_array("c", c)
         if self.c.ndim not in (1, 2, 3):
-            raise InputError(f"c: expected shape (n,), (n, m) or (n, m, m), found {self.c.shape}")
+            raise InputError(f"expected shape (n,), (n, m) or (n, m, m), found {self.c.shape}", subject="c")
         self.robots = len(self.c)
         self._known: dict[int, Weights] = {}
 
@@ -104,8 +104,9 @@ class FunctionWeights:
         value = self.function(float(t))
         if not isinstance(value, (tuple, list)) or len(value) != 3:
             raise CouplingError(
-                f"c: expected a function of t returning c, c' and c'', found {value!r}; "
-                "SmoothWeights.from_function takes one that returns c alone"
+                f"expected a function of t returning c, c' and c'', found {value!r}; "
+                "SmoothWeights.from_function takes one that returns c alone",
+                subject="c",
             )
         try:
             parts = [finite_array(name, part) for name, part in zip(DERIVATIVES, value, strict=True)]
@@ -115,7 +116,7 @@ class FunctionWeights:
                     f"expected one weight for each of {self.robots} robots, found shapes {found}"
                 )
         except InputError as error:
-            raise CouplingError(f"weights at t = {t:g} s: {error}") from error
+            raise CouplingError(f"{error}", subject=f"weights at t = {t:g} s") from error
         return parts
 
 
@@ -187,7 +188,9 @@ def as_source(robots: int, c: ArrayLike | WeightFunction | WeightSource) -> Weig
     else:
         source = ConstantWeights(c)
     if source.robots != robots:
-        raise InputError(f"c: expected one weight for each of {robots} robots, found {source.robots}")
+        raise InputError(
+            f"expected one weight for each of {robots} robots, found {source.robots}", subject="c"
+        )
     return source
 
 
@@ -200,7 +203,7 @@ def as_matrices(c: np.ndarray, m: int) -> np.ndarray:
         return c[:, :, None] * np.eye(m)
     if c.shape == (n, m, m):
         return c.copy()
-    raise InputError(f"c: expected shape ({n},), ({n}, {m}) or ({n}, {m}, {m}), found {c.shape}")
+    raise InputError(f"expected shape ({n},), ({n}, {m}) or ({n}, {m}, {m}), found {c.shape}", subject="c")
 
 
 def geometric_mean(c: np.ndarray) -> float:

@@ -23,7 +23,7 @@ from ..robots.robot import Robot, load_robot
 from ..simulation.simulate import Experiment
 from ..tasks.spaces import JointSpace
 from ..tasks.trajectories import Cubic
-from .parts import Parts, chosen_gains
+from .parts import ControllerParts, ready_experiment
 
 INITIAL = np.deg2rad([[73.3340, 60.3330, -169.8120], [15.2520, 71.6830, -181.9800]])  # Table I
 FINAL = np.deg2rad([[90.0, 63.6090, -174.7290], [-2.9730, 74.1070, -185.1080]])
@@ -42,10 +42,8 @@ def a460_pair(
     synchronized: bool = True,
     friction: bool = True,
     gains: Gains | None = None,
-    reference_acceleration: str | None = None,
-    k_r_space: str | None = None,
     adapt_friction: bool = False,
-    **parts: Unpack[Parts],
+    **parts: Unpack[ControllerParts],
 ) -> Experiment:
     """The two-arm cell of section V-A, in joint space with epsilon = e_1 - e_2, eq. (45).
 
@@ -53,30 +51,18 @@ def a460_pair(
         synchronized: False sets beta = K_eps = 0, the paper's independent adaptive control.
         friction: whether the plant has friction, which is outside the controller's model.
         gains: by default the paper's.
-        reference_acceleration, k_r_space: see `Controller`.
         adapt_friction: whether the controller's model has friction too, see `FrictionParameters`.
-        parts: `adaptation`, `law`, `network`, see `Experiment`.
+        parts: parts and options of the controller, see `ControllerParts`.
     """
-    words = {"synchronized": synchronized, "friction": friction, "adapt_friction": adapt_friction}
-    for name, value in words.items():
-        boolean(name, value)
+    boolean("friction", friction)
+    boolean("adapt_friction", adapt_friction)
     robot = load_robot("a460")
     members = [_member(robot, i, FRICTION if friction else Friction()) for i in range(2)]
     if adapt_friction:
         members = [_knowing_friction(member) for member in members]
-    gains = chosen_gains(gains, _gains(adapt_friction), parts)
-    kind = "synchronized" if synchronized else "independent"
-    return Experiment(
-        Cell(members, Coupling.pair(c=(1.0, -1.0)), JointSpace(), name="A460 pair"),
-        gains if synchronized else gains.independent(),
-        DURATION,
-        (),
-        reference_acceleration,
-        k_r_space,
-        **parts,
-        title=f"A460 pair, {kind}{'' if friction else ', without friction'}"
-        f"{', friction adapted' if adapt_friction else ''}",
-    )
+    cell = Cell(members, Coupling.pair(c=(1.0, -1.0)), JointSpace(), name="A460 pair")
+    remarks = [*["without friction"] * (not friction), *["friction adapted"] * adapt_friction]
+    return ready_experiment(cell, DURATION, _gains(adapt_friction), gains, synchronized, parts, *remarks)
 
 
 def _member(robot: Robot, i: int, friction: Friction) -> Member:

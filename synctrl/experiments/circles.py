@@ -21,7 +21,7 @@ from ..simulation.simulate import Experiment
 from ..tasks.redundancy import Redundancy
 from ..tasks.spaces import CartesianSpace
 from ..tasks.trajectories import Circle
-from .parts import Parts, chosen_gains
+from .parts import ControllerParts, ready_experiment
 
 FORMATION = 0.30  # m, distance of every circle's centre from the middle
 HEIGHT = 0.40  # m
@@ -63,21 +63,14 @@ def circle_cell(
     name: str,
     gains: Gains | None,
     synchronized: bool,
-    parts: Parts | None = None,
+    parts: ControllerParts | None = None,
 ) -> Experiment:
     """Robots at equal angles around the middle, each on its circle, coupled in a ring."""
-    parts = Parts() if parts is None else parts
-    gains = chosen_gains(gains, _gains(stations), parts)
     postures = [np.array(station.posture) for station in stations]
     members = [_member(s, 2 * np.pi * i / len(stations), OFFSETS[i]) for i, s in enumerate(stations)]
     space = CartesianSpace("xyz", redundancy=Redundancy(postures, POSTURE_GAIN))
-    return Experiment(
-        Cell(members, Coupling.ring(len(stations)), space, name=name),
-        gains if synchronized else gains.independent(),
-        DURATION,
-        title=f"{name}, {'synchronized' if synchronized else 'independent'}",
-        **parts,
-    )
+    cell = Cell(members, Coupling.ring(len(stations)), space, name=name)
+    return ready_experiment(cell, DURATION, _gains(stations), gains, synchronized, parts or ControllerParts())
 
 
 def _gains(stations: Sequence[Station]) -> Gains:

@@ -8,7 +8,7 @@ from ..control.gains import Gains
 from ..simulation.simulate import Experiment
 from .circles import Station, circle_cell
 from .panda_four import DISTANCE, K_R, POSTURE
-from .parts import Parts
+from .parts import ControllerParts
 
 UR_POSTURE = (0.0, -1.3, 1.9, -2.17, -1.57, 0.0)
 STATIONS = (
@@ -21,7 +21,9 @@ STATIONS = (
 )
 
 
-def mixed_four(synchronized: bool = True, gains: Gains | None = None, **parts: Unpack[Parts]) -> Experiment:
+def mixed_four(
+    synchronized: bool = True, gains: Gains | None = None, **parts: Unpack[ControllerParts]
+) -> Experiment:
     """Arms with six and with seven joints on tilted circles, position only: the rest is free for a posture.
 
     Without friction, and with 0.7 of the true inertial parameters as the first estimate.
@@ -29,6 +31,6 @@ def mixed_four(synchronized: bool = True, gains: Gains | None = None, **parts: U
     Args:
         synchronized: False sets beta = K_eps = 0, independent adaptive control.
         gains: by default ones that converge within the run.
-        parts: `adaptation`, `law`, `network`, see `Experiment`.
+        parts: parts and options of the controller, see `ControllerParts`.
     """
     return circle_cell(STATIONS, "mixed cell", gains, synchronized, parts)

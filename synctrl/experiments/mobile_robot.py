@@ -31,7 +31,7 @@ from ..simulation.disturbances import Disturbance
 from ..simulation.simulate import Experiment
 from ..tasks.spaces import JointSpace
 from ..tasks.trajectories import Motion
-from .parts import Parts, chosen_gains
+from .parts import ControllerParts, ready_experiment
 
 WHEEL_RADIUS, TRACK = 0.1, 0.4  # m
 INERTIA = 0.05  # kg·m^2, about the axle
@@ -93,7 +93,10 @@ def wheel_synchronization() -> SynchronizationFunction:
 
 
 def mobile_robot(
-    synchronized: bool = True, disturbed: bool = True, gains: Gains | None = None, **parts: Unpack[Parts]
+    synchronized: bool = True,
+    disturbed: bool = True,
+    gains: Gains | None = None,
+    **parts: Unpack[ControllerParts],
 ) -> Experiment:
     """Two wheels, each a robot with one joint, on a path whose radii change with time.
 
@@ -101,20 +104,15 @@ def mobile_robot(
         synchronized: False sets beta = K_eps = 0.
         disturbed: whether the left wheel meets an obstacle, -1.5 N·m for 3 <= t < 3.5 s.
         gains: by default ours.
-        parts: `adaptation`, `law`, `network`, see `Experiment`.
+        parts: parts and options of the controller, see `ControllerParts`.
     """
     wheel = load_robot("wheel")
     members = [_member(wheel, i) for i in range(2)]
     coupling = wheel_synchronization().coupling([member.trajectory for member in members], DURATION)
-    gains = chosen_gains(gains, GAINS, parts)
-    kind = "synchronized" if synchronized else "independent"
-    return Experiment(
-        Cell(members, coupling, JointSpace(), name="wheels of a mobile robot"),
-        gains if synchronized else gains.independent(),
-        DURATION,
-        (OBSTACLE,) if disturbed else (),
-        title=f"wheels of a mobile robot, {kind}{', disturbed' if disturbed else ''}",
-        **parts,
+    cell = Cell(members, coupling, JointSpace(), name="wheels of a mobile robot")
+    remarks, disturbances = (("disturbed",), (OBSTACLE,)) if disturbed else ((), ())
+    return ready_experiment(
+        cell, DURATION, GAINS, gains, synchronized, parts, *remarks, disturbances=disturbances
     )
 
 

@@ -11,7 +11,7 @@ from typing import Unpack
 
 import numpy as np
 
-from ..checks import boolean, choice, finite_number
+from ..checks import choice, finite_number
 from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
@@ -22,7 +22,7 @@ from ..simulation.disturbances import Disturbance
 from ..simulation.simulate import Experiment
 from ..tasks.spaces import CartesianSpace
 from ..tasks.trajectories import ExponentialApproach
-from .parts import Parts, chosen_gains
+from .parts import ControllerParts, ready_experiment
 
 R, D = 5.0, 1.0  # m
 TURN = 0.02  # rad, how far each desired path goes along its circle
@@ -45,9 +45,7 @@ def planar_four(
     phi: float = 0.1,
     radii: str = "text",
     gains: Gains | None = None,
-    reference_acceleration: str | None = None,
-    k_r_space: str | None = None,
-    **parts: Unpack[Parts],
+    **parts: Unpack[ControllerParts],
 ) -> Experiment:
     """The four-arm cell of section V-B, in Cartesian space with the ring (47)-(48).
 
@@ -58,29 +56,22 @@ def planar_four(
         radii: "text" puts robots 2 and 3 on the larger circle as (46) and (47) do, "table" 2 and 4 as
             Table II.
         gains: by default the paper's.
-        reference_acceleration, k_r_space: see `Controller`.
-        parts: `adaptation`, `law`, `network`, see `Experiment`.
+        parts: parts and options of the controller, see `ControllerParts`.
 
     Raises:
         InputError: an unknown word, or a number that is not finite.
         UnreachableError: on simulation, when phi puts the paths out of reach.
     """
-    boolean("synchronized", synchronized)
     phi = finite_number("phi", phi)
     radii = choice("radii", radii, tuple(RADII))
     arm = load_robot("planar2r")
     members = [_member(arm, i, phi, RADII[radii][i]) for i in range(4)]
     coupling = Coupling.ring(4, c=(R + D, -R, R, -(R + D)), unit="m")
-    gains = chosen_gains(gains, GAINS, parts)
-    return Experiment(
-        Cell(members, coupling, CartesianSpace("xy"), name="four planar arms"),
-        gains if synchronized else gains.independent(),
-        DURATION,
-        _disturbances(disturbance),
-        reference_acceleration,
-        k_r_space,
-        **parts,
-        title=_title(synchronized, disturbance),
+    cell = Cell(members, coupling, CartesianSpace("xy"), name="four planar arms")
+    remarks = () if disturbance is None else ("disturbed",)
+    disturbances = _disturbances(disturbance)
+    return ready_experiment(
+        cell, DURATION, GAINS, gains, synchronized, parts, *remarks, disturbances=disturbances
     )
 
 
@@ -112,9 +103,6 @@ def _disturbances(disturbance: str | Disturbance | Sequence[Disturbance] | None)
         return (disturbance,)
     if isinstance(disturbance, Sequence) and not isinstance(disturbance, str):
         return tuple(disturbance)
-    raise InputError(f"disturbance: expected None, 'torque' or Disturbance objects, found {disturbance!r}")
-
-
-def _title(synchronized: bool, disturbance: object) -> str:
-    kind = "synchronized" if synchronized else "independent"
-    return f"four planar arms, {kind}{', disturbed' if disturbance is not None else ''}"
+    raise InputError(
+        f"expected None, 'torque' or Disturbance objects, found {disturbance!r}", subject="disturbance"
+    )

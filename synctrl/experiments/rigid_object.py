@@ -22,7 +22,7 @@ from ..simulation.disturbances import Disturbance
 from ..simulation.simulate import Experiment
 from ..tasks.spaces import CartesianSpace
 from ..tasks.trajectories import Circle
-from .parts import Parts, chosen_gains
+from .parts import ControllerParts, ready_experiment
 
 A = np.array([-0.3, 0.0])  # m, x_1 - x_2
 BASES = ((-0.35, 0.0, 0.0), (0.35, 0.0, 0.0))  # m
@@ -43,7 +43,10 @@ def object_synchronization() -> SynchronizationFunction:
 
 
 def rigid_object(
-    synchronized: bool = True, disturbed: bool = True, gains: Gains | None = None, **parts: Unpack[Parts]
+    synchronized: bool = True,
+    disturbed: bool = True,
+    gains: Gains | None = None,
+    **parts: Unpack[ControllerParts],
 ) -> Experiment:
     """Two arms and the object between them, in Cartesian space.
 
@@ -51,19 +54,14 @@ def rigid_object(
         synchronized: False sets beta = K_eps = 0.
         disturbed: whether the first arm is pushed, 1 N·m on both joints for 2 <= t < 2.2 s.
         gains: by default ours.
-        parts: `adaptation`, `law`, `network`, see `Experiment`.
+        parts: parts and options of the controller, see `ControllerParts`.
     """
     members = [_member(i) for i in range(2)]
     coupling = object_synchronization().coupling([member.trajectory for member in members], DURATION)
-    gains = chosen_gains(gains, GAINS, parts)
-    kind = "synchronized" if synchronized else "independent"
-    return Experiment(
-        Cell(members, coupling, SPACE, name="rigid object"),
-        gains if synchronized else gains.independent(),
-        DURATION,
-        (PUSH,) if disturbed else (),
-        title=f"rigid object, {kind}{', disturbed' if disturbed else ''}",
-        **parts,
+    cell = Cell(members, coupling, SPACE, name="rigid object")
+    remarks, disturbances = (("disturbed",), (PUSH,)) if disturbed else ((), ())
+    return ready_experiment(
+        cell, DURATION, GAINS, gains, synchronized, parts, *remarks, disturbances=disturbances
     )
 
 

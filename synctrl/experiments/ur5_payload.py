@@ -21,7 +21,7 @@ from ..tasks.pose import PoseSpace
 from ..tasks.poses import Attached, AxisRotation, PoseTrajectory
 from ..tasks.rotations import exp
 from ..tasks.trajectories import FunctionTrajectory
-from .parts import Parts, chosen_gains
+from .parts import ControllerParts, ready_experiment
 
 DISTANCE = 0.65  # m, of each base from the middle
 LENGTH = 0.40  # m, of the payload: from hand to hand
@@ -44,7 +44,9 @@ GAINS = Gains(
 )
 
 
-def ur5_payload(synchronized: bool = True, gains: Gains | None = None, **parts: Unpack[Parts]) -> Experiment:
+def ur5_payload(
+    synchronized: bool = True, gains: Gains | None = None, **parts: Unpack[ControllerParts]
+) -> Experiment:
     """The two-arm cell in pose space, with epsilon = e_1 - e_2 in position and orientation.
 
     Without friction, and with 0.7 of the true inertial parameters as the first estimate. The arms start at
@@ -53,17 +55,11 @@ def ur5_payload(synchronized: bool = True, gains: Gains | None = None, **parts: 
     Args:
         synchronized: False sets beta = K_eps = 0, independent adaptive control.
         gains: by default ones that converge within the run.
-        parts: `adaptation`, `law`, `network`, see `Experiment`.
+        parts: parts and options of the controller, see `ControllerParts`.
     """
-    gains = chosen_gains(gains, GAINS, parts)
-    kind = "synchronized" if synchronized else "independent"
-    return Experiment(
-        Cell([_member(i) for i in range(2)], Coupling.pair(), PoseSpace(), name="UR5 pair with payload"),
-        gains if synchronized else gains.independent(),
-        DURATION,
-        title=f"UR5 pair with payload, {kind}",
-        **parts,
-    )
+    members = [_member(i) for i in range(2)]
+    cell = Cell(members, Coupling.pair(), PoseSpace(), name="UR5 pair with payload")
+    return ready_experiment(cell, DURATION, GAINS, gains, synchronized, parts)
 
 
 def payload_motion() -> PoseTrajectory:

@@ -89,7 +89,7 @@ def compare(experiment: Experiment, scaled: Sequence[str] = ("Lambda",), **optio
     bench = Bench(experiment, options)
     gains, independent = experiment.gains, experiment.gains.independent()
     if not (gains.beta.any() or gains.K_eps.any()):
-        raise InputError("experiment: expected a synchronized controller, found beta = K_eps = 0")
+        raise InputError("expected a synchronized controller, found beta = K_eps = 0", subject="experiment")
     ours = bench.trial("synchronized", gains)
     match = match_peak_torque(bench, ours.peak_torque, scaled)
     matched = f"independent, {' and '.join(map(_symbol, scaled))} times {match.factor:.3g}"

@@ -14,18 +14,19 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any, Self
 
-from ..errors import ResultError, SimulationError, StepWarning
+from ..errors import SimulationError, StepWarning
+from ..files import reported
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 
 LAYOUT = "{desc:36} {percentage:3.0f}% |{bar}| {n:.1f}/{total:g} s  [{elapsed}]"
 INTERVAL = 0.1  # s between two reports of a run
-#: tells the parent how far a run is; set when a process starts, for it cannot be handed over with a job
+#: tells the parent how far a run is; set when a process starts, for it cannot be handed over with a run
 _report: Any = None
 
 
 @dataclass(frozen=True)
-class Job:
+class PlannedRun:
     """A run to be made: how its experiment is built, how long it takes, and what computes the plant."""
 
     make: Callable[[], Experiment]
@@ -37,13 +38,13 @@ class Job:
         return replace(self, duration=min(duration, self.duration or self.make().duration))
 
 
-def run_all(folder: Path, workers: int, jobs: Mapping[str, Job]) -> dict[str, Result]:
+def run_all(folder: Path, workers: int, planned: Mapping[str, PlannedRun]) -> dict[str, Result]:
     """Make runs, with a progress bar each in simulated seconds, and save each as soon as it is complete.
 
     Args:
         folder: where the `.npz` files go.
         workers: number of processes.
-        jobs: the runs by name, which is also that of the file.
+        planned: the runs by name, which is also that of the file.
 
     Raises:
         SimulationError: a run had to stop, or its process was killed; the others are saved, and of a run that
@@ -54,7 +55,7 @@ def run_all(folder: Path, workers: int, jobs: Mapping[str, Job]) -> dict[str, Re
     context = get_context("spawn")
     events = context.SimpleQueue()
     with ProcessPoolExecutor(workers, context, initializer=_start, initargs=(events.put,)) as pool:
-        futures = {name: pool.submit(_work, name, job, folder) for name, job in jobs.items()}
+        futures = {name: pool.submit(_work, name, run, folder) for name, run in planned.items()}
         try:
             _watch(futures, events)
         except KeyboardInterrupt:
@@ -111,15 +112,15 @@ def _start(report: Callable) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _work(name: str, job: Job, folder: Path) -> Path:
+def _work(name: str, run: PlannedRun, folder: Path) -> Path:
     """Make one run, in one of the processes."""
-    experiment, path = job.make(), folder / f"{name}.npz"
-    duration = job.duration or experiment.duration
+    experiment, path = run.make(), folder / f"{name}.npz"
+    duration = run.duration or experiment.duration
     try:
         progress = _reporter(name, duration)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StepWarning)  # the page has a section on steps
-            return experiment.simulate(duration, plant=job.plant, progress=progress).save(path)
+            return experiment.simulate(duration, plant=run.plant, progress=progress).save(path)
     except SimulationError as error:
         if error.result is not None:
             error.result.save(path)
@@ -143,9 +144,6 @@ def _reporter(name: str, duration: float) -> Callable[[float], None]:
 
 def _check_writable(folder: Path) -> None:
     """Fail before anything runs where nothing could be saved."""
-    try:
+    with reported("write into the folder", folder):
         folder.mkdir(parents=True, exist_ok=True)
-        with TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise ResultError(f"cannot write into the folder '{folder}': {error.strerror or error}") from error
+        TemporaryFile(dir=folder).close()

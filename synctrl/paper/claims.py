@@ -8,8 +8,8 @@ paper's; `MUCH` and the other constants below say what we ask for.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +29,8 @@ LITTLE = 0.10
 ALONG = 0.9
 
 
-class Quantity(NamedTuple):
+@dataclass(frozen=True)
+class Finding:
     """A computed figure behind a verdict."""
 
     name: str
@@ -52,19 +53,12 @@ class Claim:
     text: str
     source: str
     holds: bool
-    figures: tuple[Quantity, ...]
+    figures: tuple[Finding, ...]
     explanation: str
 
     def as_data(self) -> dict[str, Any]:
         """Plain data for a JSON file."""
-        figures = [quantity._asdict() for quantity in self.figures]
-        return {
-            "text": self.text,
-            "source": self.source,
-            "holds": self.holds,
-            "figures": figures,
-            "explanation": self.explanation,
-        }
+        return asdict(self)
 
 
 def sync_error_is_much_smaller(synchronized: Result, independent: Result, source: str) -> Claim:
@@ -72,7 +66,7 @@ def sync_error_is_much_smaller(synchronized: Result, independent: Result, source
     ours, theirs = metrics(synchronized).sync_error, metrics(independent).sync_error
     peak, rms = theirs.peak / ours.peak, theirs.rms / ours.rms
     figures = [
-        Quantity(f"{name} of {error_name(synchronized, *at)}, independent / synchronized", value)
+        Finding(f"{name} of {error_name(synchronized, *at)}, independent / synchronized", value)
         for name, ratios in (("peak", peak), ("RMS", rms))
         for at, value in extremes(ratios)
     ]
@@ -94,9 +88,9 @@ def errors_converge(run: Result, source: str) -> Claim:
         source,
         bool(max(tracking, sync) <= CONVERGED),
         (
-            Quantity("late tracking error / peak", tracking),
-            Quantity("late synchronization error / peak", sync),
-            Quantity("length of the run", run.t[-1], "s"),
+            Finding("late tracking error / peak", tracking),
+            Finding("late synchronization error / peak", sync),
+            Finding("length of the run", run.t[-1], "s"),
         ),
         f"Asked: over the last tenth of the run at most {CONVERGED:.0%} of each peak left. A run of finite "
         "length can show decay, not the limit; the limit is the theorem's.",
@@ -112,9 +106,10 @@ def need(runs: Mapping[str, Result], *names: str) -> list[Result]:
     Raises:
         InputError: one is missing.
     """
-    missing = [name for name in names if name not in runs]
+    missing = tuple(name for name in names if name not in runs)
     if missing:
-        raise InputError(f"claims: expected runs {', '.join(names)}; missing: {', '.join(missing)}")
+        words = f"expected runs {', '.join(names)}; missing: {', '.join(missing)}"
+        raise InputError(words, subject="claims", found=missing)
     return [runs[name] for name in names]
 
 
@@ -137,7 +132,7 @@ def common(a: Result, b: Result) -> tuple[np.ndarray, np.ndarray]:
     """Instants that both runs have, and the first run's synchronization errors there."""
     t = a.t if len(a.t) < len(b.t) else b.t
     if not np.array_equal(a.t[: len(t)], b.t[: len(t)]):
-        raise InputError("claims: expected two runs logged at the same instants")
+        raise InputError("expected two runs logged at the same instants", subject="claims")
     return t, a.sync_error[: len(t)]
 
 

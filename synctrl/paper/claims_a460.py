@@ -12,7 +12,7 @@ from .claims import (
     MUCH,
     REACHED,
     Claim,
-    Quantity,
+    Finding,
     common,
     errors_converge,
     kind,
@@ -34,8 +34,8 @@ def arms_reach_their_targets(run: Result) -> Claim:
         f"section V-A, {'Figs. 2 and 3' if kind(run) == 'synchronized' else 'Figs. 5 and 6'}",
         bool(share.max() <= REACHED),
         (
-            Quantity("largest final error", np.abs(run.tracking_error[-1]).max(), run.unit("tracking_error")),
-            Quantity("largest share of the way that is left", share.max()),
+            Finding("largest final error", np.abs(run.tracking_error[-1]).max(), run.unit("tracking_error")),
+            Finding("largest share of the way that is left", share.max()),
         ),
         f"Asked: on every joint at most {REACHED:.0%} of the desired way left after {run.t[-1]:g} s. Largest "
         f"share: {run.names[row]}, {run.info['axes'][joint]}.",
@@ -51,7 +51,7 @@ def offsets_are_due_to_friction(run: Result, frictionless: Result) -> Claim:
         "The residual offsets of the joints are due to friction.",
         "section V-A",
         bool(theirs * MUCH <= ours),
-        (Quantity("largest late error with friction", ours, unit), Quantity("without", theirs, unit)),
+        (Finding("largest late error with friction", ours, unit), Finding("without", theirs, unit)),
         "Friction is in the plant and not in the regressor Y. Asked: the same cell without friction has, "
         f"over the last tenth of the first {t[-1]:g} s, a tracking error smaller by a factor of at least "
         f"{MUCH:g}.",
@@ -66,8 +66,8 @@ def offsets_are_due_to_gravity(frictionless: Result) -> Claim:
         "section V-A",
         bool(remaining > CONVERGED),
         (
-            Quantity("late error / peak, gravity without friction", remaining),
-            Quantity(
+            Finding("late error / peak, gravity without friction", remaining),
+            Finding(
                 "largest late error, gravity without friction",
                 late(frictionless.tracking_error).max(),
                 frictionless.unit("tracking_error"),

@@ -13,7 +13,7 @@ from .claims import (
     LITTLE,
     MUCH,
     Claim,
-    Quantity,
+    Finding,
     changed,
     common,
     errors_converge,
@@ -30,13 +30,13 @@ def others_move_along(undisturbed: Result, disturbed: Result) -> Claim:
     lengths = np.linalg.norm(others, axis=1) * np.linalg.norm(first)
     cosines = others @ first / np.where(lengths > 0, lengths, np.inf)  # 0 for a robot that does not respond
     sizes = np.abs(response).max(axis=(0, 2))
-    figures = [Quantity(f"response of {n}", s, "m") for n, s in zip(disturbed.names, sizes, strict=True)]
+    figures = [Finding(f"response of {n}", s, "m") for n, s in zip(disturbed.names, sizes, strict=True)]
     return Claim(
         "Disturbed and synchronized, robots 2 to 4 respond to the torque on robot 1 and so avoid large "
         "synchronization errors.",
         "section V-B, Figs. 13 and 14",
         bool(cosines.min() >= ALONG and sizes[1:].min() * MUCH >= sizes[0]),
-        (*figures, Quantity("smallest cosine between a response and that of robot 1", float(cosines.min()))),
+        (*figures, Finding("smallest cosine between a response and that of robot 1", float(cosines.min()))),
         "Response: tracking error with minus without the disturbance, its peak. Asked: each response has at "
         f"least 1/{MUCH:g} of the size of robot 1's and runs along it, cosine at least {ALONG:g}.",
     )
@@ -52,8 +52,8 @@ def others_are_untouched(undisturbed: Result, disturbed: Result) -> Claim:
         "section V-B, Figs. 11 and 15",
         bool(differing == 0 and moved > 0),
         (
-            Quantity("logged values of robots 2 to 4 that differ", differing),
-            Quantity("response of robot 1", moved, "m"),
+            Finding("logged values of robots 2 to 4 that differ", differing),
+            Finding("response of robot 1", moved, "m"),
         ),
         "Asked: positions, velocities, torques, errors and estimates of robots 2 to 4 bit for bit the same.",
     )
@@ -69,9 +69,9 @@ def only_adjacent_sync_errors_grow(undisturbed: Result, disturbed: Result) -> Cl
         "section V-B, Figs. 12 and 16",
         bool(differing == 0 and min(growth[0], growth[3]) >= MUCH),
         (
-            Quantity("logged values of ε_2 and ε_3 that differ", differing),
-            Quantity("peak of ε_1, disturbed / undisturbed", growth[0]),
-            Quantity("peak of ε_4, disturbed / undisturbed", growth[3]),
+            Finding("logged values of ε_2 and ε_3 that differ", differing),
+            Finding("peak of ε_1, disturbed / undisturbed", growth[0]),
+            Finding("peak of ε_4, disturbed / undisturbed", growth[3]),
         ),
         "Asked: ε_2 and ε_3 bit for bit the same, the peaks of ε_1 and ε_4 larger by a factor of at least "
         f"{MUCH:g}.",
@@ -86,7 +86,7 @@ def disturbance_is_shared(synchronized: Result, independent: Result) -> Claim:
         "Disturbed, the largest synchronization error is much smaller with synchronization than without.",
         "section V-B, Figs. 14 and 16",
         bool(ours * MUCH <= theirs),
-        (Quantity("largest, synchronized", ours, unit), Quantity("largest, independent", theirs, unit)),
+        (Finding("largest, synchronized", ours, unit), Finding("largest, independent", theirs, unit)),
         f"Asked: smaller by a factor of at least {MUCH:g}.",
     )
 
@@ -105,8 +105,8 @@ def gain_contributes_little(name: str, paper: Result, without: Result) -> Claim:
         "ours, not the paper's",
         bool(change <= LITTLE),
         (
-            Quantity("largest synchronization error, the paper's gains", np.abs(with_it).max(), unit),
-            Quantity(f"the same without {name}", np.abs(without_it).max(), unit),
+            Finding("largest synchronization error, the paper's gains", np.abs(with_it).max(), unit),
+            Finding(f"the same without {name}", np.abs(without_it).max(), unit),
         ),
         f"Asked: a change of at most {LITTLE:.0%} of the largest synchronization error in the first "
         f"{t[-1]:g} s.",
@@ -125,10 +125,10 @@ def baseline_is_not_gain_matched(synchronized: Result, stiff: Result) -> Claim:
         "ours, not the paper's",
         bool(theirs < ours),
         (
-            Quantity("largest tracking error, synchronized", ours, "m"),
-            Quantity("largest tracking error, independent and stiffer", theirs, "m"),
-            Quantity("largest synchronization error, synchronized", errors[0], unit),
-            Quantity("largest synchronization error, independent and stiffer", errors[1], unit),
+            Finding("largest tracking error, synchronized", ours, "m"),
+            Finding("largest tracking error, independent and stiffer", theirs, "m"),
+            Finding("largest synchronization error, synchronized", errors[0], unit),
+            Finding("largest synchronization error, independent and stiffer", errors[1], unit),
         ),
         f"Compared over the first {t[-1]:g} s.",
     )

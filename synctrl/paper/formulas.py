@@ -29,7 +29,9 @@ def formula_svg(tex: str) -> bytes:
         try:
             width, height, depth, _, _ = MathTextParser("path").parse(f"${tex}$", dpi=72, prop=font)
         except ValueError as error:
-            raise InputError(f"formula '{tex}': expected TeX that matplotlib can read; {error}") from error
+            raise InputError(
+                f"expected TeX that matplotlib can read; {error}", subject=f"formula '{tex}'"
+            ) from error
         figure = Figure(figsize=(width / 72, height / 72), facecolor="none")
         FigureCanvasSVG(figure)
         figure.text(0, depth / height, f"${tex}$", fontproperties=font)

@@ -1,4 +1,7 @@
-"""Two runs of one cell compared, instant by instant: how far apart two judges of the physics are."""
+"""An independent judge: cells that run with plants by Pinocchio and by MuJoCo, and how far these agree.
+
+MuJoCo reads the URDF on its own, so that an error in a robot's model or its dynamics would show here.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +10,43 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..checks import instance
+from ..control.gains import Gains
+from ..coupling.cell import Cell, Member
+from ..coupling.coupling import Coupling
 from ..errors import InputError
+from ..robots.robot import load_robot
 from ..simulation.result import Result
+from ..simulation.simulate import Experiment
+from ..tasks.trajectories import Cubic
 
 #: what counts as agreement, relative to the largest error
 AGREEMENT = 1e-4
 
+GAINS = Gains(Lambda=5.0, beta=2.0, K_r=5.0, K_eps=5.0, Gamma=0.05)
+MOTION_TIME, DURATION = 0.6, 0.4  # s
+#: share of the true parameters that the controller starts with
+KNOWN = 0.5
+
+
+def joint_pair(name: str) -> Experiment:
+    """Two robots of one kind, turned and tilted differently, that move all their joints together.
+
+    Args:
+        name: of the robot in the catalogue.
+    """
+    members = []
+    for i in range(2):
+        robot = load_robot(name).placed((0.3 * i, 1.0, -0.2), (0.3, -0.4 * i, 0.5 + i))
+        start = np.linspace(-0.7, 0.9, robot.nv) + 0.2 * i
+        path = Cubic(start, start + np.linspace(0.5, -0.4, robot.nv), MOTION_TIME)
+        members.append(Member(robot, path, theta_hat0=KNOWN * robot.inertial_parameters))
+    cell = Cell(members, Coupling.pair(), name=f"two {name}")
+    return Experiment(cell, GAINS, DURATION, title=f"two {name} in joint space")
+
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
-    """How far the errors of two runs are apart.
+class Agreement:
+    """How far the errors of two runs of one cell are apart.
 
     Attributes:
         title: of the first run.
@@ -36,7 +66,7 @@ class Comparison:
         return bool(max(self.tracking.max(), self.sync.max()) <= AGREEMENT)
 
 
-def compare_runs(ours: Result, theirs: Result) -> Comparison:
+def compare_runs(ours: Result, theirs: Result) -> Agreement:
     """Compare two runs of one cell at equal instants.
 
     Raises:
@@ -45,13 +75,15 @@ def compare_runs(ours: Result, theirs: Result) -> Comparison:
     for run in (ours, theirs):
         instance("runs", run, Result, "a Result")
     if not len(ours.t):
-        raise InputError(f"run '{ours.info['title']}': expected at least one logged instant, found none")
+        raise InputError(
+            "expected at least one logged instant, found none", subject=f"run '{ours.info['title']}'"
+        )
     if not np.array_equal(ours.t, theirs.t) or ours.x.shape != theirs.x.shape:
-        raise InputError(f"runs: expected the same instants of the same cell, found {ours!r} and {theirs!r}")
-    tracking, sync = (
-        _relative(getattr(ours, kind), getattr(theirs, kind)) for kind in ("tracking_error", "sync_error")
-    )
-    return Comparison(str(ours.info["title"]), ours.t, tracking, sync)
+        raise InputError(
+            f"expected the same instants of the same cell, found {ours!r} and {theirs!r}", subject="runs"
+        )
+    tracking = _relative(ours.tracking_error, theirs.tracking_error)
+    return Agreement(str(ours.info["title"]), ours.t, tracking, _relative(ours.sync_error, theirs.sync_error))
 
 
 def _relative(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:

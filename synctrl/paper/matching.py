@@ -61,7 +61,7 @@ def match_peak_torque(bench: Bench, target: float, scaled: Sequence[str] = ("Lam
 
     target = positive_number("target", target)
     if not scaled or set(scaled) - set(SCALABLE):
-        raise InputError(f"scaled: expected some of {', '.join(SCALABLE)}, found {list(scaled)!r}")
+        raise InputError(f"expected some of {', '.join(SCALABLE)}, found {list(scaled)!r}", subject="scaled")
     base, before = bench.experiment.gains.independent(), bench.runs
 
     def gains(logarithm: float) -> Gains:
@@ -89,6 +89,7 @@ def _bracket(excess: Callable[[float], float]) -> tuple[float, float]:
                 return min(near, far), max(near, far)
             near = far
     raise InputError(
-        f"gains: expected that a factor between 1/{LARGEST_FACTOR:g} and {LARGEST_FACTOR:g} on them gives "
-        "the peak torque of the synchronized controller, found none"
+        f"expected that a factor between 1/{LARGEST_FACTOR:g} and {LARGEST_FACTOR:g} on them gives "
+        "the peak torque of the synchronized controller, found none",
+        subject="gains",
     )

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from itertools import count
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..analysis.metrics import Metrics, metrics, row_names, settling_bands, squared
 from ..show.layout import cell_layout
-from ..show.plots import common_limits, joint_trajectories, save, sync_errors, tracking_errors
+from ..show.plots import common_limits, joint_trajectories, sync_errors, tracking_errors
 from ..show.style import display
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
@@ -17,7 +19,22 @@ from .claims import Claim
 from .claims import kind as kind_of
 from .claims_a460 import a460_claims
 from .claims_planar import own_findings, planar_four_claims
-from .report import Formulas, Links, Picture, Row, Section, Table, Text, Verdicts, number
+from .report import (
+    Block,
+    Formulas,
+    Links,
+    Picture,
+    Section,
+    SideBySide,
+    Table,
+    Text,
+    Verdicts,
+    as_picture,
+    number,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 LAW = (
     (r"e_i = x_i^d - x_i", "tracking error", "(1)"),
@@ -46,31 +63,26 @@ def introduction(claims: Sequence[Claim]) -> Section:
     """What this page is, the law, and how many of the claims hold."""
     failed = [claim.text for claim in claims if not claim.holds]
     held = f"{len(claims) - len(failed)} of {len(claims)} claims that are checked below hold."
-    return Section(
-        "What is shown here",
-        (
-            Text(
-                (
-                    "Sun and Mills, “Adaptive Synchronized Control for Coordination of Multirobot Assembly "
-                    "Tasks” (2002), computed again. Every robot tracks its own path with an adaptive law and "
-                    "couples its error with its neighbours’, so that tracking and synchronization errors "
-                    "both go to zero. Independent control, the paper’s comparison, is the same controller "
-                    "with β = K_ε = 0.",
-                )
-            ),
-            Formulas(LAW),
-            Text(
-                (
-                    "S says which robots are compared (a pair, or a ring of neighbours), c_i are their "
-                    "weights, Y_i is the regressor of robot i and θ̂_i its estimate of the parameters.",
-                    "Every number on this page was computed when the page was made. The metrics and claims "
-                    "are in metrics.json as well, in SI units, and the runs themselves in the folder runs. A "
-                    "claim of the paper that does not hold here says so.",
-                    " ".join([held, *(f"Does not hold: “{text}”" for text in failed)]),
-                )
-            ),
-        ),
-    )
+    verdict = " ".join([held, *(f"Does not hold: “{text}”" for text in failed)])
+    words = (_ABOUT, Formulas(LAW), _SYMBOLS, _COMPUTED, Text(verdict))
+    return Section("What is shown here", words)
+
+
+_ABOUT = Text(
+    "Sun and Mills, “Adaptive Synchronized Control for Coordination of Multirobot Assembly Tasks” (2002), "
+    "computed again. Every robot tracks its own path with an adaptive law and couples its error with its "
+    "neighbours’, so that tracking and synchronization errors both go to zero. Independent control, the "
+    "paper’s comparison, is the same controller with β = K_ε = 0."
+)
+_SYMBOLS = Text(
+    "S says which robots are compared (a pair, or a ring of neighbours), c_i are their weights, Y_i is the "
+    "regressor of robot i and θ̂_i its estimate of the parameters."
+)
+_COMPUTED = Text(
+    "Every number on this page was computed when the page was made. The metrics and claims are in "
+    "metrics.json as well, in SI units, and the runs themselves in the folder runs. A claim of the paper "
+    "that does not hold here says so."
+)
 
 
 def trial_section(duration: float) -> Section:
@@ -79,7 +91,7 @@ def trial_section(duration: float) -> Section:
         f"This page is a trial: no run is longer than {duration:g} s, so nothing had the time to converge. "
         "Figures and verdicts are not those of the whole runs."
     )
-    return Section("A trial", (Text((words,), "note"),))
+    return Section("A trial", (Text(words, "note"),))
 
 
 def a460_section(runs: Mapping[str, Result], folder: Path, animations: Links) -> Section:
@@ -90,44 +102,30 @@ def a460_section(runs: Mapping[str, Result], folder: Path, animations: Links) ->
         folder: where figures go.
         animations: links to those of this cell.
     """
-    ours, theirs = runs["synchronized"], runs["independent"]
-    limits = common_limits("sync_error", ours, theirs)
-    figures = {
-        2: joint_trajectories(ours, 0),
-        3: joint_trajectories(ours, 1),
-        4: sync_errors(ours, limits),
-        5: joint_trajectories(theirs, 0),
-        6: joint_trajectories(theirs, 1),
-        7: sync_errors(theirs, limits),
+    pair = {kind: runs[kind] for kind in KINDS}
+    limits = common_limits("sync_error", *pair.values())
+    drawings: Drawings = {
+        "Joint angles of robot 1": lambda run: joint_trajectories(run, 0),
+        "Joint angles of robot 2": lambda run: joint_trajectories(run, 1),
+        "Synchronization errors of the joints": lambda run: sync_errors(run, limits),
     }
-    pictures = {k: _picture(folder, k, figure, _A460_CAPTIONS[k]) for k, figure in figures.items()}
-    return Section(
-        "Two CRS A460 robots (section V-A)",
-        (
-            Text(
-                (
-                    "Two arms move a payload along a cubic path; ε = e_1 - e_2 compares their joint errors. "
-                    "Joint angles and gains are the paper’s. The time of the motion, 2 s, the initial "
-                    "estimate, 0.7 of the true parameters, and the place of the second base are our choices.",
-                )
-            ),
-            Text(
-                (
-                    "Synthetic data: no published masses, inertias or friction of the A460 were found. Those "
-                    "used here are invented to be plausible, so the size of the errors is not the paper’s; "
-                    "only their comparison means something. Friction is in the plant and unknown to the "
-                    "controller.",
-                ),
-                "note",
-            ),
-            animations,
-            Row((pictures[2], pictures[5])),
-            Row((pictures[3], pictures[6])),
-            Row((pictures[4], pictures[7])),
-            *metrics_tables(ours, theirs),
-            Verdicts(tuple(a460_claims(runs))),
-        ),
-    )
+    blocks: list[Block] = [_A460, _SYNTHETIC, animations]
+    blocks += [*_compared(folder, 2, pair, drawings), *metrics_tables(*pair.values())]
+    blocks.append(Verdicts(tuple(a460_claims(runs))))
+    return Section("Two CRS A460 robots (section V-A)", tuple(blocks))
+
+
+_A460 = Text(
+    "Two arms move a payload along a cubic path; ε = e_1 - e_2 compares their joint errors. Joint angles and "
+    "gains are the paper’s. The time of the motion, 2 s, the initial estimate, 0.7 of the true parameters, "
+    "and the place of the second base are our choices."
+)
+_SYNTHETIC = Text(
+    "Synthetic data: no published masses, inertias or friction of the A460 were found. Those used here are "
+    "invented to be plausible, so the size of the errors is not the paper’s; only their comparison means "
+    "something. Friction is in the plant and unknown to the controller.",
+    "note",
+)
 
 
 def planar_section(
@@ -141,61 +139,72 @@ def planar_section(
         folder: where figures go.
         animations: links to those of this cell.
     """
-    pairs = [(runs["synchronized"], runs["independent"])]
-    pairs.append((runs["synchronized_disturbed"], runs["independent_disturbed"]))
-    pictures = {8: _picture(folder, 8, cell_layout(pairs[0][0], experiment), _PLANAR_CAPTIONS[8])}
-    for first, (ours, theirs) in zip((9, 13), pairs, strict=True):
-        e, epsilon = (common_limits(kind, ours, theirs) for kind in ("tracking_error", "sync_error"))
-        figures = [tracking_errors(ours, e), sync_errors(ours, epsilon)]
-        figures += [tracking_errors(theirs, e), sync_errors(theirs, epsilon)]
-        for k, figure in enumerate(figures, start=first):
-            pictures[k] = _picture(folder, k, figure, _PLANAR_CAPTIONS[k])
-    return Section(
-        "Four planar arms (section V-B)",
-        (
-            Text(
-                (
-                    "Four arms move along circles about the origin and keep their distances; a ring of four "
-                    "pairs compares neighbours. Tables II and III and the gains are the paper’s. Table II "
-                    "does not give φ; it is 0.1 rad here, which makes the cell nearly square. On which "
-                    "robots move on the larger circle the text and Table II disagree; the text is followed. "
-                    "The weights c are lengths, so ε is in m².",
-                )
-            ),
-            animations,
-            pictures[8],
-            Row((pictures[9], pictures[11])),
-            Row((pictures[10], pictures[12])),
-            *metrics_tables(*pairs[0]),
-            Text(
-                (
-                    "Disturbed: +1 N·m on both joints of robot 1 for 0.5 s ≤ t < 0.75 s. That it acts on "
-                    "both joints is our choice.",
-                )
-            ),
-            Row((pictures[13], pictures[15])),
-            Row((pictures[14], pictures[16])),
-            *metrics_tables(*pairs[1]),
-            Verdicts(tuple(planar_four_claims(runs))),
-        ),
-    )
+    above = "The four arms from above, at the start (pale) and at the end."
+    layout = _numbered(folder, 8, cell_layout(runs["synchronized"], experiment), above)
+    undisturbed = {kind: runs[kind] for kind in KINDS}
+    disturbed = {f"{kind}, disturbed": runs[f"{kind}_disturbed"] for kind in KINDS}
+    blocks: list[Block] = [_PLANAR, animations, layout, *_planar_pair(folder, 9, undisturbed)]
+    blocks += [_DISTURBANCE, *_planar_pair(folder, 13, disturbed)]
+    blocks.append(Verdicts(tuple(planar_four_claims(runs))))
+    return Section("Four planar arms (section V-B)", tuple(blocks))
+
+
+def _planar_pair(folder: Path, first: int, pair: Mapping[str, Result]) -> list[Block]:
+    """Figures and metrics of two runs of the four arms that are compared."""
+    e, epsilon = (common_limits(kind, *pair.values()) for kind in ("tracking_error", "sync_error"))
+    drawings: Drawings = {
+        "Position errors": lambda run: tracking_errors(run, e),
+        "Synchronization errors": lambda run: sync_errors(run, epsilon),
+    }
+    return [*_compared(folder, first, pair, drawings), *metrics_tables(*pair.values())]
+
+
+_PLANAR = Text(
+    "Four arms move along circles about the origin and keep their distances; a ring of four pairs compares "
+    "neighbours. Tables II and III and the gains are the paper’s. Table II does not give φ; it is 0.1 rad "
+    "here, which makes the cell nearly square. On which robots move on the larger circle the text and Table "
+    "II disagree; the text is followed. The weights c are lengths, so ε is in m²."
+)
+_DISTURBANCE = Text(
+    "Disturbed: +1 N·m on both joints of robot 1 for 0.5 s ≤ t < 0.75 s. That it acts on both joints is our "
+    "choice."
+)
 
 
 def honesty_section(runs: Mapping[str, Result]) -> Section:
     """What the paper's comparison leaves unsaid."""
-    return Section(
-        "Said honestly",
-        (
-            Text(
-                (
-                    "Without synchronization the paper sets β = K_ε = 0 and leaves all other gains as they "
-                    "are. That takes gain away, so part of what synchronization seems to achieve is achieved "
-                    "by more gain. Of the gains that synchronization adds, β does the work.",
-                )
-            ),
-            Verdicts(tuple(own_findings(runs))),
-        ),
-    )
+    return Section("Said honestly", (_UNSAID, Verdicts(tuple(own_findings(runs)))))
+
+
+_UNSAID = Text(
+    "Without synchronization the paper sets β = K_ε = 0 and leaves all other gains as they are. That takes "
+    "gain away, so part of what synchronization seems to achieve is achieved by more gain. Of the gains that "
+    "synchronization adds, β does the work."
+)
+
+
+# -- figures ----------------------------------------------------------------------------------------------
+
+KINDS = ("synchronized", "independent")
+#: figures that are drawn of each run, by what they show
+Drawings = Mapping[str, Callable[[Result], "Figure"]]
+
+
+def _compared(folder: Path, first: int, runs: Mapping[str, Result], drawings: Drawings) -> list[Block]:
+    """A column of figures per run, a row per drawing; as in the paper, they are numbered down the columns."""
+    numbers = count(first)
+    columns = [
+        [_numbered(folder, next(numbers), draw(run), f"{what}, {kind}.") for what, draw in drawings.items()]
+        for kind, run in runs.items()
+    ]
+    return [SideBySide(row) for row in zip(*columns, strict=True)]
+
+
+def _numbered(folder: Path, k: int, figure: Figure, caption: str) -> Picture:
+    return as_picture(figure, folder / f"figure_{k:02d}", f"Figure {k}. {caption}")
+
+
+# -- tables -----------------------------------------------------------------------------------------------
 
 
 def metrics_tables(ours: Result, theirs: Result) -> list[Table]:
@@ -255,29 +264,3 @@ def _torque_table(ours: Result, computed: tuple[Metrics, Metrics]) -> Table:
 def _both(ours: float, theirs: float, ratio: bool = False) -> tuple[str, ...]:
     shown = tuple(number(value) if np.isfinite(value) else "–" for value in (ours, theirs))
     return (*shown, number(theirs / ours) if ours else "–") if ratio else shown
-
-
-def _picture(folder: Path, k: int, figure: object, caption: str) -> Picture:
-    _, svg = save(figure, folder / f"figure_{k:02d}")  # type: ignore[arg-type]
-    return Picture(svg, f"Figure {k}. {caption}")
-
-
-_A460_CAPTIONS = {
-    2: "Joint angles of robot 1, synchronized.",
-    3: "Joint angles of robot 2, synchronized.",
-    4: "Synchronization errors of the joints, synchronized.",
-    5: "Joint angles of robot 1, independent.",
-    6: "Joint angles of robot 2, independent.",
-    7: "Synchronization errors of the joints, independent.",
-}
-_PLANAR_CAPTIONS = {
-    8: "The four arms from above, at the start (pale) and at the end.",
-    9: "Position errors, synchronized.",
-    10: "Synchronization errors, synchronized.",
-    11: "Position errors, independent.",
-    12: "Synchronization errors, independent.",
-    13: "Position errors, synchronized, disturbed.",
-    14: "Synchronization errors, synchronized, disturbed.",
-    15: "Position errors, independent, disturbed.",
-    16: "Synchronization errors, independent, disturbed.",
-}

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..analysis.identification import LEARNED, Identification
-from ..show.plots import common_limits, joint_trajectories, save, sync_errors, tracking_errors
+from ..show.plots import common_limits, joint_trajectories, sync_errors, tracking_errors
 from ..show.style import display
 from ..simulation.result import Result
-from .report import Picture, Row, Section, Table, Text, number
+from .report import Block, Picture, Section, SideBySide, Table, Text, as_picture, number
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: the run with six joints that belongs to one with three
 FULL = {"synchronized": "full", "independent": "full_alone"}
@@ -26,24 +29,23 @@ def full_a460_section(runs: Mapping[str, Result], folder: Path) -> Section:
         folder: where figures go, and where those of `a460_section` are.
     """
     limits = common_limits("sync_error", *(runs[name] for pair in FULL.items() for name in pair))
-    blocks: list[Any] = [
+    blocks: list[Block] = [
         Text(
-            (
-                "As in the paper's laboratory the plant has six joints here, of which PID controllers hold "
-                "the last three, while the adaptive controller knows three joints and a lumped mass. On the "
-                "left figures 2 to 7 for the plant that the controller knows; on the right with six joints.",
-            )
+            "As in the paper's laboratory the plant has six joints here, of which PID controllers hold the "
+            "last three, while the adaptive controller knows three joints and a lumped mass. On the left "
+            "figures 2 to 7 for the plant that the controller knows; on the right with six joints."
         )
     ]
     for first, kind in zip((2, 5), FULL, strict=True):
         pair = (runs[kind], runs[FULL[kind]])
-        for robot in range(2):
-            three = folder / f"figure_{first + robot:02d}.svg"  # drawn once
-            six = _drawn(folder, first + robot, joint_trajectories(pair[1], robot), "six")
-            blocks.append(_beside(first + robot, kind, three, six))
-        errors = [sync_errors(run, limits) for run in pair]
-        drawn = (_drawn(folder, first + 2, *each) for each in zip(errors, ("three", "six"), strict=True))
-        blocks.append(_beside(first + 2, kind, *drawn))
+        for k, robot in enumerate(range(2), start=first):
+            known = Picture(folder / f"figure_{k:02d}.svg", _caption(k, kind, "three"))  # drawn already
+            blocks.append(
+                SideBySide((known, _figure(folder, k, joint_trajectories(pair[1], robot), kind, "six")))
+            )
+        errors = zip(pair, ("three", "six"), strict=True)
+        both = (_figure(folder, first + 2, sync_errors(run, limits), kind, joints) for run, joints in errors)
+        blocks.append(SideBySide(tuple(both)))
     return Section("The A460 with six joints", (*blocks, _wrist_table(runs), _error_table(runs)))
 
 
@@ -56,30 +58,24 @@ def friction_section(runs: Mapping[str, Result], folder: Path) -> Section:
     """
     pair = (runs["friction_unknown"], runs["friction_adapted"])
     limits = common_limits("tracking_error", *pair)
-    pictures = []
-    for run, name in zip(pair, ("unknown", "adapted"), strict=True):
-        _, svg = save(tracking_errors(run, limits), folder / f"friction_{name}")
-        pictures.append(Picture(svg, f"Tracking errors, friction {name}."))
+    pictures = tuple(
+        as_picture(
+            tracking_errors(run, limits), folder / f"friction_{name}", f"Tracking errors, friction {name}."
+        )
+        for run, name in zip(pair, ("unknown", "adapted"), strict=True)
+    )
     unit, factor = display(pair[0].unit("tracking_error"))
     rows = []
     for run in pair:
         final = factor * np.abs(run.tracking_error[-1]).max(axis=0)
         rows.append((str(run.info["title"]), f"{run.t[-1]:g}", *map(number, final)))
     head = ("run", "length, s", *(f"|e| of {axis} at the end, {unit}" for axis in pair[0].info["axes"]))
-    return Section(
-        "Friction among what is adapted",
-        (
-            Text(
-                (
-                    "With viscous and Coulomb friction in Y, as columns v_ref and tanh(v / smoothing), the "
-                    "proof holds for the plant with friction, and the offset that friction leaves goes away. "
-                    "The coefficients start at 0.7 of the true ones, as the other parameters do.",
-                )
-            ),
-            Row(tuple(pictures)),
-            Table(head, tuple(rows)),
-        ),
+    words = Text(
+        "With viscous and Coulomb friction in Y, as columns v_ref and tanh(v / smoothing), the proof holds "
+        "for the plant with friction, and the offset that friction leaves goes away. The coefficients start "
+        "at 0.7 of the true ones, as the other parameters do."
     )
+    return Section("Friction among what is adapted", (words, SideBySide(pictures), Table(head, tuple(rows))))
 
 
 def identification_section(found: Mapping[str, Sequence[Identification]]) -> Section:
@@ -103,33 +99,24 @@ def identification_section(found: Mapping[str, Sequence[Identification]]) -> Sec
         "run and robot", "adapted", "identifiable", "learned", "condition", "excitation",
         "torque error, N·m, peak", "at the end", "base parameter error, start", "at the end",
     )  # fmt: skip
-    return Section(
-        "Errors converge, parameters need not",
-        (
-            Text(
-                (
-                    "That the tracking error vanishes says nothing about parameters. Identifiable: how many "
-                    "combinations of the adapted parameters torque depends on at all (base parameters), with "
-                    "the condition number of their columns. Excitation: smallest eigenvalue of the integral "
-                    "of YᵀY over the run, for base parameters in SI units. Learned: directions whose error "
-                    f"had the time to fall by e {LEARNED:g} times, by an estimate that neglects s'. Only "
-                    "where all are learned could one speak of convergence of parameters.",
-                )
-            ),
-            Table(head, tuple(rows)),
-        ),
+    words = Text(
+        "That the tracking error vanishes says nothing about parameters. Identifiable: how many combinations "
+        "of the adapted parameters torque depends on at all (base parameters), with the condition number of "
+        "their columns. Excitation: smallest eigenvalue of the integral of YᵀY over the run, for base "
+        "parameters in SI units. Learned: directions whose error had the time to fall by e "
+        f"{LEARNED:g} times, by an estimate that neglects s'. Only where all are learned could one speak of "
+        "convergence of parameters."
     )
+    return Section("Errors converge, parameters need not", (words, Table(head, tuple(rows))))
 
 
-def _drawn(folder: Path, k: int, figure: Any, joints: str) -> Path:
-    _, svg = save(figure, folder / f"figure_{k:02d}_{joints}_joints")
-    return svg
+def _figure(folder: Path, k: int, figure: Figure, kind: str, joints: str) -> Picture:
+    """One figure of the paper for the plant with three joints, or with six."""
+    return as_picture(figure, folder / f"figure_{k:02d}_{joints}_joints", _caption(k, kind, joints))
 
 
-def _beside(k: int, kind: str, three: Path, six: Path) -> Row:
-    """One figure of the paper for the plant with three joints, and with six."""
-    captions = (f"Figure {k}, {kind}, {joints} joints in the plant." for joints in ("three", "six"))
-    return Row(tuple(map(Picture, (three, six), captions)))
+def _caption(k: int, kind: str, joints: str) -> str:
+    return f"Figure {k}, {kind}, {joints} joints in the plant."
 
 
 def _wrist_table(runs: Mapping[str, Result]) -> Table:

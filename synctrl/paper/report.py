@@ -12,14 +12,18 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from ..errors import InputError, ResultError
-from ..files import write_whole
+from ..errors import InputError
+from ..files import reported, write_whole
 from ..show.panels import ten_to
+from ..show.plots import save
 from ..show.style import display
-from .claims import Claim, Quantity
+from .claims import Claim, Finding
 from .formulas import formula_svg
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 STYLESHEET = Path(__file__).with_name("report.css")
 
@@ -33,16 +37,16 @@ class Block(Protocol):
 
 @dataclass(frozen=True)
 class Text:
-    """Paragraphs of plain text; `kind` is "plain", "note" or "formula"."""
+    """A paragraph of plain text; `kind` is "plain", "note" or "formula"."""
 
-    paragraphs: tuple[str, ...]
+    paragraph: str
     kind: str = "plain"
 
     def html(self) -> str:
-        """A paragraph each; formulas keep their spaces."""
-        tag = "pre" if self.kind == "formula" else "p"
-        written = escape if self.kind == "formula" else words
-        return "".join(f'<{tag} class="{escape(self.kind)}">{written(p)}</{tag}>' for p in self.paragraphs)
+        """A paragraph; a formula keeps its spaces."""
+        if self.kind == "formula":
+            return f'<pre class="formula">{escape(self.paragraph)}</pre>'
+        return f'<p class="{escape(self.kind)}">{words(self.paragraph)}</p>'
 
 
 @dataclass(frozen=True)
@@ -69,16 +73,19 @@ class Picture:
 
     def html(self) -> str:
         """A figure whose picture is part of the page."""
-        try:
-            data = base64.b64encode(self.svg.read_bytes()).decode("ascii")
-        except OSError as error:
-            raise ResultError(f"cannot read the figure '{self.svg}': {error.strerror or error}") from error
-        picture = f'<img alt="{escape(self.caption)}" src="data:image/svg+xml;base64,{data}">'
+        with reported("read the figure", self.svg):
+            picture = _inlined(self.svg.read_bytes(), self.caption)
         return f"<figure>{picture}<figcaption>{words(self.caption)}</figcaption></figure>"
 
 
+def as_picture(figure: Figure, stem: Path, caption: str) -> Picture:
+    """A figure, which is written to `<stem>.svg` and `<stem>.png`, as a picture of the page."""
+    _, svg = save(figure, stem)
+    return Picture(svg, caption)
+
+
 @dataclass(frozen=True)
-class Row:
+class SideBySide:
     """Blocks side by side."""
 
     blocks: tuple[Block, ...]
@@ -108,7 +115,8 @@ class Table:
         """
         for row in self.rows:
             if len(row) != len(self.head):
-                raise InputError(f"table: expected rows of {len(self.head)} cells, found {list(row)}")
+                expected = f"expected rows of {len(self.head)} cells"
+                raise InputError(f"{expected}, found {list(row)}", subject="table", found=len(row))
         head = "".join(f"<th scope='col'>{words(cell)}</th>" for cell in self.head)
         body = "".join(_table_row(row) for row in self.rows)
         caption = f'<p class="caption">{words(self.caption)}</p>' if self.caption else ""
@@ -120,7 +128,8 @@ class Table:
             return ""
         covered = sum(width for _, width in self.groups)
         if covered != len(self.head) - 1:
-            raise InputError(f"table: expected groups over {len(self.head) - 1} columns, found {covered}")
+            expected = f"expected groups over {len(self.head) - 1} columns"
+            raise InputError(f"{expected}, found {covered}", subject="table", found=covered)
         titles = (f"<th colspan='{width}'>{words(title)}</th>" for title, width in self.groups)
         return f'<tr class="groups"><th></th>{"".join(titles)}</tr>'
 
@@ -164,7 +173,6 @@ def write_page(path: str | Path, title: str, sections: Sequence[Section]) -> Pat
     Raises:
         ResultError: the file cannot be written, or a figure cannot be read.
     """
-    path = Path(path)
     style = STYLESHEET.read_text(encoding="utf-8")
     contents = "".join(f'<li><a href="#s{k}">{words(s.title)}</a></li>' for k, s in enumerate(sections))
     page = (
@@ -173,11 +181,9 @@ def write_page(path: str | Path, title: str, sections: Sequence[Section]) -> Pat
         f"<style>{style}</style></head><body><header><h1>{escape(title)}</h1><nav><ol>{contents}</ol></nav></header>"
         f"<main>{''.join(_section(k, s) for k, s in enumerate(sections))}</main></body></html>\n"
     )
-    try:
+    with reported("write the page", path):
         write_whole(path, page.encode("utf-8", "replace"))
-    except OSError as error:
-        raise ResultError(f"cannot write the page '{path}': {error.strerror or error}") from error
-    return path
+    return Path(path)
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -203,10 +209,16 @@ def _section(k: int, section: Section) -> str:
     return f'<section id="s{k}"><h2>{words(section.title)}</h2>{blocks}</section>'
 
 
+def _inlined(svg: bytes, instead: str) -> str:
+    """A picture that is part of the page, with the words that stand for it where it cannot be seen."""
+    data = base64.b64encode(svg).decode("ascii")
+    return f'<img alt="{escape(instead)}" src="data:image/svg+xml;base64,{data}">'
+
+
 def _formula_row(tex: str, what: str, number: str) -> str:
-    data = base64.b64encode(formula_svg(tex)).decode("ascii")
-    picture = f'<img alt="{escape(tex)}" src="data:image/svg+xml;base64,{data}">'
-    return f"<tr><td>{picture}</td><td>{words(what)}</td><td>{words(number)}</td></tr>"
+    return (
+        f"<tr><td>{_inlined(formula_svg(tex), tex)}</td><td>{words(what)}</td><td>{words(number)}</td></tr>"
+    )
 
 
 def _table_row(row: Iterable[str]) -> str:
@@ -225,7 +237,7 @@ def _claim(claim: Claim) -> str:
     )
 
 
-def _shown(quantity: Quantity) -> str:
+def _shown(quantity: Finding) -> str:
     """A figure in the unit that people read."""
     unit, factor = display(quantity.unit)
     return f"{number(factor * quantity.value)} {unit}".strip()

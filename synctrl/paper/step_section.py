@@ -25,13 +25,13 @@ def step_section(runs: Mapping[str, Result]) -> Section:
         instance(f"runs, {name}", run, Result, "a Result")
     known = {name: run for name, run in runs.items() if (run.info.get("step_error") or {}).get("estimate")}
     over = [run for run in known.values() if run.info["step_error"]["advised_step"] is not None]
-    words = (
+    estimated = Text(
         "Every run estimates what its worst step errs in velocity, as a share of the largest velocity of the "
-        "run, from derivatives that it computes anyway. The error itself is about a third of that.",
-        f"{len(over)} of {len(known)} runs are above the limit"
-        + (", and would do with the step in the last column." if over else "."),
+        "run, from derivatives that it computes anyway. The error itself is about a third of that."
     )
-    return Section(TITLE, (Text(words), *([_table(over)] if over else [])))
+    advice = ", and would do with the step in the last column." if over else "."
+    verdict = Text(f"{len(over)} of {len(known)} runs are above the limit{advice}")
+    return Section(TITLE, (estimated, verdict, *([_table(over)] if over else [])))
 
 
 def _table(runs: list[Result]) -> Table:

@@ -13,7 +13,7 @@ from ..experiments.planar_four import planar_four
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .baselines import Comparison, compare
-from .reproduction import JOBS
+from .reproduction import PLANNED
 from .theory_sections import draw_certificate
 
 #: all runs but a longer one, and those with six joints, for which the step of the page is too long
@@ -61,7 +61,7 @@ def examine(
 
 
 def _certify(name: str, folder: Path, figures: Path) -> Certificate:
-    certificate = certify(Result.load(folder / f"{name}.npz"), JOBS[name].make())
+    certificate = certify(Result.load(folder / f"{name}.npz"), PLANNED[name].make())
     draw_certificate(name, certificate, figures)
     return certificate
 

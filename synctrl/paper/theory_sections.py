@@ -10,7 +10,7 @@ from ..show.lyapunov_plots import growth_mark, lyapunov_figure
 from ..show.plots import save
 from ..show.style import display
 from .baselines import Comparison
-from .report import Block, Picture, Row, Section, Table, Text, number
+from .report import Block, Picture, Section, SideBySide, Table, Text, number
 from .trials import Trial
 
 PROOF = """\
@@ -28,17 +28,9 @@ def certificate_section(certificates: Mapping[str, Certificate], folder: Path) -
         folder: where `draw_certificate` has drawn each.
     """
     pictures = tuple(_picture(name, c, folder) for name, c in certificates.items())
-    texts = tuple(f"{_words(name)}\n{c}" for name, c in certificates.items())
-    return Section(
-        "The proof, watched",
-        (
-            Text((_INTRODUCTION,)),
-            Text((PROOF,), "formula"),
-            _verdicts(certificates),
-            Row(pictures),
-            Text(texts, "formula"),
-        ),
-    )
+    texts = [Text(f"{_words(name)}\n{c}", "formula") for name, c in certificates.items()]
+    proof = (Text(_INTRODUCTION), Text(PROOF, "formula"), _verdicts(certificates), SideBySide(pictures))
+    return Section("The proof, watched", (*proof, *texts))
 
 
 def draw_certificate(name: str, certificate: Certificate, folder: Path) -> Path:
@@ -52,15 +44,12 @@ def draw_certificate(name: str, certificate: Certificate, folder: Path) -> Path:
 
 def baseline_section(comparisons: Sequence[Comparison]) -> Section:
     """Synchronized control beside independent controllers with as much gain, and part by part."""
-    blocks: list[Block] = [Text((_FAIRNESS,))]
+    blocks: list[Block] = [Text(_FAIRNESS)]
     for c in comparisons:
         what = f"{c.title}, the first {c.duration:g} s"
         parts = f"{what}: β, K_ε and the adaptation, each alone and together."
-        blocks += [
-            _trials(c, c.trials, f"{what}."),
-            _trials(c, c.ablation, parts),
-            Text(tuple(c.findings())),
-        ]
+        blocks += [_trials(c, c.trials, f"{what}."), _trials(c, c.ablation, parts)]
+        blocks += map(Text, c.findings())
     return Section("Fair comparisons", tuple(blocks))
 
 

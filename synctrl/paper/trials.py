@@ -9,6 +9,7 @@ from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
+from ..analysis.metrics import metrics
 from ..checks import instance
 from ..control.gains import Gains
 from ..errors import SimulationError, StepWarning
@@ -90,11 +91,12 @@ class Bench:
 
 def measure(name: str, result: Result) -> Trial:
     """A run that was just made, in numbers."""
-    e, epsilon = result.tracking_error, result.sync_error
-    peaks = float(np.abs(e).max()), float(np.abs(epsilon).max())
-    rms = _rms(result.t, e), _rms(result.t, epsilon)
-    torques = float(np.abs(result.tau).max()), gravity_torque(result)
-    return Trial(name, peaks[0], rms[0], peaks[1], rms[1], *torques, dict(result.info["gains"]))
+    found = metrics(result)
+    e, epsilon = found.tracking_error, found.sync_error
+    rms = [float(np.sqrt(np.square(error.rms).mean())) for error in (e, epsilon)]
+    peaks = [float(array.max()) for array in (e.peak, epsilon.peak, found.peak_torque)]
+    gains = dict(result.info["gains"])
+    return Trial(name, peaks[0], rms[0], peaks[1], rms[1], peaks[2], gravity_torque(result), gains)
 
 
 def gravity_torque(result: Result) -> float:
@@ -105,9 +107,3 @@ def gravity_torque(result: Result) -> float:
         for i, robot in enumerate(robots)
         for q in result.q[::every, i, : robot.nv]
     )
-
-
-def _rms(t: np.ndarray, error: np.ndarray) -> float:
-    mean_square = np.square(error).mean(axis=(1, 2))
-    span = t[-1] - t[0]
-    return float(np.sqrt(np.trapezoid(mean_square, t) / span if span > 0 else mean_square[-1]))

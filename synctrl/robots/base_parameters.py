@@ -132,8 +132,9 @@ def _rank(values: np.ndarray, name: str) -> int:
     dropped = values[rank] if rank < len(values) else 0.0
     if values[0] == 0 or values[rank - 1] < GAP * dropped:
         raise RobotError(
-            f"robot '{name}': expected singular values of the regressor with a clear gap above zero, "
-            f"found {values[rank - 1]:.3g} above it and {dropped:.3g} below"
+            "expected singular values of the regressor with a clear gap above zero, "
+            f"found {values[rank - 1]:.3g} above it and {dropped:.3g} below",
+            subject=f"robot '{name}'",
         )
     return rank
 

@@ -77,13 +77,15 @@ def load_description(name_or_path: str | Path, package_dirs: Iterable[str | Path
         MissingDependencyError: example-robot-data is not installed.
     """
     if not isinstance(name_or_path, (str, Path)):
-        raise InputError(f"robot: expected a name or a path, found {type(name_or_path).__name__}")
+        raise InputError(f"expected a name or a path, found {type(name_or_path).__name__}", subject="robot")
     if isinstance(name_or_path, Path) or _looks_like_path(name_or_path):
         return read_urdf(name_or_path, package_dirs)
     if name_or_path not in CATALOG:
         raise RobotError(
-            f"robot: expected a name of the catalogue or a path, found {name_or_path!a}"
-            f"{near(name_or_path, CATALOG)}; the catalogue has: {', '.join(CATALOG)}"
+            f"expected a name of the catalogue or a path, found {name_or_path!a}"
+            f"{near(name_or_path, CATALOG)}; the catalogue has: {', '.join(CATALOG)}",
+            subject="robot",
+            found=name_or_path,
         )
     return _load(name_or_path, CATALOG[name_or_path])
 
@@ -104,7 +106,8 @@ def _folder(name: str, entry: Entry) -> Path:
     data = data_folder()
     if data is None:
         raise MissingDependencyError(
-            f"robot '{name}' comes from the package example-robot-data, which is not installed; "
-            "install it with: pip install example-robot-data"
+            "it comes from the package example-robot-data, which is not installed; "
+            "install it with: pip install example-robot-data",
+            subject=f"robot '{name}'",
         )
     return data / "example-robot-data" / "robots"

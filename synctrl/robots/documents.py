@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, positive_number
-from ..errors import FrameNotFound, InputError, RobotError
+from ..checks import finite_array, positive_number, symmetric_matrix
+from ..errors import FrameNotFound, InputError
 from ..files import write_whole
 from .catalog import load_description
 from .urdf.checks import check_bodies, check_tree, inertial_fault
 from .urdf.description import Description, lock_joints
-from .urdf.document import Document, Geometry, Inertial, Joint, Limit, Link, Pose, Shape
+from .urdf.document import Document, Geometry, Inertial, Joint, Limit, Link, Pose, Shape, upper_triangle
 from .urdf.writer import to_xml
 from .urdf.xml import NAME_RULE, is_name
 
@@ -52,7 +52,7 @@ def planar_arm(lengths: Sequence[float], masses: Sequence[float], name: str = "p
     l, m = finite_array("lengths", lengths, (None,)), finite_array("masses", masses, (None,))
     if not len(l) or len(l) != len(m):
         raise InputError(
-            f"lengths, masses: expected as many of each, at least 1, found {len(l)} and {len(m)}"
+            f"expected as many of each, at least 1, found {len(l)} and {len(m)}", subject="lengths, masses"
         )
     rods = [
         _rod(k, positive_number(f"lengths[{k}]", l[k]), positive_number(f"masses[{k}]", m[k]))
@@ -103,10 +103,10 @@ def weld(
     if frame not in links:
         raise FrameNotFound(document.name, frame, links)
     if name in links or f"{name}_weld" in {joint.name for joint in document.joints}:
-        raise InputError(f"name: expected one that robot '{document.name}' does not have yet, found '{name}'")
-    origin = Pose(_triple("xyz", xyz), _triple("rpy", rpy))
+        expected = f"expected one that robot '{document.name}' does not have yet"
+        raise InputError(f"{expected}, found '{name}'", subject="name")
     payload = _payload(name, positive_number("mass", mass), _triple("com", com), size, inertia)
-    joint = Joint(f"{name}_weld", "fixed", frame, name, origin)
+    joint = Joint(f"{name}_weld", "fixed", frame, name, Pose(_triple("xyz", xyz), _triple("rpy", rpy)))
     return replace(document, links=(*document.links, payload), joints=(*document.joints, joint))
 
 
@@ -135,7 +135,9 @@ def write_urdf(document: Document, path: str | Path) -> Path:
         file.parent.stat()  # a folder of a mistyped name is not made
         write_whole(file, to_xml(document))
     except OSError as error:
-        raise InputError(f"{file}: expected a file that can be written, found: {error.strerror}") from error
+        raise InputError(
+            f"expected a file that can be written, found: {error.strerror}", subject=str(file)
+        ) from error
     return file
 
 
@@ -164,17 +166,11 @@ def _payload(
 ) -> Link:
     sides = tuple(positive_number(f"size[{k}]", side) for k, side in enumerate(_triple("size", size)))
     x, y, z = (side**2 for side in sides)
-    I = (
-        np.diag([y + z, x + z, x + y]) * mass / 12
-        if inertia is None
-        else finite_array("inertia", inertia, (3, 3))
-    )
-    if not np.allclose(I, I.T, rtol=1e-12, atol=0):
-        raise InputError(f"inertia: expected a symmetric matrix, found {I.tolist()}")
-    upper = tuple(float(I[i, j]) for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)))
-    inertial = Inertial(mass, upper, Pose(com))
+    box = np.diag([y + z, x + z, x + y]) * mass / 12
+    I = symmetric_matrix("inertia", box if inertia is None else inertia, 3)
+    inertial = Inertial(mass, upper_triangle(I), Pose(com))
     if fault := inertial_fault(inertial):
-        raise InputError(f"inertia: {fault}")
+        raise InputError(fault, subject="inertia")
     return Link(name, inertial, (Geometry(Shape("box", sides), Pose(com), _TOOL_COLOR),))
 
 
@@ -195,7 +191,7 @@ def _triple(name: str, value: ArrayLike) -> tuple[float, ...]:
 
 def _check_name(what: str, name: str) -> None:
     if not isinstance(name, str) or not is_name(name):
-        raise InputError(f"{what}: expected {NAME_RULE}, found {name!r}")
+        raise InputError(f"expected {NAME_RULE}, found {name!r}", subject=what)
 
 
 def _check_meshes(document: Document, file: Path) -> None:
@@ -206,7 +202,7 @@ def _check_meshes(document: Document, file: Path) -> None:
         for geometry in (*link.visuals, *link.collisions):
             filename = geometry.shape.filename
             if filename is not None and not filename.startswith("package://"):
-                raise RobotError(
-                    f"{document.where(link, geometry.line)}: mesh '{filename}': expected to write into its "
-                    f"folder {document.file.parent}, found {file.resolve().parent}"
+                folders = f"into its folder {document.file.parent}, found {file.resolve().parent}"
+                raise document.error(
+                    f"mesh '{filename}': expected to write {folders}", link, line=geometry.line
                 )

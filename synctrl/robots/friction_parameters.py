@@ -59,7 +59,9 @@ class FrictionParameters:
         instance("robot", robot, Robot, "a Robot, for example from load_robot")
         instance("friction", friction, (Friction, NoneType), "a Friction, or none")
         if isinstance(base, FrictionParameters):
-            raise InputError("base: expected parameters of the rigid bodies, found some with friction")
+            raise InputError(
+                "expected parameters of the rigid bodies, found some with friction", subject="base"
+            )
         self.base = FullParameters(robot) if base is None else base
         self.robot, self.friction, self.armature = robot, friction, boolean("armature", armature)
         kinds = ("viscous", "coulomb", *(("armature",) if armature else ()))
@@ -136,12 +138,15 @@ def with_friction_columns(
 
 def _unknown() -> InputError:
     return InputError(
-        "friction: expected the true friction of the joints, found none; give these parameters to a member "
-        "that has it, whose `theta` are then the true values"
+        "expected the true friction of the joints, found none; give these parameters to a member "
+        "that has it, whose `theta` are then the true values",
+        subject="friction",
     )
 
 
 def _spread(robot: Robot, name: str, value: np.ndarray) -> np.ndarray:
     if value.shape not in ((), (1,), (robot.nv,)):
-        raise InputError(f"friction, {name}: expected a number or shape ({robot.nv},), found {value.shape}")
+        raise InputError(
+            f"expected a number or shape ({robot.nv},), found {value.shape}", subject=f"friction, {name}"
+        )
     return np.broadcast_to(value, (robot.nv,)).copy()

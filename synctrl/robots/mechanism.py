@@ -67,8 +67,9 @@ def _mechanism(robot: Robot) -> tuple[Mechanism, pin.SE3]:
     roots = [j for j in range(1, model.njoints) if model.parents[j] == 0]
     if len(roots) != 1 or tip.parentJoint == 0:
         raise RobotError(
-            f"robot '{robot.name}': the compiled engine needs one joint on the base and a tip that moves, "
-            f"found {len(roots)} joints on the base and tip '{robot.tip}'; use engine='pinocchio'"
+            "the compiled engine needs one joint on the base and a tip that moves, "
+            f"found {len(roots)} joints on the base and tip '{robot.tip}'; use engine='pinocchio'",
+            subject=f"robot '{robot.name}'",
         )
     joints = tuple(_joint(model, j, first=j == roots[0]) for j in range(1, model.njoints))
     fixed = Mechanism(

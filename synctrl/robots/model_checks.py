@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from ..errors import RobotError
+from .pseudo_inertia import principal_moments
 
 
 def check_joints(robot: str, model: pin.Model) -> None:
@@ -17,8 +18,10 @@ def check_joints(robot: str, model: pin.Model) -> None:
     for joint, name in zip(model.joints[1:], model.names[1:], strict=False):
         if joint.nv != 1:
             raise RobotError(
-                f"robot '{robot}': joint '{name}' has {joint.nv} degrees of freedom; "
-                "expected joints with one (fixed-base arms of revolute and prismatic joints)"
+                f"joint '{name}' has {joint.nv} degrees of freedom; "
+                "expected joints with one (fixed-base arms of revolute and prismatic joints)",
+                subject=f"robot '{robot}'",
+                found=name,
             )
 
 
@@ -28,22 +31,23 @@ def check_numbering(robot: str, model: pin.Model) -> None:
         carried = list(model.subtrees[joint])
         if carried != list(range(joint, joint + len(carried))):
             raise RobotError(
-                f"robot '{robot}': expected joints numbered branch after branch, found joint "
-                f"'{model.names[joint]}' to carry the joints {carried}"
+                "expected joints numbered branch after branch, found joint "
+                f"'{model.names[joint]}' to carry the joints {carried}",
+                subject=f"robot '{robot}'",
+                found=model.names[joint],
             )
 
 
 def check_inertia(robot: str, joint: str, row: np.ndarray) -> None:
     """Refuse ten inertial parameters that no body can have."""
-    m, h = row[0], row[1:4]
-    ixx, ixy, iyy, ixz, iyz, izz = row[4:]
-    about_joint = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-    if m <= 0:
-        raise RobotError(f"robot '{robot}', body of '{joint}': expected a mass above 0 kg, found {m:g}")
-    S = np.array([[0, -h[2], h[1]], [h[2], 0, -h[0]], [-h[1], h[0], 0]])
-    lowest = np.linalg.eigvalsh(about_joint + S @ S / m)[0]
+    body = f"robot '{robot}', body of '{joint}'"
+    if row[0] <= 0:
+        raise RobotError(f"expected a mass above 0 kg, found {row[0]:g}", subject=body, found=row[0])
+    lowest = principal_moments(row)[0]
     if lowest <= 0:
         raise RobotError(
-            f"robot '{robot}', body of '{joint}': expected a positive definite inertia about the centre of "
-            f"mass, found a smallest eigenvalue of {lowest:g} kg·m^2"
+            f"expected a positive definite inertia about the centre of mass, found a smallest eigenvalue of "
+            f"{lowest:g} kg·m^2",
+            subject=body,
+            found=lowest,
         )

@@ -70,7 +70,7 @@ class LinearParameters:
         self.matrix = finite_array("matrix", matrix, (10 * robot.body_count, self.theta.size))
         self.names = tuple(names)
         if len(self.names) != self.theta.size:
-            raise InputError(f"names: expected {self.theta.size} names, found {len(self.names)}")
+            raise InputError(f"expected {self.theta.size} names, found {len(self.names)}", subject="names")
         _check_torque(robot, self)
 
     def regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
@@ -113,6 +113,7 @@ def _check_torque(robot: Robot, parameters: LinearParameters) -> None:
         error = np.abs(parameters.regressor(q, v, v, a) @ parameters.theta - expected).max()
         if error > 1e-9 * (1 + np.abs(expected).max()):
             raise InputError(
-                f"matrix: Y B theta differs from the torque of robot '{robot.name}' by {error:.3g} N·m; "
-                "expected a map and true values that describe its dynamics"
+                f"Y B theta differs from the torque of robot '{robot.name}' by {error:.3g} N·m; "
+                "expected a map and true values that describe its dynamics",
+                subject="matrix",
             )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from ..checks import finite_array, instance, positive_number
+from ..checks import finite_array, instance, positive_number, symmetric_matrix
 from ..errors import FrameNotFound, InputError
 from .documents import weld
 from .robot import Robot
@@ -47,14 +47,14 @@ class Load:
             radius = np.cbrt(3 * self.mass / (4 * np.pi * 1000.0))
             return 0.4 * self.mass * radius**2 * np.eye(3)
         given = finite_array("payload, inertia", self.inertia)
-        inertia = finite_array("payload, inertia", np.diag(given) if given.shape == (3,) else given, (3, 3))
-        if not np.allclose(inertia, inertia.T, rtol=1e-12, atol=0):
-            raise InputError(f"payload, inertia: expected a symmetric matrix, found {inertia.tolist()}")
+        full = np.diag(given) if given.shape == (3,) else given
+        inertia = symmetric_matrix("payload, inertia", full, 3)
         moments = np.linalg.eigvalsh(inertia)
         if moments[0] <= 0 or moments[2] > (1 + 1e-9) * (moments[0] + moments[1]):
             raise InputError(
-                "payload, inertia: expected positive principal moments, none larger than the sum of the "
-                f"others, found {moments.tolist()} kg·m^2"
+                "expected positive principal moments, none larger than the sum of the "
+                f"others, found {moments.tolist()} kg·m^2",
+                subject="payload, inertia",
             )
         return inertia
 
@@ -71,7 +71,9 @@ def carrying(robot: Robot, load: Load) -> Robot:
         raise FrameNotFound(robot.name, name, [frame.name for frame in robot.model.frames])
     frame = robot.model.frames[robot.model.getFrameId(name)]
     if frame.parentJoint == 0:
-        raise InputError(f"payload, frame: expected one of robot '{robot.name}' that moves, found '{name}'")
+        raise InputError(
+            f"expected one of robot '{robot.name}' that moves, found '{name}'", subject="payload, frame"
+        )
     model = pin.Model(robot.model)
     body = pin.Inertia(load.mass, np.array(load.com), np.array(load.inertia))
     model.appendBodyToJoint(frame.parentJoint, body, frame.placement)

@@ -46,6 +46,14 @@ def dual(gradient: np.ndarray) -> np.ndarray:
     return (gradient @ _D_ROWS).reshape(*gradient.shape[:-1], 4, 4)
 
 
+def principal_moments(theta: np.ndarray) -> np.ndarray:
+    """Moments of inertia of one body about its centre of mass, (3,), ascending, of its parameters, (10,)."""
+    m, h = theta[0], theta[1:4]
+    xx, xy, yy, xz, yz, zz = theta[4:]
+    about_origin = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return np.linalg.eigvalsh(about_origin - (h @ h * np.eye(3) - np.outer(h, h)) / m)
+
+
 def smallest_eigenvalues(theta: np.ndarray) -> np.ndarray:
     """Smallest eigenvalue of P per body, (..., bodies), of inertial parameters, (..., 10 bodies)."""
     return np.linalg.eigvalsh(pseudo_inertia(theta.reshape(*theta.shape[:-1], -1, 10)))[..., 0]

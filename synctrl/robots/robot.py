@@ -126,7 +126,7 @@ class Robot:
         """
         values = np.broadcast_to(finite_array("armature", armature), (self.nv,))
         if values.min() < 0:
-            raise InputError(f"armature: expected at least 0 kg·m^2, found {values.min():g}")
+            raise InputError(f"expected at least 0 kg·m^2, found {values.min():g}", subject="armature")
         model = pin.Model(self.model)
         model.armature = values.copy()
         return type(self)(model, self.tip, visual=self.visual, name=self.name, document=self.document)
@@ -278,7 +278,7 @@ def load_robot(name_or_path: str | Path, tip: str | None = None) -> Robot:
         FrameNotFound: no such frame.
     """
     if not isinstance(name_or_path, (str, Path)):
-        raise InputError(f"robot: expected a name or a path, found {type(name_or_path).__name__}")
+        raise InputError(f"expected a name or a path, found {type(name_or_path).__name__}", subject="robot")
     found = load_description(name_or_path)
     tip = found.tip if tip is None else tip
     return Robot(found.model, tip, visual=found.visual, name=found.name, document=found.document)

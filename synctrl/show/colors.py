@@ -32,14 +32,16 @@ def read_color(name: str, color: ColorLike) -> Color:
         return to_rgba(given)
     except ValueError:
         raise InputError(
-            f"{name}: color: expected #rrggbb, a name, or three or four numbers, found {given!r}"
+            f"color: expected #rrggbb, a name, or three or four numbers, found {given!r}", subject=name
         ) from None
 
 
 def within_unit(name: str, rgb: np.ndarray) -> np.ndarray:
     """`rgb` if all its numbers are in [0, 1]."""
     if rgb.size and (rgb.min() < 0 or rgb.max() > 1):
-        raise InputError(f"{name}: color: expected numbers in [0, 1], found {rgb.min():g} to {rgb.max():g}")
+        raise InputError(
+            f"color: expected numbers in [0, 1], found {rgb.min():g} to {rgb.max():g}", subject=name
+        )
     return rgb
 
 

@@ -39,7 +39,9 @@ def cell_layout(result: Result, experiment: Experiment | None = None) -> Figure:
     """
     check_run(result, "x", "x_desired", "q")
     if result.info["axes"] != ["x", "y"]:
-        raise InputError(f"result: expected a run along x and y, found {', '.join(result.info['axes'])}")
+        raise InputError(
+            f"expected a run along x and y, found {', '.join(result.info['axes'])}", subject="result"
+        )
     experiment = shown_experiment(result, experiment)
     with style():
         figure, panels = new_figure(5.4, columns=2, width=8.8, gridspec_kw={"width_ratios": (0.4, 1.0)})

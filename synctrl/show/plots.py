@@ -170,7 +170,7 @@ def common_limits(kind: str, *results: Result) -> tuple[float, float]:
     choice("kind", kind, ERRORS)
     own = [_needed(result, kind) for result in results]
     if not own:
-        raise InputError("results: expected at least one run, found none")
+        raise InputError("expected at least one run, found none", subject="results")
     return min(low for low, _ in own), max(high for _, high in own)
 
 
@@ -230,14 +230,14 @@ def _mark_disturbances(panel: Axes, result: Result) -> list[Any]:
 def _read_limits(limits: tuple[float, float]) -> tuple[float, float]:
     low, high = finite_array("limits", limits, (2,))
     if not low < high:
-        raise InputError(f"limits: expected the lower one first, found {low:g} and {high:g}")
+        raise InputError(f"expected the lower one first, found {low:g} and {high:g}", subject="limits")
     return float(low), float(high)
 
 
 def _check_robot(result: Result, robot: int) -> None:
     last = len(result.names) - 1
     if isinstance(robot, bool) or not isinstance(robot, (int, np.integer)) or not 0 <= robot <= last:
-        raise InputError(f"robot: expected an index from 0 to {last}, found {robot!r}")
+        raise InputError(f"expected an index from 0 to {last}, found {robot!r}", subject="robot")
 
 
 def _needed(result: Result, kind: str) -> tuple[float, float]:

@@ -37,7 +37,7 @@ def formation_scene(result: Result, fps: float = 25) -> Scene:
     check_run(result, *DRAWN)
     if list(result.info["axes"]) != ["x", "y", "z"]:
         found = ", ".join(result.info["axes"])
-        raise InputError(f"result: expected tips along x, y and z, found the coordinates {found}")
+        raise InputError(f"expected tips along x, y and z, found the coordinates {found}", subject="result")
     frames = frame_indices(result, fps)
     caption = "Bars between compared tips turn red with the synchronization error."
     scene = arms_scene(result, None, frames, fps, caption)
@@ -69,7 +69,9 @@ def payload_scene(result: Result, size: ArrayLike, fps: float = 25) -> Scene:
     scene = arms_scene(result, None, frames, fps, caption)
     hands = [member.trajectory for member in result.experiment.cell.members]
     if len(hands) != 2 or not all(isinstance(hand, Attached) for hand in hands):
-        raise InputError("result: expected two robots whose desired motions are Attached to a payload")
+        raise InputError(
+            "expected two robots whose desired motions are Attached to a payload", subject="result"
+        )
     position, orientation = _held(result.x[frames], hands)
     extent = finite_array("size", size, (3,))
     color = error_colors(result)[frames, 0]

@@ -28,15 +28,17 @@ def check_run(result: Result, *arrays: str) -> None:
     """
     instance("result", result, Result, "a Result")
     if not len(result.t):
-        raise InputError(f"run '{result.info['title']}': nothing was logged, so there is nothing to draw")
+        raise InputError(
+            "nothing was logged, so there is nothing to draw", subject=f"run '{result.info['title']}'"
+        )
     for name in arrays:
         numbers = getattr(result, name)
         seen = np.abs(numbers) <= LARGEST
         if not seen.all():
             found = numbers[~seen][0]
             raise InputError(
-                f"run '{result.info['title']}', {name}: expected numbers up to {LARGEST:g} to draw, found "
-                f"{found:g}; the run went astray"
+                f"expected numbers up to {LARGEST:g} to draw, found {found:g}; the run went astray",
+                subject=f"run '{result.info['title']}', {name}",
             )
 
 
@@ -48,15 +50,17 @@ def shown_experiment(result: Result, experiment: Experiment | None) -> Experimen
     """
     if experiment is None and result.experiment is None:
         raise InputError(
-            "experiment: expected the one that made this result, or one that still has its experiment; "
-            "this one was loaded from a file"
+            "expected the one that made this result, or one that still has its experiment; "
+            "this one was loaded from a file",
+            subject="experiment",
         )
     experiment = experiment_of(result, experiment)
     cell = experiment.cell
     if (cell.n, cell.nv, cell.m) != (*result.q.shape[1:], result.x.shape[2]):
         raise InputError(
-            f"experiment: expected the one that made the result, of {result.q.shape[1]} robots with up to "
-            f"{result.q.shape[2]} joints and {result.x.shape[2]} coordinates, found {cell!r}"
+            f"expected the one that made the result, of {result.q.shape[1]} robots with up to "
+            f"{result.q.shape[2]} joints and {result.x.shape[2]} coordinates, found {cell!r}",
+            subject="experiment",
         )
     return experiment
 
@@ -70,7 +74,8 @@ def frame_times(result: Result, fps: float) -> np.ndarray:
     fps = positive_number("fps", fps)
     if result.t[-1] * fps > MOST_FRAMES:
         raise InputError(
-            f"fps: expected at most {MOST_FRAMES} frames, found {result.t[-1] * fps:.3g} at {fps:g} a second"
+            f"expected at most {MOST_FRAMES} frames, found {result.t[-1] * fps:.3g} at {fps:g} a second",
+            subject="fps",
         )
     return np.append(0.0, np.arange(0.0, result.t[-1], 1 / fps)[1:])
 

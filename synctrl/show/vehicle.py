@@ -55,8 +55,9 @@ def vehicle_animation(result: Result, wheel_radius: float, track: float, fps: fl
     check_run(result, "x", "x_desired")
     if result.x.shape[1:] != (2, 1):
         raise InputError(
-            f"result: expected two wheels with one angle each, found {result.x.shape[1]} robots with "
-            f"{result.x.shape[2]} coordinates"
+            f"expected two wheels with one angle each, found {result.x.shape[1]} robots with "
+            f"{result.x.shape[2]} coordinates",
+            subject="result",
         )
     times = frame_times(result, fps)
     frames = np.searchsorted(0.5 * (result.t[1:] + result.t[:-1]), times)  # the nearest logged instants

@@ -170,9 +170,9 @@ def make_clock(
     """
     duration, dt = positive_number("duration", duration), positive_number("dt", dt)
     if dt > duration:
-        raise InputError(f"dt: expected at most the duration of {duration:g} s, found {dt:g} s")
+        raise InputError(f"expected at most the duration of {duration:g} s, found {dt:g} s", subject="dt")
     if duration / dt > MAX_STEPS:
-        raise InputError(f"dt: {duration:g} s in steps of {dt:g} s are more than {MAX_STEPS} steps")
+        raise InputError(f"{duration:g} s in steps of {dt:g} s are more than {MAX_STEPS} steps", subject="dt")
     every = 1 if log_dt is None else multiple("log_dt", log_dt, dt)
     bare = Clock(dt, int(np.ceil(duration / dt - 1e-9)), duration, every=every)
     near = [(_nearest(bare, instant, least=1), float(instant)) for instant in breaks]
@@ -234,5 +234,5 @@ def multiple(name: str, interval: float, dt: float) -> int:
     interval = positive_number(name, interval)
     count = round(interval / dt)
     if count < 1 or abs(count * dt - interval) > 1e-9 * interval:
-        raise InputError(f"{name}: expected a multiple of dt = {dt:g} s, found {interval:g} s")
+        raise InputError(f"expected a multiple of dt = {dt:g} s, found {interval:g} s", subject=name)
     return count

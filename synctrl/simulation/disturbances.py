@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array, finite_number, instance
+from ..checks import finite_array, finite_number, index, instance, window
 from ..coupling.cell import Cell
 from ..errors import InputError
 
@@ -33,10 +33,8 @@ class Disturbance:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "torque", finite_array("disturbance, torque", self.torque))
-        start = finite_number("disturbance, start", self.start)
-        stop = finite_number("disturbance, stop", self.stop)
-        if not 0 <= start < stop:
-            raise InputError(f"disturbance: expected 0 <= start < stop, found {start:g} and {stop:g} s")
+        finite_number("disturbance, stop", self.stop)  # it has an end, unlike a payload
+        window("disturbance", self.start, self.stop)
 
 
 class DisturbanceSchedule:
@@ -76,13 +74,11 @@ class DisturbanceSchedule:
 
 
 def _check(cell: Cell, disturbance: Disturbance) -> None:
-    if not isinstance(disturbance, Disturbance):
-        raise InputError(f"disturbances: expected Disturbance objects, found {type(disturbance).__name__}")
-    robot = disturbance.robot
-    if isinstance(robot, bool) or not isinstance(robot, (int, np.integer)) or not 0 <= robot < cell.n:
-        raise InputError(f"disturbance, robot: expected an index from 0 to {cell.n - 1}, found {robot!r}")
+    instance("disturbances", disturbance, Disturbance, "Disturbance objects")
+    robot = index("disturbance, robot", disturbance.robot, cell.n)
     nv = cell.robots[robot].nv
     if disturbance.torque.shape not in ((), (nv,)):
         raise InputError(
-            f"disturbance, torque: expected a number or shape ({nv},), found {disturbance.torque.shape}"
+            f"expected a number or shape ({nv},), found {disturbance.torque.shape}",
+            subject="disturbance, torque",
         )

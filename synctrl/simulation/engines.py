@@ -64,5 +64,7 @@ def find_engine(engine: str | Engine) -> Engine:
         return getattr(import_module(module), kind)()
     if isinstance(engine, type) or not all(callable(getattr(engine, m, None)) for m in ("refuses", "run")):
         known = ", ".join(map(repr, ENGINES))
-        raise InputError(f"engine: expected one of {known}, or an engine of your own, found {engine!r}")
+        raise InputError(
+            f"expected one of {known}, or an engine of your own, found {engine!r}", subject="engine"
+        )
     return engine

@@ -38,8 +38,9 @@ class Pid:
     def __post_init__(self) -> None:
         for name in "PID":
             gain = finite_array(name, getattr(self, name))
-            if gain.size and gain.min() < 0:
-                raise InputError(f"{name}: expected gains of at least 0, found {gain.min():g}")
+            least = float(gain.min(initial=0.0))
+            if least < 0:
+                raise InputError(f"expected gains of at least 0, found {least:g}", subject=name, found=least)
             object.__setattr__(self, name, gain)
 
 
@@ -62,14 +63,18 @@ class HeldJointsPlant(Plant):
 
     def __init__(self, cell: Cell, *, robots: Sequence[Robot], pid: Pid, at: ArrayLike = 0.0, **options: Any):
         if len(robots) != cell.n:
-            raise InputError(f"robots: expected {cell.n}, one per robot of the cell, found {len(robots)}")
+            raise InputError(
+                f"expected {cell.n}, one per robot of the cell, found {len(robots)}",
+                subject="robots",
+                found=len(robots),
+            )
         super().__init__(cell, robots=robots, **options)
         self.pid = pid
         split = [_split(known, real) for known, real in zip(cell.robots, robots, strict=True)]
         self._known, self._held = ([part[k] for part in split] for k in range(2))
         self._count = len(self._held[0])
         if any(len(held) != self._count for held in self._held):
-            raise InputError("robots: expected the same number of held joints for all of them")
+            raise InputError("expected the same number of held joints for all of them", subject="robots")
         self.at_rest = np.broadcast_to(finite_array("at", at), (self._count,))
         limits = [joint_limits(robot).torque[held] for robot, held in zip(robots, self._held, strict=True)]
         self._held_limits = np.array(limits)
@@ -84,7 +89,9 @@ class HeldJointsPlant(Plant):
     ) -> tuple[np.ndarray, np.ndarray]:
         if hidden.size != self.hidden0.size:
             raise InputError(
-                f"state: expected {self.hidden0.size} numbers of the held joints, found {hidden.size}"
+                f"expected {self.hidden0.size} numbers of the held joints, found {hidden.size}",
+                subject="state",
+                found=hidden.size,
             )
         rows = hidden.reshape(-1, 3, self._count)
         held_tau = self._torque(rows)
@@ -145,9 +152,11 @@ def _split(known: Robot, real: Robot) -> tuple[list[int], list[int]]:
     """Joints of the real robot that the controller knows, in its order, and the others."""
     missing = [name for name in known.joint_names if name not in real.joint_names]
     if missing:
+        names = ", ".join(missing)
         raise InputError(
-            f"robots: expected robot '{real.name}' to have the joints of '{known.name}', found none called "
-            f"{', '.join(missing)}"
+            f"expected robot '{real.name}' to have the joints of '{known.name}', found none called {names}",
+            subject="robots",
+            found=names,
         )
     found = [real.joint_names.index(name) for name in known.joint_names]
     return found, [k for k in range(real.nv) if k not in found]

@@ -110,8 +110,9 @@ def _check_thread(method: str, version: str) -> None:
     old = tuple(map(int, version.split(".")[:2])) < (1, 17)
     if method == "LSODA" and old and current_thread() is not main_thread():
         raise InputError(
-            f"integrator: LSODA of SciPy {version} solves one problem at a time, so it runs in the main "
-            f"thread only, found thread '{current_thread().name}'; use another method, or SciPy 1.17 or newer"
+            f"LSODA of SciPy {version} solves one problem at a time, so it runs in the main thread only, "
+            f"found thread '{current_thread().name}'; use another method, or SciPy 1.17 or newer",
+            subject="integrator",
         )
 
 

@@ -31,8 +31,9 @@ def check_fits(clock: Clock, row: int) -> None:
     if fitting > 1:
         advice = f"log_dt={-(-clock.count // (fitting - 1)) * clock.dt:.12g} would"
     raise InputError(
-        f"log_dt: the log of {clock.rows} instants takes {clock.rows * row} bytes, and {available} bytes of "
-        f"memory are available; expected a log that fits into {SHARE:.0%} of them: {advice}"
+        f"the log of {clock.rows} instants takes {clock.rows * row} bytes, and {available} bytes of "
+        f"memory are available; expected a log that fits into {SHARE:.0%} of them: {advice}",
+        subject="log_dt",
     )
 
 

@@ -100,8 +100,9 @@ def _common_gravity(cell: Cell) -> np.ndarray:
     for name, vector in zip(cell.names, vectors, strict=True):
         if not np.array_equal(vector, vectors[0]):
             raise InputError(
-                f"cell: MuJoCo has one gravity for all robots, expected that of {cell.names[0]}, "
-                f"{vectors[0].tolist()} m/s^2, for {name} as well, found {vector.tolist()}"
+                f"MuJoCo has one gravity for all robots, expected that of {cell.names[0]}, "
+                f"{vectors[0].tolist()} m/s^2, for {name} as well, found {vector.tolist()}",
+                subject="cell",
             )
     return vectors[0]
 

@@ -81,9 +81,10 @@ class MujocoArm:
             if off.max() > SAME_MASS:
                 joint, version = robot.joint_names[off.argmax()], self._mujoco.__version__
                 raise InputError(
-                    f"plant='mujoco': robot '{robot.name}' has another mass matrix in MuJoCo {version} than "
-                    f"in its model, by {off.max():.2g} of its diagonal at joint '{joint}'; expected a URDF "
-                    "that describes the model"
+                    "expected a URDF that describes the model, found another mass matrix in MuJoCo "
+                    f"{version}, by {off.max():.2g} of its diagonal at joint '{joint}'",
+                    subject=f"plant='mujoco', robot '{robot.name}'",
+                    found=joint,
                 )
 
     def __reduce__(self) -> tuple:
@@ -106,7 +107,8 @@ def require_mujoco() -> Any:
     if int(mujoco.__version__.partition(".")[0]) < OLDEST:
         raise MissingDependencyError(
             f"plant='mujoco' needs MuJoCo {OLDEST}.0 or newer, found {mujoco.__version__}, which reads "
-            "inertias in turned axes wrongly; install one with: pip install --upgrade 'synctrl[mujoco]'"
+            "inertias in turned axes wrongly; install one with: pip install --upgrade 'synctrl[mujoco]'",
+            found=mujoco.__version__,
         )
     return mujoco
 
@@ -119,8 +121,9 @@ def describe_arm(robot: Robot) -> str:
     """
     if robot.document is None:
         raise InputError(
-            f"MuJoCo reads a robot's URDF, and robot '{robot.name}' has none that describes it; use "
-            "load_robot, or plant='pinocchio'"
+            "MuJoCo reads a robot's URDF, and there is none that describes this one; use load_robot, or "
+            "plant='pinocchio'",
+            subject=f"plant='mujoco', robot '{robot.name}'",
         )
     text = dynamics_xml(_for_mujoco(robot.document))
     start = text.index(">", text.index("<robot")) + 1

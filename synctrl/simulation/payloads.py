@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import finite_number
-from ..errors import InputError
+from ..checks import index, instance, window
 from ..robots.payload import Load, carrying
 from ..robots.robot import Robot
 
@@ -49,10 +48,7 @@ class Payload:
         load = Load(self.mass, self.com, self.inertia, self.frame)
         for name in ("mass", "com", "inertia"):
             object.__setattr__(self, name, getattr(load, name))
-        start = finite_number("payload, start", self.start)
-        stop = np.inf if self.stop is None else finite_number("payload, stop", self.stop)
-        if not 0 <= start < stop:
-            raise InputError(f"payload: expected 0 <= start < stop, found {start:g} and {stop:g} s")
+        window("payload", self.start, self.stop)
 
     @property
     def load(self) -> Load:
@@ -95,7 +91,8 @@ class PayloadSchedule:
 
     def __init__(self, robots: Sequence[Robot], payloads: Sequence[Payload]):
         for payload in payloads:
-            _check(len(robots), payload)
+            instance("payloads", payload, Payload, "Payload objects")
+            index("payload, robot", payload.robot, len(robots))
         changes = {t for p in payloads for t in (p.start, p.stop) if t is not None and t > 0}
         self.free = tuple(robots)
         self.edges = tuple(sorted(float(t) for t in changes))
@@ -114,11 +111,3 @@ def _loaded(robot: Robot, i: int, payloads: Sequence[Payload], t: float) -> Robo
         if payload.robot == i and payload.carried_at(t):
             robot = carrying(robot, payload.load)
     return robot
-
-
-def _check(count: int, payload: Payload) -> None:
-    if not isinstance(payload, Payload):
-        raise InputError(f"payloads: expected Payload objects, found {type(payload).__name__}")
-    robot = payload.robot
-    if isinstance(robot, bool) or not isinstance(robot, (int, np.integer)) or not 0 <= robot < count:
-        raise InputError(f"payload, robot: expected an index from 0 to {count - 1}, found {robot!r}")

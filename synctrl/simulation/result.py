@@ -125,7 +125,7 @@ class Result:
         """
         instance("every", every, (int, np.integer), "a whole number")
         if isinstance(every, bool) or every < 1:
-            raise InputError(f"every: expected a whole number above 0, found {every!r}")
+            raise InputError(f"expected a whole number above 0, found {every!r}", subject="every")
         last = max(len(self.t) - 1, 0)
         kept = np.union1d(np.arange(0, last, every), [last] if len(self.t) else []).astype(int)
         arrays = {name: getattr(self, name)[kept] for name in LAYOUT}
@@ -186,11 +186,11 @@ def _check_outputs(result: Result) -> None:
     described = result.info.get("outputs", {})
     if described.keys() != result.outputs.keys():
         raise InputError(
-            f"outputs: expected those of info['outputs'], {[*described]}, found {[*result.outputs]}"
+            f"expected those of info['outputs'], {[*described]}, found {[*result.outputs]}", subject="outputs"
         )
     expected = shapes(result.info, len(result.t)) if described else {}
     for name, array in result.outputs.items():
         try:
             check_shape(name, array.dtype, array.shape, expected[f"{OUTPUTS}{name}"])
         except ResultError as error:
-            raise InputError(f"outputs: {error}") from None
+            raise InputError(str(error), subject="outputs") from None

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..errors import ResultError
 from ..files import whole_file
-from .result_schema import check_arrays, check_info, check_shape, shapes
+from .result_schema import check_array_names, check_arrays, check_info, check_shape, shapes
 from .schema import read_json
 
 #: what reading a file that is no archive, or a damaged one, may raise
@@ -51,7 +51,7 @@ def write_result(path: Path, info: Mapping[str, Any], arrays: Mapping[str, np.nd
         try:
             text = json.dumps(info)
         except (TypeError, ValueError, RecursionError) as error:
-            raise ResultError(f"info: expected plain data, found {error}") from None
+            raise ResultError(f"expected plain data, found {error}", subject="info") from None
         check_info(read_json(text))
         check_arrays(info, arrays)
         content: dict[str, Any] = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
@@ -66,7 +66,7 @@ def read_result(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         ResultError: the file is missing, damaged, or no result.
     """
     if not path.is_file():
-        raise ResultError(f"no result file at '{path}'")
+        raise ResultError(f"no result file at '{path}'", file=path)
     with _named(path, "no result of synctrl can be read from"), path.open("rb") as file:
         size = os.fstat(file.fileno()).st_size  # of what is open: there may be another file of that name now
         with zipfile.ZipFile(file) as archive:
@@ -84,7 +84,9 @@ def _named(path: Path, what: str) -> Iterator[None]:
     try:
         yield
     except (ResultError, *_DAMAGE_OF_ARCHIVES) as error:
-        raise ResultError(f"{what} '{path}': {error}") from error
+        damage = ResultError(f"{what} '{path}': {error}", file=path)
+        damage.subject, damage.found = getattr(error, "subject", None), getattr(error, "found", None)
+        raise damage from error
 
 
 # -- archives ---------------------------------------------------------------------------------------------
@@ -108,13 +110,11 @@ def _read_arrays(
 ) -> dict[str, np.ndarray]:
     """The arrays, each of the shape that info says; how many instants there are says the first one."""
     if "t" not in members:
-        raise ResultError("expected an array 't', found none")
+        raise ResultError("expected one, found none", subject="array 't'")
     with archive.open(members["t"]) as stream:
         instants = _read_header(stream, members["t"]).shape
     expected = shapes(info, instants[0] if instants else 0)
-    if members.keys() != expected.keys():
-        different = ", ".join(sorted(members.keys() ^ expected.keys()))
-        raise ResultError(f"expected the arrays that info speaks of, these differ: {different}")
+    check_array_names(members, expected)
     return {name: _read_array(archive, members[name], name, expected[name]) for name in expected}
 
 
@@ -130,11 +130,13 @@ def _read_array(
 def _read_text(archive: zipfile.ZipFile, member: zipfile.ZipInfo | None) -> str:
     """The one text of an array that holds nothing else."""
     if member is None:
-        raise ResultError("expected an array 'info', found none")
+        raise ResultError("expected one, found none", subject="array 'info'")
     with archive.open(member) as stream:
         header = _read_header(stream, member)
         if header.dtype.kind != "U" or header.shape:
-            raise ResultError(f"info: expected a text, found {header.dtype} of shape {header.shape}")
+            raise ResultError(
+                f"expected a text, found {header.dtype} of shape {header.shape}", subject="info"
+            )
         return str(_read_numbers(stream, header))
 
 
@@ -155,18 +157,19 @@ def _read_header(stream: IO[bytes], member: zipfile.ZipInfo) -> Header:
     length = int.from_bytes(start[len(MAGIC) :], "little")
     found = _HEADER.fullmatch(stream.read(length))
     if not start.startswith(MAGIC) or found is None:
-        raise ResultError(f"{member.filename!a}: expected an array of numbers or a text")
+        raise ResultError("expected an array of numbers or a text", subject=f"{member.filename!a}")
     byte_order, kind, width, fortran, lengths = (part.decode("ascii") for part in found.groups())
     shape = tuple(int(k) for k in lengths.replace(",", " ").split())
     if kind == "f" and width != "8":
-        raise ResultError(f"{member.filename!a}: expected float64, found float{8 * int(width)}")
+        raise ResultError(f"expected float64, found float{8 * int(width)}", subject=f"{member.filename!a}")
     size = int(width) * (4 if kind == "U" else 1)
     for k in shape:
         size *= k
     if len(start) + length + size != member.file_size:
         raise ResultError(
-            f"{member.filename!a}: expected {size} bytes of an array of shape {shape}, found "
-            f"{member.file_size - length - len(start)}"
+            f"expected {size} bytes of an array of shape {shape}, found "
+            f"{member.file_size - length - len(start)}",
+            subject=f"{member.filename!a}",
         )
     return Header(np.dtype(f"{byte_order}{kind}{width}"), "F" if fortran == "True" else "C", shape)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from itertools import chain
 from types import MappingProxyType
 from typing import Any
@@ -160,23 +160,24 @@ def check_info(info: Any) -> None:
     for name, about in info.get("outputs", {}).items():
         if not name.isidentifier() or about["axes"][0] != "time":
             raise ResultError(
-                f"info, outputs, {name}: expected an identifier with 'time' as its first axis, found "
-                f"{about['axes']!a:.80}"
+                f"expected an identifier with 'time' as its first axis, found {about['axes']!a:.80}",
+                subject=f"info, outputs, {name}",
             )
 
 
 def _check_robots(robots: list[dict[str, Any]], sizes: Mapping[str, int]) -> None:
     """What a robot says of itself has to fit together, and into the arrays."""
     if len({robot["name"] for robot in robots}) < len(robots):
-        raise ResultError("info, robots: expected another name for each robot, found one twice")
+        raise ResultError("expected another name for each robot, found one twice", subject="info, robots")
     for k, robot in enumerate(robots):
         found = {name: len(robot[name]) for name in ("joints", "parameters", "theta")}
         limits = len(robot.get("torque_limits", robot["joints"]))
         fits = found["joints"] <= sizes["joint"] and found["parameters"] <= sizes["parameter"]
         if not fits or found["theta"] != found["parameters"] or limits != found["joints"]:
             raise ResultError(
-                f"info, robots[{k}]: expected as many theta as parameters and torque_limits as joints, up to "
-                f"{sizes['parameter']} and {sizes['joint']}, found {found} and {limits} torque_limits"
+                "expected as many theta as parameters and torque_limits as joints, up to "
+                f"{sizes['parameter']} and {sizes['joint']}, found {found} and {limits} torque_limits",
+                subject=f"info, robots[{k}]",
             )
 
 
@@ -203,15 +204,30 @@ def check_arrays(info: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> N
         ResultError: the array, what is expected and what is found.
     """
     expected = shapes(info, arrays["t"].size)
-    if arrays.keys() != expected.keys():
-        different = ", ".join(sorted(arrays.keys() ^ expected.keys()))
-        raise ResultError(f"expected the arrays that info speaks of and no others, these differ: {different}")
+    check_array_names(arrays, expected)
     for name, array in arrays.items():
         check_shape(name, array.dtype, array.shape, expected[name])
         if name in LAYOUT and not np.isfinite(array).all():
             where = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
-            raise ResultError(f"array '{name}': expected finite numbers, found {array[where]} at {where}")
+            raise ResultError(
+                f"expected finite numbers, found {array[where]} at {where}", subject=f"array '{name}'"
+            )
     _check_times(arrays["t"])
+
+
+def check_array_names(found: Iterable[str], expected: Iterable[str]) -> None:
+    """Refuse arrays that are too many or too few.
+
+    Raises:
+        ResultError: with the names that are not in both.
+    """
+    different = ", ".join(sorted({*found} ^ {*expected}))
+    if different:
+        raise ResultError(
+            f"expected those that info speaks of and no others, these differ: {different}",
+            subject="arrays",
+            found=different,
+        )
 
 
 def check_shape(name: str, dtype: np.dtype, found: tuple[int, ...], expected: tuple[int | None, ...]) -> None:
@@ -225,7 +241,7 @@ def check_shape(name: str, dtype: np.dtype, found: tuple[int, ...], expected: tu
     )
     if not fits or dtype != np.float64:
         raise ResultError(
-            f"array '{name}': expected float64 of shape {expected}, found {dtype} of shape {found}"
+            f"expected float64 of shape {expected}, found {dtype} of shape {found}", subject=f"array '{name}'"
         )
 
 
@@ -233,5 +249,6 @@ def _check_times(t: np.ndarray) -> None:
     wrong = np.flatnonzero(~(np.abs(t) <= LATEST) | (np.diff(t, prepend=-np.inf) <= 0))
     if wrong.size:
         raise ResultError(
-            f"array 't': expected times that grow, at most {LATEST:g} s, found {t[wrong[0]]} at {wrong[0]}"
+            f"expected times that grow, at most {LATEST:g} s, found {t[wrong[0]]} at {wrong[0]}",
+            subject="array 't'",
         )

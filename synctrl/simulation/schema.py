@@ -32,7 +32,7 @@ def read_json(text: str) -> Any:
     try:
         data = json.loads(text, object_pairs_hook=_once)
     except (ValueError, RecursionError) as error:
-        raise ResultError(f"info: expected JSON, found {error}") from None
+        raise ResultError(f"expected JSON, found {error}", subject="info") from None
     anything("info", data, {})
     return data
 
@@ -178,4 +178,4 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _refuse(where: str, expected: str, found: Any) -> NoReturn:
-    raise ResultError(f"{where}: expected {expected}, found {found!a:.80}")
+    raise ResultError(f"expected {expected}, found {found!a:.80}", subject=where)

@@ -1,9 +1,23 @@
-"""simulate: a cell under control, from its initial state to a Result."""
+"""simulate: a cell under control, from its initial state to a Result.
+
+Engines make runs with fixed steps, by the method of Runge and Kutta called "rk4". "pinocchio" is the
+reference; "compiled" is the same closed loop as generated C. SciPy's methods choose their steps, and only
+the reference has them; the last bits of "Radau" and "BDF", which solve linear systems, depend on the number
+of threads of the BLAS library. The plant may be computed by "mujoco" instead of "pinocchio": it reads the
+robots' URDF by itself and is an independent judge of the physics. With a control period torque and
+adaptation are held in between, as on a digital controller, which only "rk4" follows. What is computed does
+not depend on what is logged.
+
+A run that has to stop raises a kind of `SimulationError`, which says why; an interrupt, as by Ctrl-C,
+becomes a `RunInterrupted`. These, and whatever else of our errors ends a run that has begun, carry what was
+computed as `.result`. A run that came to its end warns if torque was cut off while the controller went on
+adapting, and if the step of "rk4" was too long: `info["step_error"]` then says which step does.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from ..checks import boolean, choice, instance, label, positive_number
@@ -103,58 +117,31 @@ class Experiment:
         atol: float = 1e-11,
         progress: Progress | None = None,
     ) -> Result:
-        """Run it.
+        """Run it; the head of this module says more of engines, integrators and runs that stop.
 
         Args:
             duration: s; by default the experiment's.
             dt: step of "rk4", s.
-            integrator: "rk4", or a method of SciPy's solve_ivp: "RK45", "RK23", "DOP853", "Radau", "BDF",
-                "LSODA". The last bits of "Radau" and "BDF", which solve linear systems, depend on the number
-                of threads of the BLAS library.
-            engine: "pinocchio", the reference, or "compiled": the same closed loop as generated C, for "rk4";
-                or an `Engine` of one's own.
-            plant: library that computes the plant: "pinocchio", or "mujoco", which reads the robots' URDF by
-                itself and is an independent judge of the physics.
-            control_period: None for continuous control; otherwise torque and adaptation are held for this
-                long, a multiple of dt, s. Only with "rk4".
-            log_dt: interval of the log, a multiple of dt, s; by default dt. What is computed does not depend
-                on it, and every dt is watched.
+            integrator: "rk4", or a method of SciPy's solve_ivp: "RK45", "RK23", "DOP853", "Radau", "BDF" or
+                "LSODA".
+            engine: "pinocchio", "compiled" (the same as generated C), or an `Engine` of one's own.
+            plant: library that computes the plant, "pinocchio" or "mujoco".
+            control_period: None for continuous control; else how long torque is held, a multiple of dt, s.
+            log_dt: interval of the log, a multiple of dt, s; by default dt. Every dt is watched all the same.
             rtol, atol: tolerances of SciPy's methods.
             progress: called now and then with the time reached, s.
 
         Raises:
-            InputError: a duration, step, period, interval or tolerance that is not positive, an unknown
-                integrator or engine, a combination that does not exist, or a log that does not fit into
-                memory.
+            InputError: a value that is wrong or does not go with another, or a log larger than memory.
             UnreachableError: a robot cannot reach its desired positions; raised before anything runs.
             MissingDependencyError, CompilationError: the compiled engine cannot be had, and why.
-            SimulationError: the run had to stop; its kinds say why. This and whatever else of our errors ends
-                a run that has begun carries what was computed as `.result`.
-            RunInterrupted: by Ctrl-C, or another KeyboardInterrupt; it carries the same.
+            SimulationError, RunInterrupted: the run had to stop, or was interrupted.
 
         Warns:
-            SaturationWarning: torque was cut off while the controller went on adapting.
-            StepWarning: the step of "rk4" was too long, and which one does; `info["step_error"]` says more.
+            SaturationWarning, StepWarning: torque was cut off; the step of "rk4" was too long.
         """
-        choice("integrator", integrator, ("rk4", *ADAPTIVE))
-        by = find_engine(engine)
-        if progress is not None and not callable(progress):
-            raise InputError(f"progress: expected a function of the time reached, found {progress!r}")
-        choice("plant", plant, tuple(PHYSICS))
-        tolerances = positive_number("rtol", rtol), positive_number("atol", atol)
         run = self.plan(duration, dt, control_period, plant, log_dt)
-        if integrator != "rk4":
-            _needs_rk4(integrator, engine, control_period)
-        elif (reason := by.refuses(run)) is not None:
-            raise InputError(reason)
-        run.check()
-        if integrator != "rk4":
-            result = run_adaptive(run, integrator, *tolerances, progress)
-        else:
-            result = by.run(run, progress)
-        warn_of_step(result.info["step_error"], result.names, dt)
-        warn_of_saturation(result)
-        return result
+        return _carry_out(run, integrator, engine, (rtol, atol), progress)
 
     def controller(
         self, period: float, *, include_gravity: bool = True, faults: str = "error"
@@ -186,6 +173,7 @@ class Experiment:
         log_dt: float | None = None,
     ) -> Run:
         """Everything that a run needs; arguments as in `simulate`."""
+        choice("plant", plant, tuple(PHYSICS))
         duration = self.duration if duration is None else duration
         loop = self.closed_loop(plant)
         schedule = DisturbanceSchedule(self.cell, self.disturbances)
@@ -233,50 +221,45 @@ def simulate(
 ) -> Result:
     """Run a cell under adaptive synchronized control: `Experiment(...).simulate(...)` in one call.
 
-    Args:
-        cell, gains, duration: as in `Experiment`.
-        disturbances, reference_acceleration, k_r_space, title: as in `Experiment`.
-        payloads, saturate, plant_type, adaptation, law, network: as in `Experiment`.
-        dt, integrator, engine, plant, control_period, log_dt: as in `Experiment.simulate`.
-        rtol, atol, progress: as in `Experiment.simulate`.
-
-    Raises:
-        SynctrlError: see `Experiment` and `Experiment.simulate`.
-        RunInterrupted: by Ctrl-C.
+    The arguments are those of `Experiment` and of `Experiment.simulate`, which say what they mean, and what
+    is raised and warned of.
     """
-    experiment = Experiment(
-        cell,
-        gains,
-        duration,
-        disturbances,
-        reference_acceleration,
-        k_r_space,
-        title,
-        payloads,
-        saturate,
-        plant_type,
-        adaptation,
-        law,
-        network,
-    )
-    return experiment.simulate(
-        dt=dt,
-        integrator=integrator,
-        engine=engine,
-        plant=plant,
-        control_period=control_period,
-        log_dt=log_dt,
-        rtol=rtol,
-        atol=atol,
-        progress=progress,
-    )
+    given = dict(locals())  # every argument by its name
+    experiment = Experiment(**{field.name: given.pop(field.name) for field in fields(Experiment)})
+    return experiment.simulate(**given)
+
+
+def _carry_out(
+    run: Run,
+    integrator: str,
+    engine: str | Engine,
+    tolerances: tuple[float, float],
+    progress: Progress | None,
+) -> Result:
+    """Check what is left to be checked, and make a run."""
+    choice("integrator", integrator, ("rk4", *ADAPTIVE))
+    by = find_engine(engine)
+    if progress is not None and not callable(progress):
+        raise InputError(f"expected a function of the time reached, found {progress!r}", subject="progress")
+    rtol, atol = (positive_number(*each) for each in zip(("rtol", "atol"), tolerances, strict=True))
+    if integrator != "rk4":
+        _needs_rk4(integrator, engine, run.info["control_period"])
+    elif (reason := by.refuses(run)) is not None:
+        raise InputError(reason)
+    run.check()
+    adaptive = integrator != "rk4"
+    result = run_adaptive(run, integrator, rtol, atol, progress) if adaptive else by.run(run, progress)
+    warn_of_step(result.info["step_error"], result.names, run.info["dt"])
+    warn_of_saturation(result)
+    return result
 
 
 def _needs_rk4(integrator: str, engine: str | Engine, control_period: float | None) -> None:
     if engine != "pinocchio":
         raise InputError(f"engine={engine!r} has the integrator 'rk4' only, found {integrator!r}")
     if control_period is not None:
-        raise InputError(f"control_period: sampled control needs the integrator 'rk4', found {integrator!r}")
+        expected = "sampled control needs the integrator 'rk4'"
+        raise InputError(f"{expected}, found {integrator!r}", subject="control_period")
 
 
 def _describe(disturbance: Disturbance) -> dict[str, Any]:

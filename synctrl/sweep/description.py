@@ -36,17 +36,18 @@ def read_about(folder: str | Path) -> dict[str, Any]:
     try:
         about = json.loads(read_regular(path).decode("utf-8"))
     except FileNotFoundError:
-        raise ResultError(f"no sweep in '{folder}': it has no {ABOUT}") from None
+        raise ResultError(f"no sweep in '{folder}': it has no {ABOUT}", file=folder) from None
     except (OSError, ValueError, RecursionError) as error:
-        raise ResultError(f"'{path}' cannot be read: {error}") from error
+        raise ResultError(f"'{path}' cannot be read: {error}", file=path) from error
     if not isinstance(about, dict) or about.get("format") not in list(FORMATS):
         found = about.get("format") if isinstance(about, dict) else type(about).__name__
-        raise ResultError(f"'{path}': expected the format '{FORMAT}', found {found!r}")
+        expected = f"'{path}': expected the format '{FORMAT}'"
+        raise ResultError(f"{expected}, found {found!r}", file=path, found=found)
     try:
         row_format(about)
         checked_bands(about.get("settling_bands"))
     except InputError as error:
-        raise ResultError(f"'{path}': {error}") from error
+        raise ResultError(f"'{path}': {error}", file=path) from error
     return about
 
 
@@ -60,7 +61,7 @@ def row_format(about: Mapping[str, Any]) -> Format:
     measures = FORMATS[about["format"]]
     expected = columns(factors, measures)
     if about.get("columns") != expected:
-        raise InputError(f"columns: expected {expected}, found {about.get('columns')!r}")
+        raise InputError(f"expected {expected}, found {about.get('columns')!r}", subject="columns")
     duration = positive_number("duration", about.get("duration"))
     if "search" in about:
         instance("search", about["search"], Mapping, "a description of the search")
@@ -68,7 +69,9 @@ def row_format(about: Mapping[str, Any]) -> Format:
         return Format(expected, Generations(factors, population), duration, measures)
     draws = Draws(factors, count("samples", about.get("samples")), count("seed", about.get("seed"), least=0))
     if about.get("runs") != draws.count:
-        raise InputError(f"runs: expected {draws.count}, as the factors say, found {about.get('runs')!r}")
+        raise InputError(
+            f"expected {draws.count}, as the factors say, found {about.get('runs')!r}", subject="runs"
+        )
     return Format(expected, draws, duration, measures)
 
 
@@ -79,7 +82,7 @@ def checked_bands(bands: Any) -> dict[str, float]:
         InputError: other kinds, or values that are no band.
     """
     if not isinstance(bands, Mapping) or set(bands) != set(ERRORS):
-        raise InputError(f"bands: expected numbers for {' and '.join(ERRORS)}, found {bands!r}")
+        raise InputError(f"expected numbers for {' and '.join(ERRORS)}, found {bands!r}", subject="bands")
     return {kind: non_negative_number(f"bands, {kind}", bands[kind]) for kind in ERRORS}
 
 
@@ -107,10 +110,10 @@ def _described_factors(factors: Any) -> dict[str, Values | None]:
         instance("factors", name, str, "the name of a factor")
         instance(f"factor '{name}'", values, Mapping, "a description of its values")
         if name in found:
-            raise InputError(f"factors: expected different names, found '{name}' again")
+            raise InputError(f"expected different names, found '{name}' again", subject="factors")
         found[name] = described(values)
     if not found:
-        raise InputError("factors: expected at least one, found none")
+        raise InputError("expected at least one, found none", subject="factors")
     return found
 
 

@@ -36,11 +36,24 @@ class Distribution(Values, Protocol):
         """One value."""
 
 
+@dataclass(frozen=True)
 class _Interval:
     """From `low` to `high`, with a way to go through it."""
 
     low: float
     high: float
+
+    def __post_init__(self) -> None:
+        kind = type(self).__name__
+        for name in ("low", "high"):
+            object.__setattr__(self, name, self._number(f"{kind}, {name}", getattr(self, name)))
+        if not self.low < self.high:
+            raise InputError(f"expected low < high, found {self.low:g} and {self.high:g}", subject=kind)
+
+    @staticmethod
+    def _number(name: str, value: object) -> float:
+        """One end as a number, if it can be one."""
+        return finite_number(name, value)
 
     def at(self, share: float) -> float:
         """The value below which a share of the distribution lies, 0 <= share <= 1."""
@@ -52,14 +65,7 @@ class _Interval:
     def describe(self) -> dict[str, Any]:
         return {"kind": type(self).__name__, "low": self.low, "high": self.high}
 
-    def _check_order(self) -> None:
-        if not self.low < self.high:
-            raise InputError(
-                f"{type(self).__name__}: expected low < high, found {self.low:g} and {self.high:g}"
-            )
 
-
-@dataclass(frozen=True)
 class Uniform(_Interval):
     """Every number from low to high is as likely as every other.
 
@@ -67,19 +73,10 @@ class Uniform(_Interval):
         InputError: not finite, or not low < high.
     """
 
-    low: float
-    high: float
-
-    def __post_init__(self) -> None:
-        for name in ("low", "high"):
-            object.__setattr__(self, name, finite_number(f"Uniform, {name}", getattr(self, name)))
-        self._check_order()
-
     def at(self, share: float) -> float:
         return min(self.low + share * (self.high - self.low), self.high)
 
 
-@dataclass(frozen=True)
 class LogUniform(_Interval):
     """Every order of magnitude between low and high is as likely as every other.
 
@@ -87,13 +84,7 @@ class LogUniform(_Interval):
         InputError: not above 0, or not low < high.
     """
 
-    low: float
-    high: float
-
-    def __post_init__(self) -> None:
-        for name in ("low", "high"):
-            object.__setattr__(self, name, positive_number(f"LogUniform, {name}", getattr(self, name)))
-        self._check_order()
+    _number = staticmethod(positive_number)
 
     def at(self, share: float) -> float:
         return float(np.clip(self.low * (self.high / self.low) ** share, self.low, self.high))
@@ -132,10 +123,10 @@ class _Listed:
     def __init__(self, values: Sequence[Any]):
         kind = type(self).__name__
         if isinstance(values, str) or not len(values):
-            raise InputError(f"{kind}: expected a list of numbers, words or parts, found {values!r}")
+            raise InputError(f"expected a list of numbers, words or parts, found {values!r}", subject=kind)
         self.values = tuple(_plain(kind, part_label(value) if is_part(value) else value) for value in values)
         if len(set(self.values)) != len(self.values):
-            raise InputError(f"{kind}: expected different values, found {list(self.values)}")
+            raise InputError(f"expected different values, found {list(self.values)}", subject=kind)
         self.meant: Mapping[Value, Any] = dict(zip(self.values, values, strict=True))
 
     def describe(self) -> dict[str, Any]:
@@ -194,7 +185,7 @@ def described(description: Mapping[str, Any]) -> Values | None:
     try:
         return kind(**parameters)
     except TypeError as error:
-        raise InputError(f"{name}: {error}") from error
+        raise InputError(str(error), subject=name) from error
 
 
 def drawn(name: str, values: Any, rng: np.random.Generator) -> Value:
@@ -226,7 +217,8 @@ def part_label(part: Any) -> str:
         text = {name: json.dumps(x, ensure_ascii=False, allow_nan=False) for name, x in settings.items()}
     except (TypeError, ValueError) as error:
         raise InputError(
-            f"{type(part).__name__}: expected settings that are plain data from as_dict, found {settings!r}"
+            f"expected settings that are plain data from as_dict, found {settings!r}",
+            subject=type(part).__name__,
         ) from error
     return f"{settings['name']}({', '.join(f'{key}={text[key]}' for key in settings if key != 'name')})"
 
@@ -241,5 +233,5 @@ def _plain(name: str, value: Any) -> Value:
     if not isinstance(value, str):
         return finite_number(name, value)
     if not is_text(value):
-        raise InputError(f"{name}: expected a word that can be written to a file, found {value!a}")
+        raise InputError(f"expected a word that can be written to a file, found {value!a}", subject=name)
     return str(value)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, TypedDict
 
 from ..checks import choice, count
 from . import backends
@@ -25,16 +25,25 @@ SHARES = 4
 RETRIES = 2
 
 
+class CrewOptions(TypedDict, total=False):
+    """Who makes the runs of a sweep or a search: arguments of `Evaluation`, which says what they mean."""
+
+    workers: int
+    backend: str
+    client: Any
+    batch: int | None
+
+
 class Evaluation:
     """Makes runs of a job, some at a time, and knows those made before.
 
     Args:
         job: what is run.
         journal: where rows go, or None to keep them in memory only.
-        workers: number of processes.
-        backend: "joblib", "dask" or "serial".
-        client: for "dask", a client or the address of a scheduler.
-        batch: runs per task; by default as many as take about a second.
+        workers: number of processes (or of workers of a new Dask cluster).
+        backend: "joblib" for processes of this machine, "dask" for a cluster, "serial" for none of both.
+        client: for "dask", a client or the address of a scheduler; by default a cluster of this machine.
+        batch: runs per task of a worker; by default as many as take about a second.
 
     Attributes:
         rows: of all runs that are made, by number of the run.
@@ -45,8 +54,8 @@ class Evaluation:
         self,
         job: Job,
         journal: Journal | None,
-        workers: int,
-        backend: str,
+        workers: int = 2,
+        backend: str = "joblib",
         client: Any = None,
         batch: int | None = None,
     ):

@@ -63,15 +63,15 @@ class Factor:
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():
-            raise InputError(f"factor: expected a name, found {self.name!r}")
+            raise InputError(f"expected a name, found {self.name!r}", subject="factor")
         needed = ("describe",) if isinstance(self.values, Grid) else ("draw", "describe")
         if not all(callable(getattr(self.values, method, None)) for method in needed):
             raise InputError(
-                f"factor '{self.name}': expected a distribution, which has draw and describe, or a Grid, "
-                f"found {self.values!r}"
+                f"expected a distribution, which has draw and describe, or a Grid, found {self.values!r}",
+                subject=f"factor '{self.name}'",
             )
         if not callable(self.change):
-            raise InputError(f"factor '{self.name}': expected a function, found {self.change!r}")
+            raise InputError(f"expected a function, found {self.change!r}", subject=f"factor '{self.name}'")
 
     def apply(self, setup: Setup, value: Value) -> Setup:
         """The setup with this factor at a value.
@@ -139,52 +139,46 @@ def true_parameters(values: Values, robot: int | None = None, body: int | None =
         values: factors above 0.
         robot, body: which ones, counted from 0; by default all.
     """
-    name = _indexed("true_parameters", robot=robot, body=body)
-    return Factor(name, values, partial(variations.with_scaled_bodies, robot=robot, body=body))
+    return _indexed("true_parameters", values, variations.with_scaled_bodies, robot=robot, body=body)
 
 
 def initial_estimates(values: Values, robot: int | None = None) -> Factor:
     """Factor by which the initial estimates theta_hat(0) are multiplied."""
-    name = _indexed("initial_estimates", robot=robot)
-    return Factor(name, values, partial(variations.with_scaled_estimates, robot=robot))
+    return _indexed("initial_estimates", values, variations.with_scaled_estimates, robot=robot)
 
 
 def model_error(values: Values, robot: int | None = None) -> Factor:
     """Relative error of the initial estimates: theta_hat(0) = (1 + value) theta; -1 is to know nothing."""
-    name = _indexed("model_error", robot=robot)
-    return Factor(name, values, partial(variations.with_model_error, robot=robot))
+    return _indexed("model_error", values, variations.with_model_error, robot=robot)
 
 
 def initial_positions(values: Values, robot: int | None = None, joint: int | None = None) -> Factor:
     """Angle (or length) that is added to initial joint positions, rad (or m)."""
-    name = _indexed("initial_positions", robot=robot, joint=joint)
-    change = partial(variations.with_moved_start, quantity="q0", robot=robot, joint=joint)
-    return Factor(name, values, change)
+    change = partial(variations.with_moved_start, quantity="q0")
+    return _indexed("initial_positions", values, change, robot=robot, joint=joint)
 
 
 def initial_velocities(values: Values, robot: int | None = None, joint: int | None = None) -> Factor:
     """Velocity that is added to initial joint velocities, rad/s (or m/s)."""
-    name = _indexed("initial_velocities", robot=robot, joint=joint)
-    change = partial(variations.with_moved_start, quantity="v0", robot=robot, joint=joint)
-    return Factor(name, values, change)
+    change = partial(variations.with_moved_start, quantity="v0")
+    return _indexed("initial_velocities", values, change, robot=robot, joint=joint)
 
 
 def disturbance_scale(values: Values, disturbance: int = 0) -> Factor:
     """Factor by which the torque of one of the experiment's disturbances is multiplied."""
-    name = _indexed("disturbance_scale", disturbance=disturbance or None)
-    return Factor(name, values, partial(variations.with_scaled_disturbance, disturbance=disturbance))
+    change = partial(variations.with_scaled_disturbance, disturbance=disturbance)
+    return Factor(_name("disturbance_scale", disturbance=disturbance or None), values, change)
 
 
 def disturbance_start(values: Values, disturbance: int = 0) -> Factor:
     """Instant at which one of the experiment's disturbances starts; it lasts as long as before, s."""
-    name = _indexed("disturbance_start", disturbance=disturbance or None)
-    return Factor(name, values, partial(variations.with_disturbance_from, disturbance=disturbance))
+    change = partial(variations.with_disturbance_from, disturbance=disturbance)
+    return Factor(_name("disturbance_start", disturbance=disturbance or None), values, change)
 
 
 def weights(values: Values, robot: int | None = None) -> Factor:
     """Factor by which the coupling's weights c_i are multiplied."""
-    name = _indexed("weights", robot=robot)
-    return Factor(name, values, partial(variations.with_scaled_weights, robot=robot))
+    return _indexed("weights", values, variations.with_scaled_weights, robot=robot)
 
 
 def control_period(values: Values) -> Factor:
@@ -201,7 +195,7 @@ def _part(name: str, values: Grid | Choice) -> Factor:
     instance(name, values, (Grid, Choice), f"a Grid or a Choice of kinds of {name}")
     for value in values.meant.values():
         if not is_part(value):
-            raise InputError(f"{name}: expected parts with bind and as_dict, found {value!r}")
+            raise InputError(f"expected parts with bind and as_dict, found {value!r}", subject=name)
     return Factor(name, values, partial(variations.with_part, part=name, meant=values.meant))
 
 
@@ -209,12 +203,17 @@ def _keep(experiment: Experiment, value: Value) -> Experiment:
     return experiment
 
 
-def _indexed(name: str, **indices: int | None) -> str:
+def _indexed(name: str, values: Values, change: Change, **indices: int | None) -> Factor:
+    """A factor that concerns what has these indices, counted from 0; None stands for all of it."""
+    return Factor(_name(name, **indices), values, partial(change, **indices))
+
+
+def _name(name: str, **indices: int | None) -> str:
     """`name`, with the indices that are given: `true_parameters_robot0_body1`."""
     for what, index in indices.items():
         if index is None:
             continue
         if isinstance(index, bool) or not isinstance(index, (int, np.integer)) or index < 0:
-            raise InputError(f"{name}: expected the index of a {what}, counted from 0, found {index!r}")
+            raise InputError(f"expected the index of a {what}, counted from 0, found {index!r}", subject=name)
         name += f"_{what}{index}"
     return name

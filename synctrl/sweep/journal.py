@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import IO, Any, Self
 
 from ..errors import ResultError
-from ..files import read_regular, write_whole
+from ..files import read_regular, reported, write_whole
 from .description import ABOUT, FORMAT, difference, read_about, row_format
 from .distributions import Value
 from .rows import Format, Row, Runs, fault_of_values, line_of, wrong_line
@@ -59,7 +59,9 @@ class Journal:
         if (self.folder / ABOUT).exists():
             return read_about(self.folder)
         if os.fstat(self._file.fileno()).st_size:
-            raise ResultError(f"'{self.folder}' has runs but no {ABOUT}; choose another folder")
+            raise ResultError(
+                f"'{self.folder}' has runs but no {ABOUT}; choose another folder", file=self.folder
+            )
         return None
 
     def begin(self, about: Mapping[str, Any], runs: Runs) -> None:
@@ -79,7 +81,8 @@ class Journal:
             if known is None:
                 write_whole(self.folder / ABOUT, json.dumps(self.about, ensure_ascii=False, indent=1) + "\n")
             elif found := difference(known, json.loads(json.dumps(self.about))):
-                raise ResultError(f"'{self.folder}' holds another sweep: {found}; choose another folder")
+                other = f"'{self.folder}' holds another sweep: {found}; choose another folder"
+                raise ResultError(other, file=self.folder, found=found)
             content = read_regular(self.folder / RUNS)
             self.rows = Format(about["columns"], runs, about["duration"]).read(self.folder / RUNS, content)
             self._file.truncate(content.rfind(b"\n") + 1)  # an incomplete last line does not count
@@ -139,7 +142,8 @@ class Journal:
         except OSError as error:
             raise ResultError(
                 f"cannot write to the sweep in '{self.folder}': {error.strerror or error}; the runs written "
-                "before are kept, and the same sweep goes on from them"
+                "before are kept, and the same sweep goes on from them",
+                file=self.folder,
             ) from error
 
 
@@ -155,10 +159,8 @@ def read_rows(folder: str | Path, about: Mapping[str, Any]) -> dict[int, Row]:
         SweepFileError: a complete line that cannot be of this sweep; the message names file and line.
     """
     path = Path(folder) / RUNS
-    try:
+    with reported("read", path):
         content = read_regular(path) if path.exists() else b""
-    except OSError as error:
-        raise ResultError(f"'{path}' cannot be read: {error.strerror or error}") from error
     return row_format(about).read(path, content)
 
 
@@ -177,5 +179,5 @@ def lock(file: IO[bytes], folder: Path) -> None:
     except BlockingIOError:
         file.close()
         raise ResultError(
-            f"another process has it: it is running the sweep in '{folder}'; wait until it ends"
+            f"another process has it: it is running the sweep in '{folder}'; wait until it ends", file=folder
         ) from None

@@ -85,7 +85,8 @@ class Format(NamedTuple):
 
 def wrong_line(path: Path, line: int, fault: str) -> SweepFileError:
     """The error about a line of a file."""
-    return SweepFileError(f"'{path}', line {line}: {fault}; take the line out and its run is made again")
+    message = f"'{path}', line {line}: {fault}; take the line out and its run is made again"
+    return SweepFileError(message, file=path, line=line)
 
 
 def line_of(run: int, rows: Mapping[int, Row]) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, TypedDict
 
 from ..analysis.metrics import settling_bands
 from ..checks import choice, count, instance, positive_number
@@ -18,6 +18,17 @@ from .measures import MEASURES, definitions
 from .prepared import Prepared
 from .rows import columns
 from .worker import Job
+
+
+class StudyOptions(TypedDict, total=False):
+    """How all runs of a sweep or a search are made: arguments of `Study`, which says what they mean."""
+
+    seed: int
+    duration: float | None
+    dt: float
+    engine: str
+    control_period: float | None
+    bands: Mapping[str, float] | None
 
 
 class Study:
@@ -42,6 +53,7 @@ class Study:
         self,
         base: Experiment,
         factors: Sequence[Factor],
+        *,
         seed: int = 0,
         duration: float | None = None,
         dt: float = 1e-3,
@@ -98,8 +110,9 @@ class Study:
             result = Prepared(*setup[:4]).simulate(setup.experiment, setup.control_period)
         except SimulationError as error:
             raise InputError(
-                f"base: its own run stops, so there is no scale for settling times: {error}; give `bands`, "
-                "or start from an experiment that runs to its end"
+                f"its own run stops, so there is no scale for settling times: {error}; give `bands`, "
+                "or start from an experiment that runs to its end",
+                subject="base",
             ) from error
         return settling_bands(result)
 
@@ -110,13 +123,16 @@ def _checked_factors(factors: Sequence[Factor]) -> tuple[Factor, ...]:
     names = [factor.name for factor in factors]
     taken = [name for name in names if names.count(name) > 1 or name in columns(())]
     if taken:
-        raise InputError(f"factors: the name '{taken[0]}' is taken; give each column a name of its own")
+        raise InputError(
+            f"the name '{taken[0]}' is taken; give each column a name of its own", subject="factors"
+        )
     if not names:
-        raise InputError("factors: expected at least one, found none")
+        raise InputError("expected at least one, found none", subject="factors")
     varied = {"Gamma", "Gamma_scale"} & {*names}
     if "adaptation" in names and varied:
         raise InputError(
-            f"factors: an adaptation takes the place of the gain Gamma, so expected one of the two, found "
-            f"'adaptation' and '{min(varied)}'"
+            "an adaptation takes the place of the gain Gamma, so expected one of the two, found "
+            f"'adaptation' and '{min(varied)}'",
+            subject="factors",
         )
     return tuple(factors)

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
-import numpy as np
-
-from ..checks import count
-from ..errors import InputError
+from ..checks import count, index
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .distributions import Value
 from .draws import Draws
-from .evaluation import Evaluation, progress_bar
+from .evaluation import CrewOptions, Evaluation, progress_bar
 from .factors import Factor, Setup
 from .journal import Journal
-from .study import Study
+from .study import Study, StudyOptions
 from .worker import Job, Runner, Task
 
 
@@ -32,13 +29,7 @@ class Sweep:
         base: the experiment that is varied.
         factors: what differs from run to run; applied in this order.
         samples: draws per combination of grid values; with no grid, the number of runs.
-        seed: whole number from 0.
-        duration: s; by default the experiment's.
-        dt: step, s.
-        engine: "compiled" or "pinocchio", see `Experiment.simulate`.
-        control_period: None for continuous control, or the period of sampled control, s.
-        bands: settling bands by kind of error, in its unit; by default 5% of the largest error of the base
-            experiment's run, which then has to run to its end.
+        options: `seed`, `duration`, `dt`, `engine`, `control_period` and `bands`, see `Study`.
 
     Raises:
         InputError: a value of the wrong kind, no factor, or two factors of one name.
@@ -50,14 +41,9 @@ class Sweep:
         factors: Sequence[Factor],
         *,
         samples: int = 1,
-        seed: int = 0,
-        duration: float | None = None,
-        dt: float = 1e-3,
-        engine: str = "compiled",
-        control_period: float | None = None,
-        bands: Mapping[str, float] | None = None,
+        **options: Unpack[StudyOptions],
     ):
-        self.study = Study(base, factors, seed, duration, dt, engine, control_period, bands)
+        self.study = Study(base, factors, **options)
         self.samples = count("samples", samples)
         values = {factor.name: factor.values for factor in self.study.factors}
         self._draws = Draws(values, self.samples, self.study.seed)
@@ -117,42 +103,28 @@ class Sweep:
 
         Args:
             folder: where, see `Journal`; made if it does not exist.
-            workers: number of processes (or of workers of a new Dask cluster).
-            backend: "joblib" for processes of this machine, "dask" for a cluster, "serial" for none of both.
-            client: for "dask", a client or the address of a scheduler; by default a cluster of this machine.
-            keep_every: keep the trajectories of every run, each so many-th instant, in `runs/`; by default
-                not.
-            batch: runs per task of a worker; by default as many as take about a second.
+            workers, backend, client, batch: who makes the runs, see `Evaluation`.
+            keep_every: keep the trajectories of all runs in `runs/`, every so-many-th instant of each.
             progress: show a progress bar.
 
         Returns:
             The path of the table, `table.csv`.
 
         Raises:
-            InputError: an unknown backend, or a number of the wrong kind.
-            MissingDependencyError: the backend or the engine cannot be had.
-            ResultError: another process has the folder, or it holds another sweep, is damaged, or cannot be
-                written.
-            SweepFileError: a line in the folder cannot be of this sweep.
+            InputError, MissingDependencyError: a wrong value, or a backend or engine that cannot be had.
+            ResultError, SweepFileError: another process has the folder, or it holds another sweep, is damaged
+                in the line that is named, or cannot be written.
             SweepError: workers die again and again, or a function of a factor fails.
 
         Warns:
-            StepWarning, SaturationWarning: once, of all runs made by this call to their end: how many had
-                too long a step or torque cut off, and which was the worst.
+            StepWarning, SaturationWarning: how many of the runs that this call made to their end had too long
+                a step or torque cut off, and which was the worst.
         """
         if keep_every is not None:
             count("keep_every", keep_every)
         with Journal(folder) as journal:
-            job = self.study.job(journal.known(), keep_every)
-            journal.begin(self.about(job), self._draws)
-            evaluation = Evaluation(job, journal, workers, backend, client, batch)
-            tasks = [self._task(run) for run in range(len(self))]
-            with progress_bar(len(tasks), len(journal.rows), progress) as bar, evaluation.open():
-                for rows in evaluation.run(tasks):
-                    bar.update(len(rows))
-            table = journal.finish()
-        evaluation.doubts.warn("sweep", self.study.base.dt)
-        return table
+            crew = CrewOptions(workers=workers, backend=backend, client=client, batch=batch)
+            return self._make(journal, keep_every, progress, crew)
 
     def about(self, job: Job) -> dict[str, Any]:
         """What the sweep is, as plain data."""
@@ -161,8 +133,20 @@ class Sweep:
 
     # -- internals ----------------------------------------------------------------------------------------
 
+    def _make(self, journal: Journal, keep_every: int | None, progress: bool, crew: CrewOptions) -> Path:
+        """Make the runs that a folder does not have yet; returns the path of the table."""
+        job = self.study.job(journal.known(), keep_every)
+        journal.begin(self.about(job), self._draws)
+        evaluation = Evaluation(job, journal, **crew)
+        tasks = [self._task(run) for run in range(len(self))]
+        with progress_bar(len(tasks), len(journal.rows), progress) as bar, evaluation.open():
+            for rows in evaluation.run(tasks):
+                bar.update(len(rows))
+        table = journal.finish()
+        evaluation.doubts.warn("sweep", self.study.base.dt)
+        return table
+
     def _task(self, run: int) -> Task:
         """A run and its values."""
-        if isinstance(run, bool) or not isinstance(run, (int, np.integer)) or not 0 <= run < len(self):
-            raise InputError(f"run: expected a number from 0 to {len(self) - 1}, found {run!r}")
-        return Task(int(run), tuple(self._draws.at(int(run))))  # type: ignore[arg-type]
+        number = index("run", run, len(self))
+        return Task(number, tuple(self._draws.at(number)))  # type: ignore[arg-type]

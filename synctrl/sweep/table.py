@@ -61,8 +61,11 @@ def trajectories(folder: str | Path, run: int) -> Result:
     read_about(folder)
     path = kept_file(folder, count("run", run, least=0))
     if not path.is_file():
-        raise ResultError(f"no trajectories of run {run} in '{folder}': run the sweep with keep_every")
+        raise ResultError(
+            f"no trajectories of run {run} in '{folder}': run the sweep with keep_every", file=path
+        )
     result = Result.load(path)
     if result.info.get("run") != run:
-        raise ResultError(f"'{path}': expected run {run}, found run {result.info.get('run')!r}")
+        found = result.info.get("run")
+        raise ResultError(f"'{path}': expected run {run}, found run {found!r}", file=path, found=found)
     return result

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import index
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
 from ..errors import InputError
@@ -33,7 +34,9 @@ def with_scaled_gain(experiment: Experiment, value: float, gain: str) -> Experim
     """
     entries = getattr(experiment.gains, gain)
     if entries is None:
-        raise InputError(f"{gain}_scale: expected gains with {gain}, found none beside an adaptation")
+        raise InputError(
+            f"expected gains with {gain}, found none beside an adaptation", subject=f"{gain}_scale"
+        )
     return with_gain(experiment, value * entries, gain)
 
 
@@ -130,8 +133,9 @@ def same_parameters(parameters: Parameters, robot: Robot) -> Parameters:
         theta = _fit(parameters.matrix, robot)
         return LinearParameters(robot, parameters.matrix, theta, parameters.names)
     raise InputError(
-        f"true parameters: expected full, linear or friction parameters, found {type(parameters).__name__} "
-        f"for robot '{robot.name}'; vary them with a function of your own"
+        f"expected full, linear or friction parameters, found {type(parameters).__name__} "
+        f"for robot '{robot.name}'; vary them with a function of your own",
+        subject="true parameters",
     )
 
 
@@ -166,18 +170,17 @@ def _with_estimates(
 
 
 def _with_disturbance(
-    experiment: Experiment, index: int, change: Callable[[Disturbance], Disturbance]
+    experiment: Experiment, disturbance: int, change: Callable[[Disturbance], Disturbance]
 ) -> Experiment:
     disturbances = list(experiment.disturbances)
-    here = _index("disturbance", index, len(disturbances))
+    here = _index("disturbance", disturbance, len(disturbances))
     disturbances[here] = [change(d) for d in disturbances[here]]
     return replace(experiment, disturbances=disturbances)
 
 
-def _index(what: str, index: int | None, count: int) -> slice:
+def _index(what: str, given: int | None, count: int) -> slice:
     """One of so many, or all of them."""
-    if index is None:
+    if given is None:
         return slice(None)
-    if not 0 <= index < count:
-        raise InputError(f"{what}: expected an index from 0 to {count - 1}, found {index}")
-    return slice(index, index + 1)
+    k = index(what, given, count)
+    return slice(k, k + 1)

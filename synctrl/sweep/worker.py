@@ -111,7 +111,7 @@ class Runner:
             raise
         except Exception as error:
             raise SweepError(
-                f"run {task.run}: a factor's function failed with {type(error).__name__}: {error}"
+                f"a factor's function failed with {type(error).__name__}: {error}", subject=f"run {task.run}"
             ) from error
         return self._prepared.simulate(setup.experiment, setup.control_period)
 

@@ -54,7 +54,9 @@ class AxisRotation:
         self.start = rotations.rotation_matrix("start", start)
         self.axis = _unit("axis", axis)
         if angle.dimension != 1:
-            raise InputError(f"angle: expected a trajectory of 1 number, found one of {angle.dimension}")
+            raise InputError(
+                f"expected a trajectory of 1 number, found one of {angle.dimension}", subject="angle"
+            )
         self.angle = angle
         self.breaks = tuple(angle.breaks)
 
@@ -124,7 +126,7 @@ class FunctionOrientation:
                 finite_array("acceleration", acceleration(t), (3,)),
             )
         except InputError as error:
-            raise TrajectoryError(f"orientation at t = {t:g} s: {error}") from error
+            raise TrajectoryError(f"{error}", subject=f"orientation at t = {t:g} s") from error
 
 
 class PoseTrajectory:
@@ -143,7 +145,7 @@ class PoseTrajectory:
     def __init__(self, position: Trajectory, orientation: Orientation | None = None):
         if position.dimension != 3:
             raise InputError(
-                f"position: expected a trajectory of 3 numbers, found one of {position.dimension}"
+                f"expected a trajectory of 3 numbers, found one of {position.dimension}", subject="position"
             )
         self.position = position
         self.orientation = AxisRotation.fixed(np.eye(3)) if orientation is None else orientation

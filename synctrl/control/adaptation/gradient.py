@@ -32,7 +32,7 @@ class Gradient:
     def __init__(self, Gamma: ArrayLike | RaggedGain):
         self.Gamma = read_gain("Gamma", Gamma)
         if self.Gamma.size and self.Gamma.min() < 0:
-            raise InputError(f"Gamma: expected entries of at least 0, found {self.Gamma.min():g}")
+            raise InputError(f"expected entries of at least 0, found {self.Gamma.min():g}", subject="Gamma")
 
     def bind(self, cell: Cell) -> BoundGradient:
         """This adaptation for a cell.
@@ -57,9 +57,9 @@ def chosen(Gamma: np.ndarray | RaggedGain | None, adaptation: Adaptation | None)
         return Gradient(Gamma)
     if adaptation is None or Gamma is not None:
         found = "neither" if adaptation is None else "both"
-        raise InputError(f"adaptation: expected the gain Gamma or an adaptation, found {found}")
+        raise InputError(f"expected the gain Gamma or an adaptation, found {found}", subject="adaptation")
     if not hasattr(adaptation, "bind") or isinstance(adaptation, type):
-        raise InputError(f"adaptation: expected, for example, Gradient(0.3), found {adaptation!r}")
+        raise InputError(f"expected, for example, Gradient(0.3), found {adaptation!r}", subject="adaptation")
     return adaptation
 
 

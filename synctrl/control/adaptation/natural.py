@@ -50,8 +50,9 @@ class Natural:
         bodies = [_bodies(name, p) for name, p in zip(cell.names, cell.parameters, strict=True)]
         if len(set(bodies)) != 1 or len({len(p.theta) for p in cell.parameters}) != 1:
             raise InputError(
-                "adaptation: Natural expects robots with the same numbers of bodies and parameters, found "
-                f"{bodies} bodies"
+                "Natural expects robots with the same numbers of bodies and parameters, found "
+                f"{bodies} bodies",
+                subject="adaptation",
             )
         return BoundNatural(cell, bodies[0], self.gamma, self.gamma_friction)
 
@@ -73,8 +74,9 @@ class BoundNatural:
         if not smallest.min() > 0:
             i, k = np.unravel_index(int(np.argmin(smallest)), smallest.shape)
             raise InputError(
-                f"theta_hat0 of {self._cell.names[i]}: Natural starts from bodies that can exist; the "
-                f"pseudo-inertia of body {k + 1} has the eigenvalue {smallest[i, k]:.3g}, expected above 0"
+                "Natural starts from bodies that can exist; the "
+                f"pseudo-inertia of body {k + 1} has the eigenvalue {smallest[i, k]:.3g}, expected above 0",
+                subject=f"theta_hat0 of {self._cell.names[i]}",
             )
         L = np.linalg.cholesky(P)
         logs = np.log(L[..., _DIAGONAL, _DIAGONAL])
@@ -151,8 +153,9 @@ def _bodies(name: str, parameters: Any) -> int:
     base = parameters.base if type(parameters) is FrictionParameters else parameters
     if type(base) is not FullParameters:
         raise InputError(
-            f"{name}, adaptation: Natural needs all inertial parameters of the bodies (parameters='full'), "
-            f"found {type(base).__name__} with {', '.join(base.names[:3])}"
+            "Natural needs all inertial parameters of the bodies (parameters='full'), "
+            f"found {type(base).__name__} with {', '.join(base.names[:3])}",
+            subject=f"{name}, adaptation",
         )
     return base.robot.body_count
 

@@ -34,7 +34,7 @@ class ChungSlotine:
     def __init__(self, K_2: ArrayLike):
         self.K_2 = finite_array("K_2", K_2)
         if self.K_2.size and self.K_2.min() < 0:
-            raise InputError(f"K_2: expected entries of at least 0, found {self.K_2.min():g}")
+            raise InputError(f"expected entries of at least 0, found {self.K_2.min():g}", subject="K_2")
 
     def bind(self, cell: Cell, gains: Gains) -> BoundChungSlotine:
         """This law for a cell.
@@ -45,8 +45,9 @@ class ChungSlotine:
         for name in ("beta", "K_eps"):
             if getattr(gains, name).any():
                 raise InputError(
-                    f"gains: expected {name} = 0 with the law ChungSlotine, which has no place for it, found "
-                    f"{getattr(gains, name).tolist()}; gains.independent() sets beta and K_eps to zero"
+                    f"expected {name} = 0 with the law ChungSlotine, which has no place for it, found "
+                    f"{getattr(gains, name).tolist()}; gains.independent() sets beta and K_eps to zero",
+                    subject="gains",
                 )
         m = cell.m
         return BoundChungSlotine(

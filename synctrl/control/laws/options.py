@@ -38,7 +38,9 @@ def chosen(law: Law | None, reference_acceleration: str | None, k_r_space: str |
     if law is None:
         law = SunMills(reference_acceleration or "exact", k_r_space or "joint")
     elif not hasattr(law, "bind") or isinstance(law, type):
-        raise InputError(f"law: expected, for example, SunMills() or ChungSlotine(0.3), found {law!r}")
+        raise InputError(
+            f"expected, for example, SunMills() or ChungSlotine(0.3), found {law!r}", subject="law"
+        )
     acceleration = _agreed("reference_acceleration", reference_acceleration, law, "exact")
     space = getattr(law, "k_r_space", k_r_space or "joint")
     _agreed("k_r_space", k_r_space, law, space)
@@ -50,7 +52,8 @@ def _agreed(name: str, given: str | None, law: Law, otherwise: str) -> str:
     own = getattr(law, name, otherwise)
     if given not in (None, own):
         raise InputError(
-            f"{name}: expected {own!r}, which is what the law {type(law).__name__} has, or nothing beside "
-            f"it, found {given!r}"
+            f"expected {own!r}, which is what the law {type(law).__name__} has, or nothing beside "
+            f"it, found {given!r}",
+            subject=name,
         )
     return own

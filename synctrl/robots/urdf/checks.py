@@ -7,7 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 import pinocchio as pin
 
-from ...errors import RobotError, RobotWarning, near, warn
+from ...errors import RobotWarning, near, warn
+from ..pseudo_inertia import principal_moments
 from .document import Document, Inertial, Joint, Link
 
 MAX_LINKS = 1000
@@ -58,11 +59,10 @@ def check_tree(document: Document) -> None:
 def _check_counts(document: Document) -> None:
     count, moving = len(document.links), len(document.moving_joints)
     if not 1 <= count <= MAX_LINKS:
-        raise RobotError(f"{document.source}: expected 1 to {MAX_LINKS} links, found {count}")
+        raise document.error(f"expected 1 to {MAX_LINKS} links, found {count}", found=count)
     if not 1 <= moving <= MAX_MOVING_JOINTS:
-        raise RobotError(
-            f"{document.source}: expected 1 to {MAX_MOVING_JOINTS} joints that move, found {moving}"
-        )
+        expected = f"expected 1 to {MAX_MOVING_JOINTS} joints that move"
+        raise document.error(f"{expected}, found {moving}", found=moving)
 
 
 def _check_unique(document: Document) -> None:
@@ -72,9 +72,7 @@ def _check_unique(document: Document) -> None:
             if item.name in first:
                 before = first[item.name].line
                 line = f" in line {before}" if before else ""
-                raise RobotError(
-                    f"{document.where(item)}: expected a unique name, found another {kind}{line}"
-                )
+                raise document.error(f"expected a unique name, found another {kind}{line}", item)
             first[item.name] = item
 
 
@@ -83,42 +81,39 @@ def _check_references(document: Document) -> None:
     for joint in document.joints:
         for role, name in (("parent", joint.parent), ("child", joint.child)):
             if name not in links:
-                raise RobotError(
-                    f"{document.where(joint)}: expected a {role} among the links, "
-                    f"found '{name}'{near(name, links)}"
+                raise document.error(
+                    f"expected a {role} among the links, found '{name}'{near(name, links)}", joint
                 )
         if joint.parent == joint.child:
-            raise RobotError(
-                f"{document.where(joint)}: expected two links, found '{joint.child}' as both parent and child"
-            )
+            raise document.error(f"expected two links, found '{joint.child}' as both parent and child", joint)
 
 
 def _check_roots(document: Document) -> None:
     joint_of: dict[str, Joint] = {}
     for joint in document.joints:
         if joint.child in joint_of:
-            raise RobotError(
-                f"{document.where(joint)}: expected a tree, in which link '{joint.child}' has one "
-                f"parent joint, found '{joint_of[joint.child].name}' too"
+            raise document.error(
+                f"expected a tree, in which link '{joint.child}' has one parent joint, found "
+                f"'{joint_of[joint.child].name}' too",
+                joint,
             )
         joint_of[joint.child] = joint
     roots = [link.name for link in document.links if link.name not in joint_of]
     if len(roots) > 1:
-        raise RobotError(
-            f"{document.source}: expected one root link, found {len(roots)}: {_some(roots)}; "
+        raise document.error(
+            f"expected one root link, found {len(roots)}: {_some(roots)}; "
             "each other link needs a joint whose child it is"
         )
     if not roots:
-        raise RobotError(f"{document.source}: expected a root link, found a cycle through every link")
+        raise document.error("expected a root link, found a cycle through every link")
 
 
 def _check_reached(document: Document) -> None:
     reached = set(walk(document))
     lost = [link.name for link in document.links if link.name not in reached]
     if lost:
-        raise RobotError(
-            f"{document.source}: expected every link to hang from '{document.root}', found a cycle of links: "
-            f"{_some(lost)}"
+        raise document.error(
+            f"expected every link to hang from '{document.root}', found a cycle of links: {_some(lost)}"
         )
 
 
@@ -181,7 +176,7 @@ def check_bodies(document: Document) -> None:
     parameters = body_parameters(document)
     for joint in document.moving_joints:
         if fault := _joint_fault(joint, links) or _body_fault(joint, parameters[joint.name]):
-            raise RobotError(f"{document.where(joint)}: {fault}")
+            raise document.error(fault, joint)
 
 
 def _check_links(document: Document) -> None:
@@ -190,10 +185,10 @@ def _check_links(document: Document) -> None:
         fault = link.inertial and inertial_fault(link.inertial)
         if link.inertial is None or not fault:
             continue
-        message = f"{document.where(link, link.inertial.line)}, inertial: {fault}"
+        error = document.error(fault, link, part="inertial", line=link.inertial.line)
         if carrier[link.name][0] is not None:
-            raise RobotError(message)
-        warn(f"{message}; the link does not move, so this plays no part", RobotWarning)
+            raise error
+        warn(f"{error}; the link does not move, so this plays no part", RobotWarning)
 
 
 def _joint_fault(joint: Joint, links: set[str]) -> str | None:
@@ -208,16 +203,11 @@ def _joint_fault(joint: Joint, links: set[str]) -> str | None:
 
 
 def _body_fault(joint: Joint, parameters: np.ndarray) -> str | None:
-    mass, moment = parameters[0], parameters[1:4]
-    body = f"link '{joint.child}' and the links fixed to it"
+    mass, body = parameters[0], f"link '{joint.child}' and the links fixed to it"
     if mass <= 0:
         return f"{body}: expected a mass above 0 kg, found {mass:g}; does a link lack its <inertial>?"
-    xx, xy, yy, xz, yz, zz = parameters[4:]
-    about_origin = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    com = moment / mass
-    about_com = about_origin - mass * (com @ com * np.eye(3) - np.outer(com, com))
-    lowest, _, highest = np.linalg.eigvalsh(about_com)
-    if lowest <= 0 or lowest <= 1e-15 * abs(about_origin).max():
+    lowest, _, highest = principal_moments(parameters)
+    if lowest <= 0 or lowest <= 1e-15 * abs(parameters[4:]).max():
         moments = f"principal moments from {lowest:g} to {highest:g} kg·m^2"
         return f"{body}: expected a positive definite inertia, found {moments}"
     return None
@@ -234,10 +224,8 @@ def check_model(document: Document, model: pin.Model) -> None:
     """
     joints = sorted(joint.name for joint in document.moving_joints)
     if sorted(model.names) != sorted([*joints, "universe"]):
-        raise RobotError(
-            f"{document.source}: expected a model with the joints {_some(joints)}, found "
-            f"{_some(model.names[1:])}"
-        )
+        found = _some(model.names[1:])
+        raise document.error(f"expected a model with the joints {_some(joints)}, found {found}", found=found)
     _check_inertias(document, model)
     for q in _configurations(model):
         _check_mass_matrix(document, model, q)
@@ -249,9 +237,9 @@ def _check_inertias(document: Document, model: pin.Model) -> None:
         wanted = expected[joint.name]
         found = model.inertias[model.getJointId(joint.name)].toDynamicParameters()
         if abs(found - wanted).max() > ROUNDING * abs(wanted).max():
-            raise RobotError(
-                f"{document.where(joint)}: expected a model with the inertial parameters of the document, "
-                f"{wanted}, found {found}"
+            raise document.error(
+                f"expected a model with the inertial parameters of the document, {wanted}, found {found}",
+                joint,
             )
 
 
@@ -268,11 +256,9 @@ def _check_mass_matrix(document: Document, model: pin.Model, q: np.ndarray) -> N
     gravity = pin.computeGeneralizedGravity(model, data, q)
     expected = "expected a positive definite mass matrix and finite gravity"
     if not (np.isfinite(H).all() and np.isfinite(gravity).all()):
-        raise RobotError(f"{document.source}: {expected}, found numbers that are not finite")
+        raise document.error(f"{expected}, found numbers that are not finite")
     # scaled to ones on the diagonal, so that units and sizes of joints do not matter
     scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
     lowest, highest = np.linalg.eigvalsh(H / np.outer(scale, scale))[[0, -1]]
     if lowest <= 0 or highest / lowest > WORST_CONDITION:
-        raise RobotError(
-            f"{document.source}: {expected}, found eigenvalues from {lowest:g} to {highest:g} after scaling"
-        )
+        raise document.error(f"{expected}, found eigenvalues from {lowest:g} to {highest:g} after scaling")

@@ -19,7 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from ...checks import finite_number, instance
-from ...errors import FrameNotFound, InputError, RobotError, RobotWarning, near, warn
+from ...errors import FrameNotFound, RobotError, RobotWarning, near, warn
 from .checks import check_bodies, check_model, check_tree
 from .document import Document, Geometry, Joint, Link
 from .meshes import data_folder, find_mesh
@@ -124,9 +124,10 @@ def lock_joints(document: Document, positions: Mapping[str, float]) -> Document:
     moving = {joint.name: joint for joint in document.moving_joints}
     for name, position in positions.items():
         if name not in moving:
-            raise RobotError(
-                f"{document.source}: expected moving joints to lock, found '{name}'{near(name, moving)}; "
-                f"they are: {', '.join(moving)}"
+            raise document.error(
+                f"expected moving joints to lock, found '{name}'{near(name, moving)}; "
+                f"they are: {', '.join(moving)}",
+                found=name,
             )
         _check_position(document, moving[name], finite_number(f"position of joint '{name}'", position))
     joints = (j.fixed(float(positions[j.name])) if j.name in positions else j for j in document.joints)
@@ -138,9 +139,8 @@ def _check_position(document: Document, joint: Joint, position: float) -> None:
     if limit is None or limit.lower is None or limit.upper is None:
         return
     if not limit.lower <= position <= limit.upper:
-        raise RobotError(
-            f"{document.where(joint)}: expected a position from {limit.lower:g} to {limit.upper:g}, "
-            f"found {position:g}"
+        raise document.error(
+            f"expected a position from {limit.lower:g} to {limit.upper:g}, found {position:g}", joint
         )
 
 
@@ -160,22 +160,22 @@ def existing_file(path: str | Path) -> Path:
     Raises:
         RobotError: no file, with the URDF files that are near.
     """
-    if not isinstance(path, (str, Path)):
-        raise InputError(f"path: expected a path, found {type(path).__name__}")
+    instance("path", path, (str, Path), "a path")
     file = Path(path)
+    shown, expected = ascii(str(file)), "expected the path of a URDF file"
     if not str(file).isprintable():
-        raise RobotError(f"{str(file)!a}: expected the path of a URDF file, found one that cannot be printed")
+        raise RobotError(f"{expected}, found one that cannot be printed", file=shown)
     try:
         if file.is_file():
             return file
         kind = "a folder" if file.is_dir() else "no such file"
         beside = sorted(f.name for f in file.parent.glob("*.urdf"))
     except (OSError, ValueError) as error:
-        raise RobotError(f"{str(file)!a}: expected the path of a URDF file, found: {error}") from error
+        raise RobotError(f"{expected}, found: {error}", file=shown) from error
     hint = near(file.name, beside) or (
         f"; in its folder there are: {', '.join(beside[:5])}" if beside else ""
     )
-    raise RobotError(f"{file}: expected a URDF file, found {kind}{hint}")
+    raise RobotError(f"expected a URDF file, found {kind}{hint}", file=file)
 
 
 def _package_dirs(package_dirs: Iterable[str | Path]) -> tuple[Path, ...]:
@@ -209,7 +209,8 @@ def model_from_xml(source: str, xml: str) -> pin.Model:
             model, failure = None, error
     if failure is not None:
         reason = " ".join(written[0].split()) or str(failure)
-        raise RobotError(f"{source}: expected a URDF that Pinocchio accepts, found: {reason}") from failure
+        message = f"expected a URDF that Pinocchio accepts, found: {reason}"
+        raise RobotError(message, file=source, found=reason) from failure
     return model
 
 
@@ -241,13 +242,19 @@ def _standard_error() -> Iterator[list[str]]:
 
 
 def _build_visual(document: Document, model: pin.Model, package_dirs: tuple[Path, ...]) -> pin.GeometryModel:
+    """All shapes for display, each at its place in the frame of its link."""
     visual = pin.GeometryModel()
     for link in document.links:
         frame_id = model.getFrameId(link.name, pin.BODY)
+        frame = model.frames[frame_id]
         for k, geometry in enumerate(link.visuals):
-            shape = _shape(document, link, geometry, package_dirs)
-            if shape is not None:
-                visual.addGeometryObject(_placed(f"{link.name}_{k}", model, frame_id, geometry, *shape))
+            found = _shape(document, link, geometry, package_dirs)
+            if found is None:
+                continue
+            colored, color = geometry.color is not None, np.array(geometry.color or DEFAULT_COLOR)
+            placement = frame.placement * geometry.origin.se3
+            place = (f"{link.name}_{k}", frame.parentJoint, frame_id, placement)
+            visual.addGeometryObject(pin.GeometryObject(*place, *found, colored, color))
     return visual
 
 
@@ -255,32 +262,14 @@ def _shape(
     document: Document, link: Link, geometry: Geometry, package_dirs: tuple[Path, ...]
 ) -> tuple[coal.CollisionGeometry, str, np.ndarray] | None:
     """Coal's geometry, and path and scale of a mesh; None where the mesh is missing."""
-    shape, one = geometry.shape, np.ones(3)
+    shape = geometry.shape
     if shape.kind != "mesh":
         kinds = {"box": coal.Box, "cylinder": coal.Cylinder, "capsule": coal.Capsule, "sphere": coal.Sphere}
-        return kinds[shape.kind](*shape.size), "", one
+        return kinds[shape.kind](*shape.size), "", np.ones(3)
     folder = document.file.parent if document.file else Path.cwd()
     file = find_mesh(shape.filename or "", folder, package_dirs)
     if file is None:
-        where = document.where(link, geometry.line)
-        warn(f"{where}: mesh '{shape.filename}' is missing and will not be shown", RobotWarning)
+        missing = f"mesh '{shape.filename}' is missing and will not be shown"
+        warn(str(document.error(missing, link, line=geometry.line)), RobotWarning)
         return None
     return coal.BVHModelOBBRSS(), str(file), np.array(shape.size)
-
-
-def _placed(
-    name: str,
-    model: pin.Model,
-    frame_id: int,
-    geometry: Geometry,
-    shape: coal.CollisionGeometry,
-    mesh: str,
-    scale: np.ndarray,
-) -> pin.GeometryObject:
-    frame = model.frames[frame_id]
-    placement = frame.placement * geometry.origin.se3
-    color = np.array(geometry.color or DEFAULT_COLOR)
-    colored = geometry.color is not None
-    return pin.GeometryObject(
-        name, frame.parentJoint, frame_id, placement, shape, mesh, scale, colored, color
-    )

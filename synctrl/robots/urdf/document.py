@@ -14,9 +14,13 @@ from typing import Self
 import numpy as np
 import pinocchio as pin
 
+from ...errors import RobotError
+
 Vector = tuple[float, ...]
 
 ZERO: Vector = (0.0, 0.0, 0.0)
+#: of a moment of inertia, in the order of a URDF
+INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 MOVING_TYPES = ("revolute", "continuous", "prismatic")
 
 
@@ -69,16 +73,19 @@ class Inertial:
             return self
         R = self.origin.se3.rotation
         I = R @ self.matrix @ R.T
-        moments = (I[0, 0], I[0, 1], I[0, 2], I[1, 1], I[1, 2], I[2, 2])
-        return replace(self, inertia=tuple(map(float, moments)), origin=Pose(self.origin.xyz))
+        return replace(self, inertia=upper_triangle(I), origin=Pose(self.origin.xyz))
 
     def parameters(self, placement: pin.SE3) -> np.ndarray:
         """The ten inertial parameters in a frame in which the link has this placement, Pinocchio's order."""
         place = placement * self.origin.se3
         c, R = place.translation, place.rotation
         I = R @ self.matrix @ R.T + self.mass * (c @ c * np.eye(3) - np.outer(c, c))
-        moments = (I[0, 0], I[0, 1], I[1, 1], I[0, 2], I[1, 2], I[2, 2])
-        return np.array([self.mass, *(self.mass * c), *moments])
+        return np.array([self.mass, *(self.mass * c), *I[np.tril_indices(3)]])
+
+
+def upper_triangle(inertia: np.ndarray) -> Vector:
+    """(ixx, ixy, ixz, iyy, iyz, izz) of a symmetric matrix, (3, 3): the order of a URDF."""
+    return tuple(map(float, inertia[np.triu_indices(3)]))
 
 
 @dataclass(frozen=True)
@@ -114,6 +121,11 @@ class Link:
     collisions: tuple[Geometry, ...] = ()
     line: int = 0
 
+    @property
+    def title(self) -> str:
+        """What messages call it."""
+        return f"link '{self.name}'"
+
 
 @dataclass(frozen=True)
 class Limit:
@@ -140,6 +152,11 @@ class Joint:
     friction: float = 0.0
     mimics: str | None = None
     line: int = 0
+
+    @property
+    def title(self) -> str:
+        """What messages call it."""
+        return f"joint '{self.name}'"
 
     @property
     def moves(self) -> bool:
@@ -196,8 +213,26 @@ class Document:
         joint = Joint(f"{name}_mount", "fixed", name, self.root, pose)
         return replace(self, links=(Link(name), *self.links), joints=(joint, *self.joints))
 
-    def where(self, item: Link | Joint, line: int | None = None) -> str:
-        """File, line and name of a link or joint, as messages begin; `line` is that of a part of it."""
-        line = line or item.line
-        kind = "link" if isinstance(item, Link) else "joint"
-        return f"{self.source}{f':{line}' if line else ''}: {kind} '{item.name}'"
+    def error(
+        self,
+        problem: str,
+        item: Link | Joint | None = None,
+        *,
+        part: str = "",
+        line: int = 0,
+        found: str | float | None = None,
+    ) -> RobotError:
+        """The error to be raised where something in the document is wrong.
+
+        Args:
+            problem: what is expected, and what was found.
+            item: the link or joint at fault; None if it is the document as a whole.
+            part: what of the item it is about, for example "inertial".
+            line: where that part stands; by default the line of the item.
+            found: what was found.
+        """
+        robot = None if self.file else f"robot '{self.name}'"
+        place = item and ", ".join(word for word in (item.title, part) if word)
+        subject = ": ".join(word for word in (robot, place) if word)
+        line = line or (item.line if item else 0)
+        return RobotError(problem, subject=subject or None, found=found, file=self.file, line=line)

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterable, Iterator
 from importlib import metadata
 from pathlib import Path
+from typing import NoReturn
 
 from ...errors import RobotError
 from .xml import Element, quoted
@@ -90,15 +91,13 @@ def _candidates(filename: str, folder: Path, package_dirs: Iterable[Path]) -> It
 def _check_file(file: Path, root: Path) -> None:
     """Refuse a mesh that lies, or refers to something, outside `root`."""
     if not file.resolve().is_relative_to(root.resolve()):
-        raise RobotError(f"{file}: expected a mesh inside {root}, found a link that leads out of it")
+        _refuse(file, f"a mesh inside {root}", "a link that leads out of it")
     if file.stat().st_size > MAX_MESH_BYTES:
-        raise RobotError(
-            f"{file}: expected a mesh of at most {MAX_MESH_BYTES / 1e6:g} MB, found a larger one"
-        )
+        _refuse(file, f"a mesh of at most {MAX_MESH_BYTES / 1e6:g} MB", "a larger one")
     try:
         data = file.read_bytes()
     except OSError as error:
-        raise RobotError(f"{file}: cannot be read: {error.strerror}") from error
+        raise RobotError(f"cannot be read: {error.strerror}", file=file) from error
     {".stl": _check_stl, ".dae": _check_dae, ".obj": _check_obj}[file.suffix.lower()](file, data)
 
 
@@ -109,16 +108,14 @@ def _check_stl(file: Path, data: bytes) -> None:
         return
     if data.lstrip().startswith(b"solid") and b"endsolid" in data:
         return
-    raise RobotError(f"{file}: expected an STL mesh, found one that is cut short or of another format")
+    _refuse(file, "an STL mesh", "one that is cut short or of another format")
 
 
 def _check_dae(file: Path, data: bytes) -> None:
     if b"\0" in data or b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        raise RobotError(
-            f"{file}: expected a mesh in UTF-8 without <!DOCTYPE> and entities, found one with them"
-        )
+        _refuse(file, "a mesh in UTF-8 without <!DOCTYPE> and entities", "one with them")
     if b"<COLLADA" not in data or b"</COLLADA>" not in data:
-        raise RobotError(f"{file}: expected a COLLADA mesh, found one that is cut short or of another format")
+        _refuse(file, "a COLLADA mesh", "one that is cut short or of another format")
     for found in _DAE_IMAGES.findall(data):
         _check_reference(file, _text(found))
 
@@ -135,13 +132,15 @@ def _check_obj(file: Path, data: bytes) -> None:
 def _check_reference(file: Path, reference: str) -> None:
     """A file named in a mesh has to lie beside or below it."""
     if not is_inside(reference.strip()) or not _stays(file.parent, reference.strip()):
-        raise RobotError(
-            f"{file}: expected references to files beside or below it, found {quoted(reference)}"
-        )
+        _refuse(file, "references to files beside or below it", quoted(reference))
 
 
 def _stays(folder: Path, reference: str) -> bool:
     return (folder / reference).resolve().is_relative_to(folder.resolve())
+
+
+def _refuse(file: Path, expected: str, found: str) -> NoReturn:
+    raise RobotError(f"expected {expected}, found {found}", file=file)
 
 
 def _text(data: bytes) -> str:

@@ -7,11 +7,28 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...errors import near
-from .document import MOVING_TYPES, Document, Geometry, Inertial, Joint, Limit, Link, Pose, Shape, Vector
+from .document import (
+    INERTIA,
+    MOVING_TYPES,
+    ZERO,
+    Document,
+    Geometry,
+    Inertial,
+    Joint,
+    Limit,
+    Link,
+    Pose,
+    Shape,
+    Vector,
+)
 from .meshes import check_filename
-from .xml import Element, parse_xml, printable, quoted, read_bytes
+from .xml import Element, parse_xml, quoted, read_bytes, shown_tag
 
 JOINT_TYPES = (*MOVING_TYPES, "fixed")
+JOINT_PARTS = (
+    *("parent", "child", "origin", "axis", "limit", "dynamics", "mimic"),
+    *("calibration", "safety_controller"),
+)
 SHAPES = ("box", "cylinder", "sphere", "capsule", "mesh")
 EXTENSIONS = ("gazebo", "transmission", "ros2_control", "sensor")
 LINK_EXTENSIONS = ("contact", "surface", "gravity", "kinematic", "self_filter", "collision_checking")
@@ -36,7 +53,7 @@ def read_text(file: Path, data: bytes) -> Document:
     """`read_document` for the content `data` of `file`."""
     root = parse_xml(str(file), data)
     if root.tag != "robot":
-        root.refuse("a URDF with the root element <robot>", f"<{printable(root.tag)}>")
+        root.refuse("a URDF with the root element <robot>", f"<{shown_tag(root.tag)}>")
     _refuse_xacro(root)
     root.know(("link", "joint", "material", *EXTENSIONS), ("name", "version"))
     colors = _colors(root)
@@ -72,12 +89,11 @@ def _link(element: Element, colors: dict[str, Vector]) -> Link:
 def _inertial(element: Element) -> Inertial:
     element.know(("origin", "mass", "inertia"))
     mass, inertia = element.required("mass"), element.required("inertia")
-    keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     mass.know((), ("value",))
-    inertia.know((), keys)
+    inertia.know((), INERTIA)
     return Inertial(
         mass=mass.number("value"),
-        inertia=tuple(inertia.number(key) for key in keys),
+        inertia=tuple(inertia.number(key) for key in INERTIA),
         origin=_origin(element),
         line=element.line,
     )
@@ -88,8 +104,7 @@ def _origin(element: Element) -> Pose:
     if origin is None:
         return Pose()
     origin.know((), ("xyz", "rpy"))
-    zero = (0.0, 0.0, 0.0)
-    return Pose(origin.numbers("xyz", 3, zero), origin.numbers("rpy", 3, zero))
+    return Pose(origin.numbers("xyz", 3, ZERO), origin.numbers("rpy", 3, ZERO))
 
 
 # -- shapes ------------------------------------------------------------------------------------------------
@@ -169,24 +184,11 @@ def _color(element: Element, colors: dict[str, Vector]) -> Vector | None:
 
 
 def _joint(element: Element) -> Joint:
-    parts = (
-        "parent",
-        "child",
-        "origin",
-        "axis",
-        "limit",
-        "dynamics",
-        "mimic",
-        "calibration",
-        "safety_controller",
-    )
-    element.know(parts, ("name", "type", "dont_collapse"))
+    element.know(JOINT_PARTS, ("name", "type", "dont_collapse"))
     kind = element.text("type")
     if kind not in JOINT_TYPES:
-        element.refuse(
-            f"a joint type of {', '.join(JOINT_TYPES)}",
-            f"{quoted(kind)}{near(kind[:60], JOINT_TYPES)}",
-        )
+        found = f"{quoted(kind)}{near(kind[:60], JOINT_TYPES)}"
+        element.refuse(f"a joint type of {', '.join(JOINT_TYPES)}", found)
     joint = Joint(
         name=element.name(),
         type=kind,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from xml.sax.saxutils import quoteattr
 
-from .document import Document, Geometry, Joint, Link, Pose, Shape, Vector
+from .document import INERTIA, Document, Geometry, Joint, Link, Pose, Shape, Vector
 
 
 def to_xml(document: Document) -> str:
@@ -60,8 +60,7 @@ def _materials(document: Document) -> dict[Vector, str]:
 def _link_lines(link: Link, materials: dict[Vector, str]) -> list[str]:
     lines = [f"  <{_tag('link', name=link.name)}>"]
     if link.inertial is not None:
-        keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-        inertia = dict(zip(keys, link.inertial.inertia, strict=True))
+        inertia = dict(zip(INERTIA, link.inertial.inertia, strict=True))
         lines += ["    <inertial>", *_origin_lines(link.inertial.origin, "      ")]
         lines += [f"      <{_tag('mass', value=link.inertial.mass)}/>"]
         lines += [f"      <{_tag('inertia', **inertia)}/>", "    </inertial>"]

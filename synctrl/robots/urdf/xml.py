@@ -61,7 +61,7 @@ class Element:
 
     def error(self, problem: str) -> RobotError:
         """An error about this element."""
-        return RobotError(f"{self.file}:{self.line}: {self.place}: {problem}")
+        return RobotError(problem, subject=self.place, file=self.file, line=self.line)
 
     def refuse(self, expected: str, found: str) -> NoReturn:
         """Raise the error: this was expected, that was found."""
@@ -69,7 +69,7 @@ class Element:
 
     def warn(self, message: str) -> None:
         """Warn about this element."""
-        warn(f"{self.file}:{self.line}: {self.place}: {message}", RobotWarning)
+        warn(str(self.error(message)), RobotWarning)
 
     # -- children -----------------------------------------------------------------------------------------
 
@@ -96,7 +96,7 @@ class Element:
         children, attributes = tuple(children), tuple(attributes)
         for child in self.children:
             if child.tag not in children:
-                _unknown(child, f"<{printable(child.tag)}>", child.tag, children)
+                _unknown(child, f"<{shown_tag(child.tag)}>", child.tag, children)
         for attribute in self.attributes:
             if attribute not in attributes and not attribute.startswith("xmlns"):
                 _unknown(self, f"attribute {quoted(attribute)}", attribute, attributes)
@@ -148,7 +148,7 @@ class Element:
         return float(word)
 
 
-def printable(tag: str) -> str:
+def shown_tag(tag: str) -> str:
     """An XML tag as it can be shown."""
     return quoted(tag)[1:-1]
 
@@ -166,9 +166,9 @@ def read_bytes(file: Path) -> bytes:
         with file.open("rb") as stream:
             data = stream.read(MAX_BYTES + 1)
     except OSError as error:
-        raise RobotError(f"{file}: cannot be read: {error.strerror}") from error
+        raise RobotError(f"cannot be read: {error.strerror}", file=file) from error
     if len(data) > MAX_BYTES:
-        raise RobotError(f"{file}: expected at most {MAX_BYTES / 1e6:g} MB, found more")
+        raise RobotError(f"expected at most {MAX_BYTES / 1e6:g} MB, found more", file=file)
     return data
 
 
@@ -190,9 +190,8 @@ def _utf8(file: str, data: bytes) -> bytes:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        raise RobotError(
-            f"{file}:{line}: expected text in UTF-8, found byte {data[error.start]:#04x}"
-        ) from error
+        found = f"byte {data[error.start]:#04x}"
+        raise RobotError(f"expected text in UTF-8, found {found}", file=file, line=line) from error
     return data
 
 
@@ -215,9 +214,7 @@ class _Reader:
             self.parser.Parse(data, True)
         except expat.ExpatError as error:
             reason = f"at column {error.offset + 1}: {expat.errors.messages[error.code]}"
-            raise RobotError(
-                f"{self.file}:{error.lineno}: expected well-formed XML, found {reason}"
-            ) from error
+            self._refuse("well-formed XML", reason, line=error.lineno)
         assert self.root is not None  # Expat refuses a document without one
         return self.root
 
@@ -243,13 +240,13 @@ class _Reader:
         if encoding is not None and encoding.lower() not in ("utf-8", "utf8", "us-ascii", "ascii"):
             self._refuse("text in UTF-8", f"a declaration of {quoted(encoding)}")
 
-    def _refuse(self, expected: str, found: str) -> NoReturn:
-        line = self.parser.CurrentLineNumber
-        raise RobotError(f"{self.file}:{line}: expected {expected}, found {found}")
+    def _refuse(self, expected: str, found: str, line: int = 0) -> NoReturn:
+        line = line or self.parser.CurrentLineNumber
+        raise RobotError(f"expected {expected}, found {found}", file=self.file, line=line)
 
 
 def _place(parent: Element | None, tag: str, attributes: dict[str, str]) -> str:
     """Where an element stands: "robot", "link 'arm'", "link 'arm', inertial, mass"."""
     named = parent is not None and parent.tag == "robot" and "name" in attributes
-    here = f"{printable(tag)} {quoted(attributes['name'])}" if named else printable(tag)
+    here = f"{shown_tag(tag)} {quoted(attributes['name'])}" if named else shown_tag(tag)
     return here if parent is None or parent.tag == "robot" else f"{parent.place}, {here}"
