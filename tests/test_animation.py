@@ -20,7 +20,7 @@ from synctrl.show.animation import (
     planar_scene,
 )
 from synctrl.show.arms import ALARM, CALM
-from synctrl.show.rotations import matrices as rotations
+from synctrl.tasks.rotations import from_quaternion as rotations
 
 FPS = 25.0
 

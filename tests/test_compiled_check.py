@@ -204,7 +204,7 @@ FAULTS = {
     "a share takes another pair": ("sign * a->integral[pair + j]", "sign * a->integral[j]"),
     "the integral's sign is lost": ("sign * a->integral[pair + j]", "a->integral[pair + j]"),
     "the place of the base": ("X(base, n, 12) X(desired", "X(base, one, 12) X(desired"),
-    "the posture's gain": ("X(gain, n, nv) X(base", "X(posture, n, nv) X(base"),
+    "the posture's gain": ("X(gain, n, nv)\n", "X(posture, n, nv)\n"),
     "the weights of W": ("X(weights, n, 4*m*m) X(W_inv, n, nv)", "X(weights, n, 4*m*m) X(gain, n, nv)"),
     "another robot's damping": ("X(K_eps, one, m) X(K_r, n, K)", "X(K_eps, one, m) X(K_r, one, K)"),
     "another robot's true parameters": ("X(pi, n, bodies) X(base", "X(pi, one, bodies) X(base"),
@@ -242,7 +242,7 @@ def test_code_that_was_made_from_a_wrong_line_of_the_law_is_found(monkeypatch):
     from synctrl.control import law
 
     with monkeypatch.context() as patch:
-        patch.setattr(law, "coupled_error", lambda w, E, beta: w - beta * E)
+        patch.setattr(law, "compute_weighted_errors", lambda c, c_dot, error: np.matvec(c, error))
         wrong = list(program.generate(classify(loop.controller).kinds))
     monkeypatch.setattr(program, "generate", lambda kinds: iter(wrong))
     with pytest.raises(CompilationError, match="differs from Pinocchio"):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from cells import SMALL_GAINS, small_cell
 
-from synctrl import Experiment
+from synctrl import CartesianSpace, Cell, Experiment
 from synctrl.compiled import structs
 from synctrl.compiled.compiler import compiler
 from synctrl.compiled.header import functions_of, header, largest
@@ -42,6 +42,14 @@ def learning_otherwise() -> Experiment:
     return replace(experiment, gains=replace(experiment.gains, Gamma=None), adaptation=Natural(0.1))
 
 
+def damped() -> Experiment:
+    """A space that damps singular configurations."""
+    cell = small_cell()
+    return Experiment(
+        Cell(cell.members, cell.coupling, CartesianSpace("xy", singularity="damped")), SMALL_GAINS, 0.05
+    )
+
+
 EXPERIMENTS = {
     "planar arms": planar_four,
     "joints": a460_pair,
@@ -49,6 +57,7 @@ EXPERIMENTS = {
     "redundant arms": panda_four,
     "damping in task space": lambda: planar_four(k_r_space="task"),
     "two kinds": mixed_four,
+    "damped": damped,
     "another adaptation": learning_otherwise,
 }
 
@@ -101,7 +110,7 @@ def test_a_rate_has_the_shape_of_its_state_and_the_place():
 
 def test_every_array_of_a_result_is_logged_from_a_quantity_of_its_dimensions():
     dimension = {"robot": "n", "pair": "p", "axis": "m", "joint": "nv", "parameter": "P"}
-    assert [*LOGS] == [*[*LAYOUT][1:], "adaptation_state"]
+    assert [*LOGS] == [*[*LAYOUT][1:], "adaptation_state", "damping", "velocity_lost"]
     for name, (dimensions, _) in [*LAYOUT.items()][1:]:
         rows, length = (dimension[each] for each in dimensions[1:])
         assert QUANTITIES[LOGS[name]][1:3] == (rows, length), name
@@ -147,7 +156,7 @@ def test_the_driver_counts_columns_as_python_does(name, tmp_path):
 
 # -- the table and the arrays -----------------------------------------------------------------------------
 
-SMALL = dict(zip((*SIZES, "n", "p"), (2, 3, 5, 7, 3, 30, 1, 1, 4, 6), strict=True))
+SMALL = dict(zip((*SIZES, "n", "p"), (2, 3, 5, 7, 3, 30, 1, 1, 1, 2, 4, 6), strict=True))
 
 
 @pytest.mark.parametrize("name", QUANTITIES)

@@ -84,12 +84,14 @@ def test_the_derivative_of_the_left_jacobian_is_that_of_finite_differences(phi, 
     np.testing.assert_allclose(left_jacobian_inverse_dot(phi, phi_dot), numeric, atol=1e-9)
 
 
-@given(off=st.floats(0, 1e-3))
-def test_series_and_closed_form_meet(off):
-    """b and its slope are the same by both, where one takes over from the other."""
-    square = np.array([rotations._SMALL**2 - off])
-    series, closed = rotations._coefficients(square), rotations._closed_form(square)
-    np.testing.assert_allclose(series, closed, rtol=2e-12)
+@given(angle=st.floats(1.0, 6.0))
+def test_the_series_have_the_digits_of_the_closed_form_where_that_has_them_all(angle):
+    """b = 1/a^2 - cot(a/2)/(2a) and b'/a, along any axis."""
+    half = angle / 2
+    b = 1 / angle**2 - 0.5 / (angle * np.tan(half))
+    slope = (0.5 / (angle * np.tan(half)) + 0.25 / np.sin(half) ** 2 - 2 / angle**2) / angle**2
+    found = rotations._coefficients(angle * np.array([0.6, 0.0, -0.8]))
+    np.testing.assert_allclose(np.ravel(found), (b, slope), rtol=2e-13)
 
 
 @given(rpy=st.tuples(*[st.floats(-3, 3)] * 3))

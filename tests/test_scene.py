@@ -27,8 +27,9 @@ from hypothesis.extra.numpy import arrays
 from synctrl.errors import InputError, RobotError
 from synctrl.show import scene as scene_module
 from synctrl.show import shapes, view
-from synctrl.show.rotations import continuous, matrices, towards
+from synctrl.show.rotations import continuous, towards
 from synctrl.show.scene import Scene
+from synctrl.tasks.rotations import from_quaternion as matrices
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARE = Path(str(importlib.metadata.distribution("example-robot-data").locate_file("cmeel.prefix/share")))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from seams.degrees import DEGREES, Degrees
+from seams.degrees import DEGREES, BoundDegrees, Degrees
 
 from synctrl import (
     CartesianSpace,
@@ -25,7 +25,6 @@ from synctrl.analysis.certify import certify
 from synctrl.errors import InputError, SimulationError, TrajectoryError, UnreachableError
 from synctrl.sweep import Grid, Sweep, gain, load
 from synctrl.tasks.spaces import units_of
-from synctrl.tasks.validity import Invalid
 
 ARM, START = load_robot("planar2r"), np.array([0.3, 1.0])
 WAYS = {
@@ -120,13 +119,20 @@ class Narrow(Degrees):
     def __init__(self, limit: float):
         self.limit = limit
 
-    def invalid(self, task):
-        far = np.abs(task.x).max(axis=1)
-        i = int(far.argmax())
-        return Invalid("angle", i, float(far[i])) if far[i] > self.limit else None
+    def bind(self, robots):
+        return BoundNarrow(robots, {"angle": self.limit})
 
     def __repr__(self) -> str:
         return f"Narrow({self.limit:g})"
+
+
+class BoundNarrow(BoundDegrees):
+    def __init__(self, robots, limits):
+        super().__init__(len(robots), robots[0].nv)
+        self.limits = limits
+
+    def watched(self, task):
+        return np.abs(task.x).max(axis=1, keepdims=True)
 
 
 @pytest.mark.parametrize("options", WAYS.values(), ids=WAYS)
@@ -149,8 +155,13 @@ def test_a_space_that_finds_nothing_invalid_changes_nothing():
 class Sided(Degrees):
     """Degrees of an elbow that may not be stretched in a step."""
 
-    def sides(self, task, robots):
-        return np.sign(task.x[:, 1])
+    def bind(self, robots):
+        return BoundSided(len(robots), robots[0].nv)
+
+
+class BoundSided(BoundDegrees):
+    def sides(self, task):
+        return task.x[:, 1:]
 
 
 def test_a_robot_that_changes_sides_ends_the_run():

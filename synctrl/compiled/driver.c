@@ -1,6 +1,6 @@
 /* The closed loop of a cell, from step to step.
  *
- * Above this text stand the sizes of rows (m, nv, P, Z, K, bodies, tip, spare), marks of steps, lists of quantities,
+ * Above this text stand the sizes of rows (m, nv, P, Z, K, bodies, tip, ...), marks of steps, lists of quantities,
  * the structures, and the generated functions of each kind of robot with the table `kinds`; see header.py. What the
  * quantities are is said in quantities.py. Arrays are row-major and have one row per robot or pair; rows are padded to
  * the largest robot. The state y is made of the quantities in STATE, one after another.
@@ -137,27 +137,6 @@ static void record(const Cell *c, Quantities *a, Work *k, long row, const Log *l
     LOGS(COPY)
 }
 
-/* sign of a determinant by elimination with row exchanges; A is destroyed */
-static double determinant_sign(double *A) {
-    double sign = 1;
-    for (int j = 0; j < m; j++) {
-        int best = j;
-        for (int i = j + 1; i < m; i++)
-            if (fabs(A[i * m + j]) > fabs(A[best * m + j])) best = i;
-        if (A[best * m + j] == 0) return 0;
-        if (best != j) {
-            sign = -sign;
-            for (int l = 0; l < m; l++) { double t = A[j * m + l]; A[j * m + l] = A[best * m + l]; A[best * m + l] = t; }
-        }
-        if (A[j * m + j] < 0) sign = -sign;
-        for (int i = j + 1; i < m; i++) {
-            double f = A[i * m + j] / A[j * m + j];
-            for (int l = j; l < m; l++) A[i * m + l] -= f * A[j * m + l];
-        }
-    }
-    return sign;
-}
-
 /* The tests of the guard of the reference engine, in its order; each looks at all robots before the next one. */
 
 static int found(Report *report, int status, int robot, double value) {
@@ -173,43 +152,30 @@ static int not_finite(const double *numbers, int size) {
     return 0;
 }
 
-static int turned(const Cell *c, const Quantities *a, Report *report) {
-    if (!pose) return 0;
-    int worst = 0;
-    double largest = 0;
-    for (int i = 0; i < c->n; i++) {
-        const double *e = a->e + (size_t)i * m + 3; /* behind the position */
-        double angle = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
-        if (angle > largest) { largest = angle; worst = i; }
-    }
-    return largest > c->max_angle && found(report, FOUND_ORIENTATION, worst, largest);
-}
-
-static int singular(const Cell *c, const Quantities *a, Report *report) {
-    for (int i = 0; tip && i < c->n; i++) {
-        const double *J = a->J + (size_t)i * m * nv, *J_inv = a->J_inv + (size_t)i * m * nv;
-        double there = 0, back = 0;
-        for (int j = 0; j < m * kinds[c->kind[i]].nv; j++) { there += J[j] * J[j]; back += J_inv[j] * J_inv[j]; }
-        double condition = sqrt(there * back);
-        if (!(condition < c->max_condition)) return found(report, FOUND_CONDITION, i, condition);
-    }
+/* The first robot of which a watched number has reached its bound, or is none; number by number. */
+static int beyond(const Cell *c, const Quantities *a, Report *report) {
+    for (int k = 0; k < watches; k++)
+        for (int i = 0; i < c->n; i++) {
+            double value = a->watched[i * watches + k];
+            if (!(value < a->bounds[k])) return found(report, FOUND_STATE + 1 + k, i, value);
+        }
     return 0;
 }
 
+/* The first robot on the other side of a singular configuration than at the last checked instant. */
 static int crossed(const Cell *c, const Quantities *a, Work *k, Report *report) {
-    for (int i = 0; tip && i < c->n; i++) {
-        if (kinds[c->kind[i]].nv != m) continue;
-        memcpy(k->w, a->J + (size_t)i * m * nv, sizeof(double) * m * m);
-        double before = k->orientation[i];
-        k->orientation[i] = determinant_sign(k->w);
-        if (before != 0 && k->orientation[i] != before) return found(report, FOUND_SIDE, i, 0);
+    for (int i = 0; watches && i < c->n; i++) {
+        double side = a->side[i], before = k->side[i];
+        k->side[i] = side;
+        if ((side < 0 && before > 0) || (side > 0 && before < 0)) return found(report, FOUND_SIDE, i, 0);
     }
     return 0;
 }
 
 static int check(const Cell *c, const Quantities *a, Work *k, const double *y, Report *report) {
     if (not_finite(y, state_size(c))) return found(report, FOUND_STATE, 0, 0);
-    if (turned(c, a, report) || singular(c, a, report) || crossed(c, a, k, report)) return 1;
+    for (int i = 0; watches && i < c->n; i++) call_guard(c, a, i, k);
+    if (beyond(c, a, report) || crossed(c, a, k, report)) return 1;
     for (int i = 0; i < c->n; i++)
         if (not_finite(a->tau + (size_t)i * nv, nv)) return found(report, FOUND_TORQUE, i, 0);
     return 0;

@@ -13,7 +13,7 @@ import numpy as np
 from ..coupling.cell import Cell
 from ..simulation.clock import Clock, Stretch
 from ..simulation.disturbances import DisturbanceSchedule
-from ..simulation.guard import CHECKS, Finding, stopped
+from ..simulation.guard import Finding, checks, limits_of, stopped
 from ..simulation.handover import tell, up_to_a_failure
 from ..simulation.recorder import Recorder
 from ..simulation.step_error import StepError
@@ -176,7 +176,7 @@ class _Steps:
         self._steps = structs.Steps(holds=every is not None)
         self._block: Block | None = None
         program.tell(self._steps, {"disturbance": schedule.torques, "pi": program.carried})
-        ctypes.memset(work.orientation, 0, 8 * program.loop.cell.n)
+        ctypes.memset(work.side, 0, 8 * program.loop.cell.n)
 
     def advance(self, block: Block, first: int, last: int, y: np.ndarray) -> None:
         """Move y through some steps of a block, in place."""
@@ -241,7 +241,8 @@ class _Steps:
             worst = program.work.step_error
             self._step_error.note(worst.largest, worst.speed, worst.at, worst.time)
         if report.status:
-            found = Finding(CHECKS[report.status - 1], report.robot, report.value)
+            check = checks(limits_of(program.loop.cell.task))[report.status - 1]
+            found = Finding(check, report.robot, report.value)
             raise stopped(program.loop, float(times[report.step]), y, recorder.last("v"), found)
 
 

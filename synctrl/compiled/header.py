@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from ..simulation.guard import CHECKS
+from ..simulation.guard import checks
 from .kind import Kind
 from .quantities import FUNCTIONS, LOGS, QUANTITIES, owned_by
 from .structs import STRUCTURES, Mark, declared
@@ -25,18 +25,23 @@ def largest(kinds: list[Kind]) -> dict[str, int]:
 
 
 def functions_of(kind: Kind) -> list[str]:
-    """Names of the functions that a kind has; an adaptation whose state is theta_hat has no `estimate`."""
-    return [name for name in FUNCTIONS if name != "estimate" or kind.learning is not None]
+    """Names of the functions that a kind has.
+
+    A space that watches nothing has no `guard`, an adaptation whose state is theta_hat no `estimate`.
+    """
+    lacks = {"guard": not kind.watches, "estimate": kind.learning is None}
+    return [name for name in FUNCTIONS if not lacks.get(name, False)]
 
 
 # -- internals --------------------------------------------------------------------------------------------
 
 
 def _constants(kinds: list[Kind]) -> Iterable[str]:
-    """Sizes, whether the task is a pose, how many kinds there are, marks, and what the guard may find."""
-    yield _enumeration({**largest(kinds), "pose": int(kinds[0].space == "pose"), "KINDS": len(kinds)})
+    """Sizes, how many kinds there are, marks, and what the guard may find."""
+    yield _enumeration({**largest(kinds), "KINDS": len(kinds)})
     yield _enumeration({name: mark.value for name, mark in Mark.__members__.items()})
-    yield _enumeration({f"FOUND_{check.upper()}": k for k, check in enumerate(CHECKS, start=1)})
+    found = enumerate(checks(kinds[0].watches), start=1)
+    yield _enumeration({f"FOUND_{check.upper()}": k for k, check in found})
 
 
 def _enumeration(constants: Mapping[str, int]) -> str:

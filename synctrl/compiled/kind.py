@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from ..control.controller import Controller
-from ..errors import InputError
 from ..robots.friction_parameters import FrictionParameters
 from ..robots.mechanism import Mechanism, mechanism
-from ..tasks.pose import PoseSpace
-from ..tasks.spaces import CartesianSpace
+from ..tasks.algebra import Algebra
+from ..tasks.redundancy import Posture
+from ..tasks.spaces import BoundJointSpace, BoundTipSpace, JointSpace, TipSpace
+from ..tasks.tips import Kinematics
 from .lawful import TracedLaw, trace_law
 from .learning import Learning, trace_learning
 
@@ -24,8 +25,7 @@ class Kind:
 
     Attributes:
         fixed: the mechanism.
-        space: "joint", "position" or "pose".
-        rows: which of x, y, z a position has.
+        space: of the task.
         matrix: map from theta to inertial parameters, (10 bodies, P), or None for all of them.
         base_rotation: rotation of the first joint's placement if all robots share it, else None.
         reference_acceleration, k_r_space: options of the controller.
@@ -37,8 +37,7 @@ class Kind:
     """
 
     fixed: Mechanism
-    space: str
-    rows: tuple[int, ...]
+    space: TipSpace | JointSpace
     matrix: np.ndarray | None
     base_rotation: np.ndarray | None
     gravity: tuple[float, float, float]
@@ -58,7 +57,12 @@ class Kind:
     @property
     def m(self) -> int:
         """Dimension of the task."""
-        return {"joint": self.nv, "position": len(self.rows), "pose": 6}[self.space]
+        return self.space.m if isinstance(self.space, TipSpace) else self.nv
+
+    @property
+    def tip(self) -> bool:
+        """Whether the task is one of the tip."""
+        return isinstance(self.space, TipSpace)
 
     @property
     def parameters(self) -> int:
@@ -77,9 +81,31 @@ class Kind:
         return self.parameters if self.learning is None else self.learning.size
 
     @property
-    def redundant(self) -> bool:
-        """Whether there are more joints than task coordinates."""
-        return self.nv > self.m
+    def damped(self) -> bool:
+        """Whether singular configurations are damped."""
+        return getattr(self.space, "damping", None) is not None
+
+    @property
+    def solves(self) -> bool:
+        """Whether the way to the joints is a pseudo-inverse."""
+        return self.damped or self.nv > self.m
+
+    @property
+    def watches(self) -> tuple[str, ...]:
+        """Names of what the guard watches."""
+        return tuple(getattr(self.space, "limits", ()))
+
+    def bound(self, tip: Kinematics, posture: Posture, algebra: Algebra) -> BoundTipSpace | BoundJointSpace:
+        """The space of one such robot.
+
+        Args:
+            tip: its tip.
+            posture: W^-1, posture and gain, (nv,).
+            algebra: of all these numbers or symbols.
+        """
+        if not isinstance(self.space, TipSpace):
+            return BoundJointSpace()
+        return self.space.over(tip, [self.nv], posture, algebra)
 
     @property
     def sizes(self) -> dict[str, int]:
@@ -91,8 +117,10 @@ class Kind:
             "Z": self.learned,
             "K": self.nv if self.k_r_space == "joint" else self.m,
             "bodies": 10 * self.nv,
-            "tip": int(self.space != "joint"),
-            "spare": int(self.redundant),
+            "tip": int(self.tip),
+            "spare": int(self.solves),
+            "damped": int(self.damped),
+            "watches": len(self.watches),
         }
 
     def key(self) -> list[Any]:
@@ -102,7 +130,9 @@ class Kind:
         options: list[Any] = [self.reference_acceleration, self.k_r_space, list(self.gravity)]
         options += [self.smoothing, self.rotors, list(self.made_of)]
         options += [None if part is None else part.key() for part in (self.learning, self.law)]
-        return [self.fixed.key(), self.space, list(self.rows), matrix, shared, options]
+        damping = asdict(self.space.damping) if self.damped else None  # type: ignore[union-attr, arg-type]
+        space = [list(getattr(self.space, "rows", ())), damping, list(self.watches)]
+        return [self.fixed.key(), space, matrix, shared, options]
 
 
 class Classified(NamedTuple):
@@ -152,11 +182,9 @@ def _kind(
     cell, parameters = controller.cell, controller.cell.parameters[i]
     rigid: Any = parameters.base if isinstance(parameters, FrictionParameters) else parameters
     gravity = cell.robots[i].gravity_vector
-    space, rows = _space(controller)
     return Kind(
         fixed,
-        space,
-        rows,
+        cell.space,  # type: ignore[arg-type]
         getattr(rigid, "matrix", None),
         rotation,
         (float(gravity[0]), float(gravity[1]), float(gravity[2])),
@@ -168,15 +196,3 @@ def _kind(
         learning,
         law,
     )
-
-
-def _space(controller: Controller) -> tuple[str, tuple[int, ...]]:
-    space: Any = controller.cell.space
-    if getattr(space, "damping", None) is not None:
-        raise InputError(
-            "engine='compiled' does not damp singular configurations; use singularity='stop', or "
-            "engine='pinocchio'"
-        )
-    if type(space) is CartesianSpace:
-        return "position", tuple(space.rows)
-    return ("pose", ()) if type(space) is PoseSpace else ("joint", ())

@@ -32,6 +32,7 @@ from ..robots.robot import Robot
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.payloads import PayloadSchedule
 from ..simulation.plant import Plant
+from ..tasks import algebra, rotations
 from ..tasks.pose import BoundPoseSpace, PoseSpace
 from ..tasks.redundancy import DampedInverse, Inverse, Pseudoinverse, Redundancy
 from ..tasks.spaces import BoundCartesianSpace, BoundJointSpace, CartesianSpace, JointSpace
@@ -43,6 +44,8 @@ SPACES = (JointSpace, CartesianSpace, PoseSpace)
 BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace)
 RIGID = (FullParameters, LinearParameters, BaseParameters)
 INVERSES = (Inverse, Pseudoinverse, DampedInverse)
+#: modules whose functions the parts of a closed loop call, beside those of their own
+LINES = (law, algebra, rotations)
 
 
 class Part(NamedTuple):
@@ -107,6 +110,8 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
         yield Part("redundancy", space.redundancy, (Redundancy,))
         yield Part("tips of the robots", task._tips, (Tips,))
         yield Part("way from the task to the joints", task._inverse, INVERSES)
+        if task._inverse.algebra is not algebra.LAPACK:
+            raise _replaced("linear algebra of the way to the joints", task._inverse.algebra)
     for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True):
         yield Part(f"model of {name}", robot, (Robot,))
         yield Part(f"parameters of {name}", parameters, (*RIGID, FrictionParameters))
@@ -118,7 +123,7 @@ def _functions(loop: ClosedLoop) -> Iterator[tuple[str, str, Any, str]]:
     """Functions that generated code was traced from: role, name, function, and the module it was found in."""
     bases = {base for part in _parts(loop) for base in type(part.value).__mro__}
     ours = {base.__module__ for base in bases if _is_ours(base.__module__)}
-    for module in sorted(ours | {law.__name__}):
+    for module in sorted(ours | {lines.__name__ for lines in LINES}):
         for name, function in vars(sys.modules[module]).items():
             if callable(function) and name[0].islower() and not isinstance(function, type):
                 yield f"function '{name}' of {module}", name, function, module
@@ -169,6 +174,7 @@ def _check_class(kind: type) -> None:
             function = _unwrapped(value)
             if (
                 callable(function)
+                and not isinstance(function, type)
                 and _home(function) != base.__module__
                 and (name == "__call__" or not name.startswith("__"))
             ):

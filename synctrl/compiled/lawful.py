@@ -19,6 +19,7 @@ from ..control.laws.protocol import ROWS, WEIGHTS
 from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.cell import Cell
 from ..errors import InputError
+from .algebra import column_of, symbols
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,35 +60,18 @@ def trace_law(controller: Controller) -> list[TracedLaw | None]:
 def _traced(law: BoundLaw, n: int, m: int) -> list[TracedLaw | None]:
     import casadi as ca
 
-    rows = {name: _symbols(name, n, m) for name in ROWS}
-    weights = {name: _symbols(name, n, m, m) for name in WEIGHTS}
+    rows = {name: symbols(name, n, m) for name in ROWS}
+    weights = {name: symbols(name, n, m, m) for name in WEIGHTS}
     errors = Errors.from_rows(**rows, **weights)
     asked = completed(law.command(errors), errors)
     found: list[TracedLaw | None] = []
     for i in range(n):
-        inputs = [_vector(rows[name][i]) for name in ROWS]
-        inputs.append(_vector(np.stack([weights[name][i] for name in WEIGHTS])))
-        outputs = [_vector(part[i]) for part in (asked.xref_dot, asked.xref_ddot, asked.force)]
-        outputs.append(_vector(asked.e_star[i]))
+        inputs = [column_of(rows[name][i]) for name in ROWS]
+        inputs.append(column_of(np.stack([weights[name][i] for name in WEIGHTS])))
+        outputs = [column_of(part[i]) for part in (asked.xref_dot, asked.xref_ddot, asked.force)]
+        outputs.append(column_of(asked.e_star[i]))
         found.append(TracedLaw(ca.Function("command", inputs, outputs)))
     return found
-
-
-def _symbols(name: str, *shape: int) -> np.ndarray:
-    """An array of symbols."""
-    import casadi as ca
-
-    symbols = ca.SX.sym(name, int(np.prod(shape)))
-    array = np.empty(symbols.numel(), dtype=object)
-    for k in range(array.size):
-        array[k] = symbols[k]
-    return array.reshape(shape)
-
-
-def _vector(array: np.ndarray) -> Any:
-    import casadi as ca
-
-    return ca.densify(ca.vertcat(*np.ravel(array)))
 
 
 class ChosenLaw:

@@ -15,6 +15,7 @@ from ..control.adaptation import Seen
 from ..control.adaptation.gradient import BoundGradient
 from ..control.controller import Controller
 from ..errors import InputError
+from .algebra import column_of, symbols
 
 #: what a rate is a function of, beside z and the gradient
 MOTION = ("q", "v", "v_ref", "a_ref", "s_q")
@@ -75,27 +76,17 @@ def _traced(controller: Controller) -> list[Learning | None]:
     )
     found: list[Learning | None] = []
     for i, (nv, count) in enumerate(zip(joints, counts, strict=True)):
-        inputs = [_vector(z[i])]
-        seen = [*(_vector(part[i, :nv]) for part in motion), _vector(gradient[i, :count])]
-        estimate = ca.Function("estimate", inputs, [_vector(estimates[i, :count])])
-        rate = ca.Function("rate", [*inputs, *seen], [_vector(rates[i])])
+        inputs = [column_of(z[i])]
+        seen = [*(column_of(part[i, :nv]) for part in motion), column_of(gradient[i, :count])]
+        estimate = ca.Function("estimate", inputs, [column_of(estimates[i, :count])])
+        rate = ca.Function("rate", [*inputs, *seen], [column_of(rates[i])])
         found.append(Learning(size, estimate, rate))
     return found
 
 
 def _symbols(name: str, lengths: list[int], longest: int) -> np.ndarray:
     """Rows of symbols, (n, longest), padded with zeros."""
-    import casadi as ca
-
     rows = np.zeros((len(lengths), longest), dtype=object)
     for row, length in zip(rows, lengths, strict=True):
-        symbols = ca.SX.sym(name, length)
-        for k in range(length):
-            row[k] = symbols[k]
+        row[:length] = symbols(name, length)
     return rows
-
-
-def _vector(row: np.ndarray) -> Any:
-    import casadi as ca
-
-    return ca.densify(ca.vertcat(*row))

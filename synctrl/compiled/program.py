@@ -18,8 +18,8 @@ from ..coupling.cell import Reference
 from ..errors import CompilationError
 from ..robots.mechanism import mechanism
 from ..simulation.closed_loop import ClosedLoop
+from ..simulation.guard import limits_of
 from ..simulation.plant import Plant
-from ..tasks.pose import MAX_ANGLE
 from . import structs
 from .build import cached_library, content_key, require_casadi
 from .header import header, largest
@@ -141,16 +141,13 @@ class CompiledLoop:
             arity=coupling.edges.shape[1],
             rubs=int(plant.viscous.any() or plant.coulomb.any()),
             saturates=int(plant.saturate),
-            max_condition=float(getattr(cell.space, "max_condition", np.inf)),
-            max_angle=MAX_ANGLE,
             **found,
         )
 
     def _work(self) -> structs.Work:
         arg, res, iw, w = self.scratch
-        size, n, m = self.loop.size, self.sizes["n"], self.sizes["m"]
-        lengths = {"arg": arg, "res": res, "iw": iw, "w": max(w, m * m), "stage": size, "held": size}
-        lengths["orientation"] = n
+        size, n = self.loop.size, self.sizes["n"]
+        lengths = {"arg": arg, "res": res, "iw": iw, "w": w, "stage": size, "held": size, "side": n}
         found = {name: self.address(np.zeros(length + 1)) for name, length in lengths.items()}
         rates = (structs.Doubles * 4)(*(self.address(np.zeros(size)) for _ in range(4)))
         return structs.Work(k=rates, **found)
@@ -249,6 +246,7 @@ def _constants(loop: ClosedLoop, bases: list[Any]) -> dict[str, np.ndarray]:
         "coulomb": plant.coulomb,
         "smoothing": plant.smoothing,
         "limits": plant.torque_limits,
+        "bounds": np.array([[*limits_of(loop.cell.task).values()]]),
     }
 
 

@@ -45,7 +45,9 @@ SIZES: Mapping[str, str] = MappingProxyType(
         "K": "columns of K_r",
         "bodies": "inertial parameters of all bodies",
         "tip": "1 for tasks of the tip, 0 for tasks of the joints",
-        "spare": "1 if there are more joints than coordinates of the task, else 0",
+        "spare": "1 if the way to the joints is a pseudo-inverse, else 0",
+        "damped": "1 if singular configurations are damped, else 0",
+        "watches": "numbers that the guard watches",
     }
 )
 
@@ -72,6 +74,7 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "coulomb": Quantity("cell", "n", "nv", "coefficients of friction"),
         "smoothing": Quantity("cell", "n", "nv", "velocity at which Coulomb friction reaches tanh(1)"),
         "limits": Quantity("cell", "n", "nv", "at which torque is cut off"),
+        "bounds": Quantity("cell", "one", "watches", "of what the guard watches, in its order"),
         "pi": Quantity("load", "n", "bodies", "true inertial parameters, with what is carried"),
         "disturbance": Quantity("disturbance", "n", "nv", "torque from outside"),
         "desired": Quantity("instant", "n", "m", "desired coordinates"),
@@ -90,7 +93,14 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "J": Quantity("work", "n", "tip*m*nv", "Jacobian"),
         "J_dot": Quantity("work", "n", "tip*m*nv", "its rate"),
         "J_inv": Quantity("work", "n", "tip*m*nv", "its inverse, or W^-1 J^T G"),
-        "G": Quantity("work", "n", "spare*m*m", "(J W^-1 J^T)^-1"),
+        "G": Quantity("work", "n", "spare*m*m", "(J W^-1 J^T + lambda^2)^-1"),
+        "zeta": Quantity("work", "n", "spare*nv", "preferred velocity of the joints"),
+        "zeta_dot": Quantity("work", "n", "spare*nv", "its rate"),
+        "damping": Quantity("work", "n", "damped", "lambda"),
+        "damping_rate": Quantity("work", "n", "damped", "rate of lambda^2"),
+        "velocity_lost": Quantity("work", "n", "damped", "|xref' - J v_ref|"),
+        "watched": Quantity("work", "n", "watches", "what may make a run end"),
+        "side": Quantity("work", "n", "tip", "of which the sign says the side of a singular configuration"),
         "epsilon": Quantity("work", "p", "m", "synchronization errors"),
         "epsilon_dot": Quantity("work", "p", "m", "their rates"),
         "E": Quantity("work", "n", "m", "a robot's share of the integrals of epsilon"),
@@ -113,30 +123,33 @@ class Signature(NamedTuple):
     outputs: tuple[str, ...]
 
 
+#: what is desired at an instant: position, velocity and acceleration
+DESIRED = "desired", "desired_dot", "desired_ddot"
+#: what a robot hears of the others, see `Errors`
+HEARD = "E", "sigma", "sigma_dot"
+
 FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
     {
         "measure": Signature(
-            ("q", "v", "base", "desired", "desired_dot", "desired_ddot", "weights", "W_inv"),
+            ("q", "v", "base", *DESIRED, "weights", "W_inv", "posture", "gain"),
             (
                 "x", "e", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot", "sine", "cosine", "J", "J_dot", "J_inv",
-                "G",
+                "G", "zeta", "zeta_dot", "damping", "damping_rate",
             ),
         ),
         "control": Signature(
             (
-                "q", "v", "sine", "cosine", "z", "E", "sigma", "sigma_dot", "e", "x_dot", "xd_dot", "xd_ddot",
-                "w", "w_dot", "J", "J_dot", "J_inv", "G", "weights", "Lambda", "beta", "K_eps", "K_r",
-                "Gamma", "W_inv", "posture", "gain", "base",
+                "q", "v", "sine", "cosine", "z", *HEARD, "e", "x_dot", "xd_dot", "xd_ddot",
+                "w", "w_dot", "J", "J_dot", "J_inv", "G", "zeta", "zeta_dot", "damping_rate", "weights",
+                "Lambda", "beta", "K_eps", "K_r", "Gamma", "W_inv", "base",
             ),
-            ("tau", "z_dot", "e_star", "s_q"),
+            ("tau", "z_dot", "e_star", "s_q", "velocity_lost"),
         ),
         "plant": Signature(("q", "v", "sine", "cosine", "moving", "pi", "base"), ("v_dot",)),
+        "guard": Signature(("e", "J", "J_inv"), ("watched", "side")),
         "estimate": Signature(("z",), ("theta_hat",)),
     }
 )  # fmt: skip
-
-#: what is desired at an instant: position, velocity and acceleration
-DESIRED = "desired", "desired_dot", "desired_ddot"
 
 #: logged arrays, all of `LAYOUT` but t and those that a result may have beside, and what each is a copy of
 LOGS: Mapping[str, str] = MappingProxyType(
@@ -154,6 +167,8 @@ LOGS: Mapping[str, str] = MappingProxyType(
         "disturbance": "disturbance",
         "theta_hat": "theta_hat",
         "adaptation_state": "z",
+        "damping": "damping",
+        "velocity_lost": "velocity_lost",
     }
 )
 

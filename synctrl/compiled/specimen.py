@@ -115,9 +115,10 @@ class Specimen:
         posture = [self._random(robot.nv) for robot in robots]
         weights = [self._positive(robot.nv) for robot in robots]
         redundancy = Redundancy(posture, 0.7, weights)
+        damping: Any = getattr(space, "damping", None) or "stop"
         if isinstance(space, CartesianSpace):
-            return CartesianSpace(space.axes, redundancy=redundancy)
-        return PoseSpace(redundancy=redundancy)
+            return CartesianSpace(space.axes, singularity=damping, redundancy=redundancy)
+        return PoseSpace(singularity=damping, redundancy=redundancy)
 
     def _gains(self, cell: Cell, k_r_space: str) -> Gains:
         columns = cell.nv if k_r_space == "joint" else cell.m

@@ -64,7 +64,7 @@ class Results(ctypes.c_void_p):
 
 
 class Cell(ctypes.Structure):
-    """What does not change in a run: sizes, who is compared with whom, and what is watched.
+    """What does not change in a run: sizes, who is compared with whom, and whether joints rub.
 
     Attributes:
         n, p, arity: robots, pairs, and robots in one pair.
@@ -73,14 +73,12 @@ class Cell(ctypes.Structure):
         first, incident, incident_sign: where the pairs of a robot begin, (n + 1), and robot after robot its
             pairs, with entries of S.
         rubs, saturates: whether there is friction, and whether torque is cut off.
-        max_condition, max_angle: limits of the guard.
     """
 
     _fields_ = [
         *((name, ctypes.c_int) for name in ("n", "p", "arity", "rubs", "saturates")),
         *((name, Ints) for name in ("kind", "edge", "first", "incident")),
         *((name, Doubles) for name in ("sign", "incident_sign")),
-        *((name, ctypes.c_double) for name in ("max_condition", "max_angle")),
     ]
 
 
@@ -151,7 +149,7 @@ class Work(ctypes.Structure):
 
     Attributes:
         held: rates at the last sample.
-        orientation: signs of the determinants at the last checked instant, (n), 0 at first.
+        side: what `side` was at the last checked instant, (n), 0 at first.
     """
 
     _fields_ = [
@@ -160,7 +158,7 @@ class Work(ctypes.Structure):
         ("iw", Longs),
         ("w", Doubles),
         ("k", Doubles * 4),
-        *((name, Doubles) for name in ("stage", "held", "orientation")),
+        *((name, Doubles) for name in ("stage", "held", "side")),
         ("step_error", StepError),
     ]
 

@@ -1,9 +1,9 @@
-"""One robot's share of the closed loop, traced with symbols into three functions.
+"""One robot's share of the closed loop, traced with symbols into a few functions.
 
-`measure` finds out where the robot is, `control` is the law, `plant` is its true dynamics. Between the first
-two the driver lets the coupling exchange what neighbours need. The law itself is not written again here: the
-functions of `control/law.py` run on symbols. Which quantities each function reads and writes, and how long
-they are, is said in `quantities.py`.
+`measure` finds out where the robot is, `control` is the law, `plant` is its true dynamics, and `guard` says
+what is watched. Between the first two the driver lets the coupling exchange what neighbours need. Spaces,
+inverse maps and the law are not written again here: those of tasks/ and of control/law.py run on symbols.
+Which quantities each function reads and writes, and how long they are, is said in `quantities.py`.
 """
 
 from __future__ import annotations
@@ -20,9 +20,33 @@ from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.weights import Weights
 from ..robots.friction_parameters import friction_diagonals
 from ..robots.symbolic import Symbols
+from ..tasks.redundancy import Inversion, velocity_lost
+from ..tasks.spaces import Measurement
+from ..tasks.tips import Poses, Positions
+from .algebra import SYMBOLS, array_of, column_of
 from .kind import Kind
 from .learning import Learning
-from .quantities import DESIRED, FUNCTIONS, QUANTITIES, columns
+from .quantities import DESIRED, FUNCTIONS, HEARD, QUANTITIES, columns
+
+
+class TracedTip:
+    """The tip of a robot whose joint positions are symbols, see `Kinematics`.
+
+    Args:
+        recursion: at these positions.
+        base: rotation and translation of the first joint's placement.
+    """
+
+    def __init__(self, recursion: Symbols, base: tuple[Any, Any]):
+        self._recursion, self._base = recursion, base
+
+    def poses(self, q: np.ndarray, v: np.ndarray) -> Poses:
+        x, R, J, J_dot = map(array_of, self._recursion.tip(column_of(v), *self._base))
+        return np.stack((x[:, 0], J[:3] @ v)), R, J, J_dot
+
+    def positions(self, q: np.ndarray, v: np.ndarray) -> Positions:
+        moved, _, J, J_dot = self.poses(q, v)
+        return moved, J[:3], J_dot[:3]
 
 
 class Trace:
@@ -37,15 +61,19 @@ class Trace:
         import casadi as ca
 
         self.ca, self.kind, self.name = ca, kind, name
-        self.given = {key: ca.SX.sym(key, columns(key, kind.sizes)) for key in QUANTITIES}
+        self.given = {key: self.ca.SX.sym(key, columns(key, kind.sizes)) for key in QUANTITIES}
         self.q, self.v = self.given["q"], self.given["v"]
-        self.sine, self.cosine = self.given["sine"], self.given["cosine"]
+        still = Symbols(kind.fixed, self.q, self.ca.sin(self.q), self.ca.cos(self.q))
+        posture = self._row("W_inv"), self._row("posture"), self._row("gain")
+        self.space: Any = kind.bound(TracedTip(still, self._base()), posture, SYMBOLS)
 
     def functions(self) -> Iterator[Any]:
         """All that the kind has; those that take long to compile first."""
         yield self.control()
         yield self.plant()
         yield self.measure()
+        if self.kind.watches:
+            yield self.guard()
         if self.kind.learning is not None:
             yield self.estimate(self.kind.learning)
 
@@ -53,78 +81,61 @@ class Trace:
 
     def measure(self) -> Any:
         """Where the robot is, and how it errs."""
-        ca = self.ca
-        sine, cosine = ca.sin(self.q), ca.cos(self.q)
-        x, e, x_dot, xd_dot, xd_ddot, J, J_dot = self._task(sine, cosine)
-        J_inv, G = self._inverse(J)
+        motion, desired = (np.stack([*map(self._row, names)]) for names in (("q", "v"), DESIRED))
+        task = self.space.measure(motion, desired)
         c, c_dot = self._weights()[:2]
-        w, w_dot = law.compute_weighted_errors(c, c_dot, np.array((e, xd_dot - x_dot)))
+        w, w_dot = law.compute_weighted_errors(c, c_dot, task.error)
+        way = {} if task.inversion is None else task.inversion._asdict()
         return self._function(
             "measure",
-            x=x, e=e, x_dot=x_dot, xd_dot=xd_dot, xd_ddot=xd_ddot, w=w, w_dot=w_dot,
-            sine=sine, cosine=cosine, J=J, J_dot=J_dot, J_inv=J_inv, G=G,
+            x=task.x, e=task.e, x_dot=task.x_dot, xd_dot=task.xd_dot, xd_ddot=task.xd_ddot, w=w, w_dot=w_dot,
+            sine=np.sin(motion[0]), cosine=np.cos(motion[0]), J=task.J, J_dot=task.J_dot, **way,
         )  # fmt: skip
 
-    def _task(self, sine: Any, cosine: Any) -> tuple:
-        kind, m = self.kind, self.kind.m
-        desired = [self.given[name] for name in DESIRED]
-        xd, xd_dot, xd_ddot = (self._array(part, m) for part in desired)
-        empty = np.empty((0, 0), dtype=object)
-        if kind.space == "joint":
-            q, v = self._row("q"), self._row("v")
-            return q, xd - q, v, xd_dot, xd_ddot, empty, empty
-        x, R, J, J_dot = Symbols(kind.fixed, self.q, sine, cosine).tip(self.v, *self._base())
-        if kind.space == "pose":
-            from .pose import pose_task
+    def guard(self) -> Any:
+        """What is watched."""
+        e = self._row("e")
+        task = Measurement(np.stack((e, e)), np.stack((e, e)), np.stack((e, e)), *self._jacobians())
+        return self._function("guard", watched=self.space.watched(task), side=self.space.sides(task))
 
-            return pose_task(self.ca, self.v, x, R, J, J_dot, self.ca.vertcat(*desired))
-        rows = list(kind.rows)
-        x, J, J_dot = (self._matrix(part[rows, :]) for part in (x, J, J_dot))
-        return x[:, 0], xd - x[:, 0], np.matvec(J, self._row("v")), xd_dot, xd_ddot, J, J_dot
+    def _jacobians(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        m, nv = (self.kind.m, self.kind.nv) if self.kind.tip else (0, 0)
+        shapes = {"J": (m, nv), "J_inv": (nv, m), "J_dot": (m, nv)}
+        J, J_inv, J_dot = (array_of(self.given[name], *shape) for name, shape in shapes.items())
+        return J, J_inv, J_dot
 
-    def _inverse(self, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """J^-1, or W^-1 J^T G with G = (J W^-1 J^T)^-1."""
-        empty = np.empty((0, 0), dtype=object)
-        if self.kind.space == "joint":
-            return empty, empty
-        if not self.kind.redundant:
-            return self._inverted(J), empty
-        W_inv_JT = self._row("W_inv")[:, None] * J.T
-        G = self._inverted(J @ W_inv_JT)
-        return W_inv_JT @ G, G
-
-    def _inverted(self, A: np.ndarray) -> np.ndarray:
-        """Inverse by minors up to three rows, by an unrolled QR factorization above."""
-        ca, rows = self.ca, len(A)
-        symbols = ca.SX.sym("A", rows, rows)
-        small = rows <= 3
-        inverse = ca.inv_minor(symbols) if small else ca.solve(symbols, ca.SX.eye(rows))
-        function = ca.Function("inverse", [symbols], [inverse])
-        return self._matrix(function(self._back(A)))
+    def _task(self) -> Measurement:
+        """What was measured, of one instant."""
+        e, x_dot, xd_dot, xd_ddot = map(self._row, ("e", "x_dot", "xd_dot", "xd_ddot"))
+        J, J_inv, J_dot = self._jacobians()
+        m = len(e) if self.kind.solves else 0
+        rows = map(self._row, ("zeta", "zeta_dot", "damping", "damping_rate"))
+        inversion = Inversion(J_inv, array_of(self.given["G"], m, m), *rows)
+        x = np.zeros_like(e)  # which the law does not ask for
+        motion, error = np.stack((x, x_dot)), np.stack((e, xd_dot - x_dot))
+        return Measurement(motion, error, np.stack((xd_dot, xd_ddot)), J, J_inv, J_dot, inversion)
 
     # -- the law ------------------------------------------------------------------------------------------
 
     def control(self) -> Any:
         """The law: torque, z' of the adaptation, e*, s_q."""
-        errors = self._errors()
+        task = self._task()
+        errors = self._errors(task)
         asked = self._asked(errors)
         v_ref, a_ref, s_q, feedback = law.compute_joint_command(
-            asked, errors, self._row("v"), self, self._row("K_r"), self.kind.k_r_space
+            asked, task, self._row("v"), self.space, self._row("K_r"), self.kind.k_r_space
         )
         model_torque, z_dot = self._adaptive(v_ref, a_ref, s_q)
+        lost = velocity_lost(self._jacobians()[0], v_ref, asked.xref_dot) if self.kind.damped else None
         return self._function(
-            "control", tau=model_torque + feedback, z_dot=z_dot, e_star=asked.e_star, s_q=s_q
-        )
-
-    def _errors(self) -> Errors:
-        """What a law is told of one robot."""
-        names = "e", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot"
-        e, x_dot, xd_dot, xd_ddot, w, w_dot = map(self._row, names)
-        heard = np.array([self._row(name) for name in ("E", "sigma", "sigma_dot")])
-        return Errors(
-            None, np.array((e, xd_dot - x_dot)), x_dot, np.array((xd_dot, xd_ddot)), np.array((w, w_dot)),
-            heard, Weights(*self._weights()),
+            "control",
+            tau=model_torque + feedback, z_dot=z_dot, e_star=asked.e_star, s_q=s_q, velocity_lost=lost,
         )  # fmt: skip
+
+    def _errors(self, task: Measurement) -> Errors:
+        """What a law is told of one robot."""
+        w, heard = (np.stack([*map(self._row, names)]) for names in (("w", "w_dot"), HEARD))
+        return Errors(None, task.error, task.x_dot, task.rates, w, heard, Weights(*self._weights()))
 
     def _asked(self, errors: Errors) -> Asked:
         """What the law asks of one robot."""
@@ -132,85 +143,65 @@ class Trace:
         if kind.law is None:
             Lambda, beta, K_eps = map(self._row, ("Lambda", "beta", "K_eps"))
             return BoundSunMills(Lambda, beta, K_eps, kind.reference_acceleration).command(errors)
-        rows = (self._back(getattr(errors, name)) for name in ROWS)
+        rows = (column_of(getattr(errors, name)) for name in ROWS)
         parts = kind.law.command(*rows, self.given["weights"])
-        return Asked(*(self._array(part, kind.m) for part in parts))
-
-    def to_joints(self, task: Any, xref_dot: np.ndarray, xref_ddot: np.ndarray) -> tuple:
-        """v_ref and a_ref, by the formulas of `Inverse` and `Pseudoinverse` in tasks/redundancy.py."""
-        kind = self.kind
-        if kind.space == "joint":
-            return xref_dot, xref_ddot
-        J, J_dot, J_inv = self._jacobians()
-        if not kind.redundant:
-            v_ref = np.matvec(J_inv, xref_dot)
-            return v_ref, np.matvec(J_inv, xref_ddot - np.matvec(J_dot, v_ref))
-        W_inv, preferred, gain, q, v = map(self._row, ("W_inv", "posture", "gain", "q", "v"))
-        zeta, zeta_dot = gain * (preferred - q), -gain * v
-        gap = xref_dot - np.matvec(J, zeta)
-        mu = np.matvec(self._array(self.given["G"], kind.m, kind.m), gap)
-        v_ref = zeta + np.matvec(J_inv, gap)
-        h = zeta_dot + W_inv * np.matvec(J_dot.T, mu)
-        return v_ref, h + np.matvec(J_inv, xref_ddot - np.matvec(J_dot, v_ref) - np.matvec(J, h))
-
-    def to_torque(self, task: Any, force: np.ndarray) -> np.ndarray:
-        """J^T f."""
-        return force if self.kind.space == "joint" else np.matvec(self._jacobians()[0].T, force)
+        return Asked(*(array_of(part, -1) for part in parts))
 
     def estimate(self, learning: Learning) -> Any:
         """z -> theta_hat, of an adaptation whose state is something else."""
-        return self._function("estimate", theta_hat=learning.estimate(self.given["z"]))
+        return self._function("estimate", theta_hat=array_of(learning.estimate(self.given["z"])))
 
-    def _adaptive(self, v_ref: np.ndarray, a_ref: np.ndarray, s_q: np.ndarray) -> tuple[np.ndarray, Any]:
+    def _adaptive(self, v_ref: np.ndarray, a_ref: np.ndarray, s_q: np.ndarray) -> tuple:
         """Y theta_hat, and z' of the adaptation; with (14) its state z is theta_hat."""
         learning, z = self.kind.learning, self.given["z"]
-        motion = tuple(map(self._back, (v_ref, a_ref, s_q)))
+        motion = tuple(map(column_of, (v_ref, a_ref, s_q)))
         if learning is None:
             torque, gradient = self._model(z, *motion)
-            Gamma: Any = self.given["Gamma"]
-            return self._array(torque, self.kind.nv), Gamma * gradient
+            return array_of(torque, -1), self._row("Gamma") * array_of(gradient, -1)
         theta_hat = self.given["theta_hat"]
         parts = self.ca.substitute([*self._model(theta_hat, *motion)], [theta_hat], [learning.estimate(z)])
-        return self._array(parts[0], self.kind.nv), learning.rate(z, self.q, self.v, *motion, parts[1])
+        z_dot = learning.rate(z, self.q, self.v, *motion, parts[1])
+        return array_of(parts[0], -1), array_of(z_dot)
 
     def _model(self, theta_hat: Any, v_ref: Any, a_ref: Any, s_q: Any) -> tuple[Any, Any]:
         """Y theta_hat, and Y^T s_q as the derivative of s_q^T Y theta_hat with respect to theta_hat."""
-        ca, kind = self.ca, self.kind
+        kind = self.kind
         rigid = theta_hat[: kind.rigid_parameters]
-        pi = rigid if kind.matrix is None else ca.mtimes(ca.SX(kind.matrix), rigid)
-        symbols = Symbols(kind.fixed, self.q, self.sine, self.cosine)
-        torque = symbols.torque(pi, self.v, v_ref, a_ref, self._gravity())
+        pi = rigid if kind.matrix is None else self.ca.mtimes(self.ca.SX(kind.matrix), rigid)
+        torque = self._recursion().torque(pi, self.v, v_ref, a_ref, self._gravity())
         if kind.smoothing is not None:
-            rubbing = theta_hat[kind.rigid_parameters :]
-            v, v_ref, a_ref = (self._array(part, kind.nv) for part in (self.v, v_ref, a_ref))
+            rubbing = array_of(theta_hat[kind.rigid_parameters :], -1, kind.nv)
+            v, v_ref, a_ref = (array_of(part, -1) for part in (self.v, v_ref, a_ref))
             diagonals = friction_diagonals(v, v_ref, a_ref, kind.smoothing, kind.rotors)
-            torque += self._back(sum(self._array(rubbing, len(diagonals), kind.nv) * np.stack(diagonals)))
-        return torque, ca.jtimes(torque, theta_hat, s_q, True)
+            torque += column_of(sum(rubbing * np.stack(diagonals)))
+        return torque, self.ca.jtimes(torque, theta_hat, s_q, True)
 
     # -- the plant ----------------------------------------------------------------------------------------
 
     def plant(self) -> Any:
         """v' = M^-1 (tau - C v - g), through a Cholesky factor of M."""
-        ca, pi = self.ca, self.given["pi"]
-        symbols = Symbols(self.kind.fixed, self.q, self.sine, self.cosine)
-        still = ca.SX.zeros(self.kind.nv)
-        bias = symbols.torque(pi, self.v, self.v, still, self._gravity())
-        v_dot = _solve_positive(ca, symbols.mass_matrix(pi), self.given["moving"] - bias)
-        return self._function("plant", v_dot=v_dot)
+        pi, recursion = self.given["pi"], self._recursion()
+        bias = recursion.torque(pi, self.v, self.v, self.ca.SX.zeros(self.kind.nv), self._gravity())
+        v_dot = _solve_positive(self.ca, recursion.mass_matrix(pi), self.given["moving"] - bias)
+        return self._function("plant", v_dot=array_of(v_dot))
 
     # -- symbols and arrays -------------------------------------------------------------------------------
 
     def _function(self, name: str, **computed: Any) -> Any:
-        """A function of the table, in which nothing is computed twice."""
+        """A function of the table, in which nothing is computed twice; what is None has no entries."""
         inputs, outputs = FUNCTIONS[name]
         given = [self.given[key] for key in inputs]
-        results = self.ca.cse([self._flat(computed[key]) for key in outputs])
+        found = [computed.get(key) for key in outputs]
+        results = self.ca.cse([column_of([] if array is None else array) for array in found])
         return self.ca.Function(f"{self.name}_{name}", given, results, [*inputs], [*outputs])
 
+    def _recursion(self) -> Symbols:
+        """At joint positions of which sine and cosine are known."""
+        return Symbols(self.kind.fixed, self.q, self.given["sine"], self.given["cosine"])
+
     def _base(self) -> tuple[Any, Any]:
-        ca, shared = self.ca, self.kind.base_rotation
-        base = self.given["base"]
-        rotation = ca.reshape(base[:9], 3, 3).T if shared is None else ca.SX(shared)
+        shared, base = self.kind.base_rotation, self.given["base"]
+        rotation = self.ca.reshape(base[:9], 3, 3).T if shared is None else self.ca.SX(shared)
         return rotation, base[9:]
 
     def _gravity(self) -> Any:
@@ -218,40 +209,11 @@ class Trace:
         return self.ca.mtimes(self._base()[0].T, self.ca.SX(self.ca.DM(self.kind.gravity)))
 
     def _weights(self) -> np.ndarray:
-        m = self.kind.m
-        return self._array(self.given["weights"], 4, m, m)
-
-    def _jacobians(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        nv, m, given = self.kind.nv, self.kind.m, self.given
-        shapes = {"J": (m, nv), "J_dot": (m, nv), "J_inv": (nv, m)}
-        J, J_dot, J_inv = (self._array(given[name], *shape) for name, shape in shapes.items())
-        return J, J_dot, J_inv
+        return array_of(self.given["weights"], 4, self.kind.m, self.kind.m)
 
     def _row(self, name: str) -> np.ndarray:
         """A quantity as an array of single symbols."""
-        return self._array(self.given[name], self.given[name].numel())
-
-    def _array(self, vector: Any, *shape: int) -> np.ndarray:
-        """A column of symbols as an array of single symbols, row by row."""
-        array = np.empty(int(np.prod(shape)), dtype=object)
-        for k in range(array.size):
-            array[k] = vector[k]
-        return array.reshape(shape)
-
-    def _matrix(self, A: Any) -> np.ndarray:
-        return self._array(self.ca.vec(A.T), *A.shape)
-
-    def _flat(self, array: Any) -> Any:
-        """An array of symbols, or a CasADi column, as a dense column, row by row."""
-        if not isinstance(array, np.ndarray):
-            return self.ca.densify(array)
-        return self.ca.densify(self.ca.vertcat(*array.ravel())) if array.size else self.ca.SX.zeros(0, 1)
-
-    def _back(self, array: np.ndarray) -> Any:
-        """An array of symbols as a CasADi vector or matrix."""
-        if array.ndim == 1:
-            return self.ca.vertcat(*array)
-        return self.ca.vertcat(*(self.ca.horzcat(*row) for row in array))
+        return array_of(self.given[name], -1)
 
 
 def _solve_positive(ca: Any, M: Any, b: Any) -> Any:

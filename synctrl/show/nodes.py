@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..checks import instance
-from .rotations import matrices
+from ..tasks.rotations import from_quaternion
 from .shapes import Shape, corners
 
 ROOT = "/meshcat/<object>"  # where MeshCat puts the object of the path /meshcat
@@ -70,7 +70,7 @@ def _node_box(node: Node) -> np.ndarray | None:
     if not inner:
         return None
     points = np.vstack(inner) * node.scale[:, None]  # (T, k, 3)
-    points = points @ matrices(node.quaternion).transpose(0, 2, 1) + node.position[:, None]
+    points = points @ from_quaternion(node.quaternion).mT + node.position[:, None]
     return np.array([points.min(axis=(0, 1)), points.max(axis=(0, 1))])
 
 
@@ -183,7 +183,7 @@ def _material(color: tuple[float, ...]) -> JSON:
 
 def _first_pose(node: Node) -> np.ndarray:
     matrix = np.eye(4)
-    matrix[:3, :3] = matrices(node.quaternion[:1])[0] * node.scale[0]
+    matrix[:3, :3] = from_quaternion(node.quaternion[0]) * node.scale[0]
     matrix[:3, 3] = node.position[0]
     return matrix
 

@@ -7,13 +7,6 @@ import numpy as np
 TINY = 1e-6  # m: too short to have a direction
 
 
-def matrices(quaternion: np.ndarray) -> np.ndarray:
-    """Rotation matrices, (T, 3, 3), of unit quaternions, (T, 4)."""
-    v, w = quaternion[:, :3], quaternion[:, 3, None, None]
-    skew = np.cross(v[:, None], np.eye(3)).transpose(0, 2, 1)
-    return np.eye(3) + 2 * w * skew + 2 * skew @ skew
-
-
 def continuous(quaternion: np.ndarray) -> np.ndarray:
     """The same rotations, with the sign of each quaternion chosen so that neighbours in time are near."""
     turns = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..control.controller import Signals
+from ..tasks.redundancy import velocity_lost
 
 
 class DampingLog:
@@ -15,20 +16,22 @@ class DampingLog:
     Args:
         instants: number of logged instants.
         robots: number of robots.
+
+    Attributes:
+        arrays: lambda, and the part of xref' = c^-1 u that J v_ref leaves out, (instants, robots) each.
     """
 
     def __init__(self, instants: int, robots: int):
-        self._damping = np.zeros((instants, robots))
-        self._lost = np.zeros((instants, robots))
+        self.arrays = {name: np.zeros((instants, robots)) for name in ("damping", "velocity_lost")}
 
     def add(self, k: int, signals: Signals) -> None:
-        """Log one instant: lambda, and the part of xref' = c^-1 u that J v_ref leaves out."""
+        """Log one instant."""
         task = signals.task
         if task.J is None or task.inversion is None or task.inversion.damping is None:
             return
-        lost = np.matvec(signals.reference.c_inv, signals.u) - np.matvec(task.J, signals.v_ref)
-        self._damping[k] = task.inversion.damping
-        self._lost[k] = np.linalg.norm(lost, axis=1)
+        xref_dot = np.matvec(signals.reference.c_inv, signals.u)
+        self.arrays["damping"][k] = task.inversion.damping[:, 0]
+        self.arrays["velocity_lost"][k] = velocity_lost(task.J, signals.v_ref, xref_dot)[:, 0]
 
     def report(self, t: np.ndarray) -> list[dict[str, Any]]:
         """Intervals in which the damping of a robot was above zero, in order of their start.
@@ -41,7 +44,8 @@ class DampingLog:
             `largest_damping`: of lambda; `largest_velocity_lost`: of |xref' - J v_ref|, task unit per s.
         """
         found = []
-        for robot, damping in enumerate(self._damping[: len(t)].T):
+        logged = (array[: len(t)].T for array in self.arrays.values())
+        for robot, (damping, lost) in enumerate(zip(*logged, strict=True)):
             for first, last in spans(damping > 0):
                 part = slice(first, last + 1)
                 found.append(
@@ -50,7 +54,7 @@ class DampingLog:
                         "start": float(t[first]),
                         "stop": float(t[last]),
                         "largest_damping": float(damping[part].max()),
-                        "largest_velocity_lost": float(self._lost[part, robot].max()),
+                        "largest_velocity_lost": float(lost[part].max()),
                     }
                 )
         return sorted(found, key=lambda entry: (entry["start"], entry["robot"]))

@@ -2,36 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from ..coupling.cell import Cell
 from ..errors import NonFiniteError, OrientationError, SimulationError, SingularJacobianError
 from ..tasks.pose import MAX_ANGLE
-from ..tasks.spaces import Measurement
+from ..tasks.spaces import BoundSpace, Measurement
 from .advance import Sample
 from .closed_loop import ClosedLoop
 
 #: parts of the state, in order
 PARTS = ("position", "velocity", "parameter estimate", "integral of the synchronization error")
-#: what a guard may find, in the order in which it looks, and as driver.c counts it from 1
-CHECKS = ("state", "orientation", "condition", "side", "torque")
 
 
 class Finding(NamedTuple):
     """What made a guard stop a run.
 
     Attributes:
-        check: which of `CHECKS` failed, or a space's own word for what is too large, see `Invalid`.
-        robot: the first one that failed it; with "orientation" the one that is farthest off.
-        value: the number that was too large: an angle, rad, or a condition number.
+        check: which of the `checks` failed.
+        robot: the first one that failed it.
+        value: the number that was too large: an angle, rad, a condition number, or the space's own.
     """
 
     check: str
     robot: int = 0
     value: float = 0.0
+
+
+def limits_of(space: BoundSpace) -> Mapping[str, float]:
+    """Names and limits of what a space watches, in the order in which a guard looks at them."""
+    return getattr(space, "limits", {})
+
+
+def checks(watched: Iterable[str]) -> tuple[str, ...]:
+    """What a guard may find, in the order in which it looks; driver.c counts them from 1."""
+    return ("state", *watched, "side", "torque")
 
 
 class Guard:
@@ -42,10 +51,9 @@ class Guard:
     """
 
     def __init__(self, loop: ClosedLoop):
-        self._loop = loop
-        space: Any = loop.cell.space
-        self._invalid, self._which = getattr(space, "invalid", None), getattr(space, "sides", None)
-        self._sides: np.ndarray | None = None
+        self._loop, self._space = loop, cast(Any, loop.cell.task)
+        self._limits = limits_of(self._space)
+        self._has_sides, self._sides = hasattr(self._space, "sides"), np.zeros((loop.cell.n, 1))
         self._v = np.zeros((loop.cell.n, loop.cell.nv))
 
     def check(self, sample: Sample) -> None:
@@ -63,26 +71,34 @@ class Guard:
         self._v[...] = sample.y[self._v.size : 2 * self._v.size].reshape(self._v.shape)
 
     def _look(self, sample: Sample) -> Finding | None:
-        """The first check that fails, in the order of `CHECKS`."""
+        """The first check that fails, in the order of `checks`."""
         if not isfinite(np.add.reduce(sample.y)) and not np.isfinite(sample.y).all():
             return Finding("state")
         task, tau = sample.signals.task, sample.signals.tau
-        invalid = None if self._invalid is None else self._invalid(task)
-        if invalid is not None:
-            return Finding(*invalid)
-        if (crossed := self._crossed(task)) is not None:
-            return crossed
+        if (found := self._beyond(task) or self._crossed(task)) is not None:
+            return found
         if not isfinite(np.add.reduce(tau, axis=None)) and (rows := _non_finite_rows(tau)).size:
             return Finding("torque", int(rows[0]))
         return None
 
+    def _beyond(self, task: Measurement) -> Finding | None:
+        """The first number that has reached its limit, or is none."""
+        if not self._limits:
+            return None
+        values = self._space.watched(task)
+        beyond = ~(values < [*self._limits.values()])
+        if not beyond.any():
+            return None
+        check, robot = divmod(int(beyond.T.argmax()), len(values))
+        return Finding([*self._limits][check], robot, float(values[robot, check]))
+
     def _crossed(self, task: Measurement) -> Finding | None:
         """The first robot on the other side of a singular configuration than at the instant before."""
-        sides = None if self._which is None else self._which(task, self._loop.cell.robots)
-        before, self._sides = self._sides, sides
-        if sides is None or before is None or sides.tobytes() == before.tobytes():
+        if not self._has_sides:
             return None
-        return Finding("side", int(np.argmax(sides != before)))
+        before, self._sides = self._sides, np.sign(self._space.sides(task))
+        crossed = before * self._sides < 0
+        return Finding("side", int(crossed.argmax())) if crossed.any() else None
 
 
 def stopped(loop: ClosedLoop, t: float, y: np.ndarray, v: np.ndarray, found: Finding) -> SimulationError:
@@ -100,7 +116,7 @@ def stopped(loop: ClosedLoop, t: float, y: np.ndarray, v: np.ndarray, found: Fin
         return _run_away(loop, t, y, v)
     if found.check == "torque":
         return _not_finite(loop.cell, t, i, "torque")
-    if found.check not in CHECKS:
+    if found.check not in ("orientation", "condition", "side"):
         return _invalid(loop.cell, t, found)
     if found.check == "orientation":
         return OrientationError(

@@ -61,7 +61,8 @@ class Recorder:
 
     def address_ahead(self, name: str) -> int | None:
         """Where the part of an array begins that is not logged yet; None if there is no such array."""
-        return self._arrays[name][self.count :].ctypes.data if name in self._arrays else None
+        array = {**self._arrays, **self._damping.arrays}.get(name)
+        return None if array is None else array[self.count :].ctypes.data
 
     def advance(self, times: np.ndarray) -> None:
         """Count rows that were filled from outside."""

@@ -114,7 +114,7 @@ class Stop:
         task = cell.task.measure(motion, cell.references(np.array([t]))[0].desired)
         if task.J is None or task.J_inv is None:
             return np.ones(cell.n)
-        return np.sqrt((task.J**2).sum((1, 2)) * (task.J_inv**2).sum((1, 2)))
+        return task.condition[:, 0]
 
     def quickest(self, robots: Sequence[int]) -> tuple[int, int]:
         """Of some robots the one that began, and its joint: it moves fastest a step after the last calm row.

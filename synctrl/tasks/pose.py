@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -10,11 +10,32 @@ from ..robots.robot import Robot
 from . import rotations
 from .redundancy import Damping, Redundancy
 from .spaces import BoundTipSpace, Measurement, TipSpace
-from .tips import Tips
-from .validity import Invalid, too_turned
 
 #: An orientation error beyond this ends a run: at pi its direction is not defined, rad.
 MAX_ANGLE = 3.0
+
+
+class BoundPoseSpace(BoundTipSpace):
+    """Tip poses.
+
+    Desired motion comes as x = (position, rotation vector), x' = (velocity, angular velocity w_d) and
+    x'' = (acceleration, w_d'), all in world axes, see poses.py.
+    """
+
+    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+        v, (xd, xd_dot, xd_ddot) = motion[1], desired
+        (position, _), R, J_t, J_t_dot = self._tips.poses(*motion)
+        x, e, J, left = compare(xd, position, R, J_t)
+        wd, wd_dot, x_dot = xd_dot[..., 3:], xd_ddot[..., 3:], np.matvec(J, v)
+        turning = np.matvec(left, wd)
+        left_dot = rotations.left_jacobian_inverse_dot(e[..., 3:], turning - x_dot[..., 3:])
+        J_o_dot = left_dot.mT @ J_t[..., 3:, :] + left.mT @ J_t_dot[..., 3:, :]
+        J_dot = _below(J_t_dot[..., :3, :], J_o_dot)
+        inversion = self._inverse.invert(J, J_dot, *motion)
+        turning_dot = np.matvec(left_dot, wd) + np.matvec(left, wd_dot)
+        rates = np.stack((_beside(xd_dot[..., :3], turning), _beside(xd_ddot[..., :3], turning_dot)))
+        moved, error = np.stack((x, x_dot)), np.stack((e, rates[0] - x_dot))
+        return Measurement(moved, error, rates, J, inversion.J_inv, J_dot, inversion)
 
 
 class PoseSpace(TipSpace):
@@ -42,6 +63,7 @@ class PoseSpace(TipSpace):
 
     unit = "m, rad"
     units = ("m",) * 3 + ("rad",) * 3
+    bound = BoundPoseSpace
 
     def __init__(
         self,
@@ -55,24 +77,15 @@ class PoseSpace(TipSpace):
         """x, y, z, and the three coordinates of the rotation vector."""
         return "x", "y", "z", "rx", "ry", "rz"
 
-    def bind(self, robots: Sequence[Robot]) -> BoundPoseSpace:
-        """Pose space of these robots.
-
-        Raises:
-            InputError: a robot has fewer than six joints, or a redundancy that does not fit.
-        """
-        return BoundPoseSpace(Tips(robots), self.inverse_map(robots))
+    @property
+    def limits(self) -> Mapping[str, float]:
+        """Of the orientation error, rad, and of the condition number."""
+        return {"orientation": MAX_ANGLE, **super().limits}
 
     def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         pose, J, _ = robot.tip_kinematics(q, np.zeros(robot.nv))
-        e_o = rotations.log(rotations.exp(target[3:]) @ pose.rotation.T)
-        e = np.concatenate((target[:3] - pose.translation, e_o))
-        return e, np.vstack((J[:3], rotations.left_jacobian_inverse(e_o).T @ J[3:]))
-
-    def invalid(self, task: Measurement) -> Invalid | None:
-        """The robot with the largest orientation error, if that is too large; else as every tip's space."""
-        turned = too_turned(task.e[:, 3:], MAX_ANGLE)
-        return super().invalid(task) if turned is None else turned
+        _, e, J, _ = compare(target, pose.translation, pose.rotation, J)
+        return e, J
 
     def displacement(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
         """From one pose to another, (..., 6): a translation and, in world axes, a rotation vector."""
@@ -83,32 +96,27 @@ class PoseSpace(TipSpace):
         return "PoseSpace()"
 
 
-class BoundPoseSpace(BoundTipSpace):
-    """Tip poses.
+def compare(
+    target: np.ndarray, position: np.ndarray, R: np.ndarray, J: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Where a tip is, and by how much it misses a target.
 
-    Desired motion comes as x = (position, rotation vector), x' = (velocity, angular velocity w_d) and
-    x'' = (acceleration, w_d'), all in world axes, see poses.py.
+    Args:
+        target: position and rotation vector, (..., 6).
+        position, R, J: of the tip, (..., 3), (..., 3, 3) and (..., 6, nv).
+
+    Returns:
+        x and e, (..., 6), the J with e' = -J v, (..., 6, nv), and Jl^-1(e_o), (..., 3, 3).
     """
+    e_o, phi = rotations.log(np.stack((rotations.exp(target[..., 3:]) @ R.mT, R)))
+    left = rotations.left_jacobian_inverse(e_o)
+    task_J = _below(J[..., :3, :], left.mT @ J[..., 3:, :])
+    return _beside(position, phi), _beside(target[..., :3] - position, e_o), task_J, left
 
-    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
-        (q, v), (xd, xd_dot, xd_ddot) = motion, desired
-        (position, _), R, J_t, J_t_dot = self._tips.poses(q, v)
-        J_w, J_w_dot = J_t[:, 3:], J_t_dot[:, 3:]
-        e_o, phi = rotations.log(np.stack((rotations.exp(xd[:, 3:]) @ np.swapaxes(R, 1, 2), R)))
-        left = rotations.left_jacobian_inverse(e_o)
-        right = np.swapaxes(left, 1, 2)
-        J = np.concatenate((J_t[:, :3], right @ J_w), axis=1)
-        x_dot = np.matvec(J, v)
-        wd, wd_dot = xd_dot[:, 3:], xd_ddot[:, 3:]
-        turning = np.matvec(left, wd)
-        left_dot = rotations.left_jacobian_inverse_dot(e_o, turning - x_dot[:, 3:])
-        turning_dot = np.matvec(left_dot, wd) + np.matvec(left, wd_dot)
-        J_o_dot = np.swapaxes(left_dot, 1, 2) @ J_w + right @ J_w_dot
-        J_dot = np.concatenate((J_t_dot[:, :3], J_o_dot), axis=1)
-        inversion = self._inverse.invert(J, J_dot, q, v)
-        x = np.concatenate((position, phi), axis=1)
-        e = np.concatenate((xd[:, :3] - position, e_o), axis=1)
-        rates = desired[1:].copy()
-        rates[:, :, 3:] = turning, turning_dot
-        moved, error = np.stack((x, x_dot)), np.stack((e, rates[0] - x_dot))
-        return Measurement(moved, error, rates, J, inversion.J_inv, J_dot, inversion)
+
+def _beside(linear: np.ndarray, angular: np.ndarray) -> np.ndarray:
+    return np.concatenate((linear, angular), axis=-1)
+
+
+def _below(linear: np.ndarray, angular: np.ndarray) -> np.ndarray:
+    return np.concatenate((linear, angular), axis=-2)

@@ -1,9 +1,12 @@
 """From task space to joint space: the inverse of a square Jacobian, a weighted pseudo-inverse, a damped one.
 
-Each is made for the robots of a cell and works on all of them at once. What they share: v_ref is the joint
-velocity closest to a preferred one, zeta, among those that move the tip with xref', and a_ref is the exact
-time derivative of v_ref. So J v_ref = xref' and J s_q = c^-1 r hold as for a square Jacobian, and with them
-the proof of convergence. Only the damped inverse gives this up, near singular configurations.
+What they share: v_ref is the joint velocity closest to a preferred one, zeta, among those that move the tip
+with xref', and a_ref is the exact time derivative of v_ref. So J v_ref = xref' and J s_q = c^-1 r hold as for
+a square Jacobian, and with them the proof of convergence. Only the damped inverse gives this up, near
+singular configurations.
+
+Arrays have one row per robot; with the leading axis left out they describe a single robot. No formula asks
+what its numbers are: with an `Algebra` of symbols the same lines are traced for the compiled engine.
 """
 
 from __future__ import annotations
@@ -18,10 +21,10 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, non_negative_number, positive_number
 from ..errors import InputError
 from ..robots.robot import Robot
+from .algebra import LAPACK, Algebra
 from .padding import padded
 
-#: signs of the cofactors of a matrix with two rows
-_CHECKERED = np.array([[1.0, -1.0], [-1.0, 1.0]])
+Posture = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +56,7 @@ class Redundancy:
     def __post_init__(self) -> None:
         non_negative_number("redundancy, gain", self.gain)
 
-    def spread(self, robots: Sequence[Robot]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def spread(self, robots: Sequence[Robot]) -> Posture:
         """W^-1, posture and its gain, each (n, nv): rows padded with zeros for joints a robot does not have.
 
         Raises:
@@ -96,18 +99,18 @@ class Inversion(NamedTuple):
     """What one evaluation knows about the way from task space to joint space.
 
     Attributes:
-        J_inv: J^-1 or J#, (n, nv, m).
-        G: (J W^-1 J^T + lambda^2)^-1, (n, m, m), or None for the plain inverse.
-        zeta, zeta_dot: preferred joint velocity and its time derivative, (n, nv).
-        damping: lambda, (n,), or None where there is none.
-        damping_rate: time derivative of lambda^2, (n,).
+        J_inv: J^-1 or J#, (..., nv, m).
+        G: (J W^-1 J^T + lambda^2)^-1, (..., m, m), or None for the plain inverse.
+        zeta, zeta_dot: preferred joint velocity and its time derivative, (..., nv), or None.
+        damping: lambda, (..., 1), or None where there is none.
+        damping_rate: time derivative of lambda^2, (..., 1), or None.
     """
 
     J_inv: np.ndarray
     G: Any = None
     zeta: Any = None
     zeta_dot: Any = None
-    damping: np.ndarray | None = None
+    damping: Any = None
     damping_rate: Any = None
 
 
@@ -123,13 +126,17 @@ class Inverted(Protocol):
 class InverseMap(Protocol):
     """A way from task space to joint space."""
 
+    @property
+    def algebra(self) -> Algebra:
+        """Of the numbers, or symbols, that it works on."""
+
     def invert(self, J: np.ndarray, J_dot: np.ndarray, q: np.ndarray, v: np.ndarray) -> Inversion:
         """Everything about this instant that does not depend on the reference."""
 
     def to_joints(
         self, task: Inverted, xref_dot: np.ndarray, xref_ddot: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """v_ref and a_ref = d/dt v_ref, (n, nv), from the reference in task space, (n, m)."""
+        """v_ref and a_ref = d/dt v_ref, (..., nv), from the reference in task space, (..., m)."""
 
 
 class Inverse:
@@ -138,8 +145,11 @@ class Inverse:
     v_ref = J^-1 xref', a_ref = J^-1 (xref'' - J' v_ref).
     """
 
+    def __init__(self, algebra: Algebra = LAPACK):
+        self.algebra = algebra
+
     def invert(self, J: np.ndarray, J_dot: np.ndarray, q: np.ndarray, v: np.ndarray) -> Inversion:
-        return Inversion(inverse(J))
+        return Inversion(self.algebra.inverse(J))
 
     def to_joints(
         self, task: Inverted, xref_dot: np.ndarray, xref_ddot: np.ndarray
@@ -159,18 +169,17 @@ class Pseudoinverse:
         a_ref = h + J# (xref'' - J' v_ref - J h)
 
     Args:
-        W_inv: diagonal of W^-1, (n, nv), zero for joints that a robot does not have.
-        posture: preferred joint positions, (n, nv), rad.
-        gain: (n, nv), 1/s.
+        W_inv: diagonal of W^-1, (..., nv), zero for joints that a robot does not have.
+        posture: preferred joint positions, (..., nv), rad.
+        gain: (..., nv), 1/s.
+        algebra: of the numbers.
     """
 
-    def __init__(self, W_inv: np.ndarray, posture: np.ndarray, gain: np.ndarray):
-        self.W_inv, self.posture, self.gain = W_inv, posture, gain
+    def __init__(self, W_inv: np.ndarray, posture: np.ndarray, gain: np.ndarray, algebra: Algebra = LAPACK):
+        self.W_inv, self.posture, self.gain, self.algebra = W_inv, posture, gain, algebra
 
     def invert(self, J: np.ndarray, J_dot: np.ndarray, q: np.ndarray, v: np.ndarray) -> Inversion:
-        W_inv_JT = self.W_inv[:, :, None] * np.swapaxes(J, 1, 2)
-        G = inverse(J @ W_inv_JT)
-        return Inversion(W_inv_JT @ G, G, *self._preferred(q, v))
+        return self._inversion(J, q, v)
 
     def to_joints(
         self, task: Inverted, xref_dot: np.ndarray, xref_ddot: np.ndarray
@@ -180,13 +189,15 @@ class Pseudoinverse:
         gap = xref_dot - np.matvec(J, zeta)
         mu = np.matvec(G, gap)
         v_ref = zeta + np.matvec(J_inv, gap)
-        h = zeta_dot + self.W_inv * np.vecmat(mu, J_dot)
+        h = zeta_dot + self.W_inv * np.matvec(J_dot.mT, mu)
         needed = xref_ddot - np.matvec(J_dot, v_ref) - np.matvec(J, h)
         return v_ref, h + np.matvec(J_inv, needed - self._damping_force(inversion, mu))
 
-    def _preferred(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """zeta = gain (posture - q) and its time derivative."""
-        return self.gain * (self.posture - q), -self.gain * v
+    def _inversion(self, J: np.ndarray, q: np.ndarray, v: np.ndarray, more: Any = 0.0) -> Inversion:
+        """With something added to J W^-1 J^T."""
+        W_inv_JT = self.W_inv[..., None] * J.mT
+        G = self.algebra.inverse(J @ W_inv_JT + more)
+        return Inversion(W_inv_JT @ G, G, self.gain * (self.posture - q), -self.gain * v)
 
     def _damping_force(self, inversion: Inversion, mu: np.ndarray) -> np.ndarray | float:
         return 0.0
@@ -202,64 +213,50 @@ class DampedInverse(Pseudoinverse):
         damping: threshold and size.
     """
 
-    def __init__(self, W_inv: np.ndarray, posture: np.ndarray, gain: np.ndarray, damping: Damping):
-        super().__init__(W_inv, posture, gain)
+    def __init__(
+        self,
+        W_inv: np.ndarray,
+        posture: np.ndarray,
+        gain: np.ndarray,
+        damping: Damping,
+        algebra: Algebra = LAPACK,
+    ):
+        super().__init__(W_inv, posture, gain, algebra)
         self._threshold, self._largest = damping.threshold**2, damping.largest
 
     def invert(self, J: np.ndarray, J_dot: np.ndarray, q: np.ndarray, v: np.ndarray) -> Inversion:
-        W_inv_JT = self.W_inv[:, :, None] * np.swapaxes(J, 1, 2)
-        A = J @ W_inv_JT
-        square, direction = _smallest(A)
-        depth = np.maximum(1 - square / self._threshold, 0.0)
-        damping = self._largest * depth
-        square_dot = 2 * (np.vecmat(direction, J_dot) * np.vecmat(direction, J) * self.W_inv).sum(-1)
-        rate = -2 * self._largest * damping * square_dot / self._threshold
-        G = inverse(A + (damping**2)[:, None, None] * np.eye(A.shape[-1]))
-        return Inversion(W_inv_JT @ G, G, *self._preferred(q, v), damping, rate)
+        square, direction = self.algebra.smallest(J @ (self.W_inv[..., None] * J.mT))
+        depth = 1 - square / self._threshold
+        damping = self._largest * 0.5 * (depth + abs(depth))
+        moved = np.matvec(J_dot.mT, direction) * np.matvec(J.mT, direction) * self.W_inv
+        rate = -4 * self._largest / self._threshold * damping * moved.sum(-1, keepdims=True)
+        more = (damping**2)[..., None] * np.eye(J.shape[-2])
+        return self._inversion(J, q, v, more)._replace(damping=damping, damping_rate=rate)
 
     def _damping_force(self, inversion: Inversion, mu: np.ndarray) -> np.ndarray:
-        return inversion.damping_rate[:, None] * mu
+        return inversion.damping_rate * mu
+
+
+def velocity_lost(J: np.ndarray, v_ref: np.ndarray, xref_dot: np.ndarray) -> np.ndarray:
+    """|xref' - J v_ref|, (..., 1): how much of a reference velocity damping leaves out, task unit per s."""
+    lost = xref_dot - np.matvec(J, v_ref)
+    return np.sqrt((lost * lost).sum(-1, keepdims=True))
 
 
 def inverse_map(
-    robots: Sequence[Robot], m: int, redundancy: Redundancy, damping: Damping | None
+    square: bool, damping: Damping | None, posture: Posture, algebra: Algebra = LAPACK
 ) -> InverseMap:
-    """The way from m task coordinates to the joints of these robots."""
+    """The way to the joints of robots.
+
+    Args:
+        square: whether all have as many joints as there are task coordinates.
+        damping: of singular configurations, if any.
+        posture: W^-1, posture and its gain, see `Redundancy.spread`.
+        algebra: of the numbers.
+    """
     if damping is not None:
-        return DampedInverse(*redundancy.spread(robots), damping)
-    if all(robot.nv == m for robot in robots):
-        return Inverse()
-    return Pseudoinverse(*redundancy.spread(robots))
-
-
-def inverse(A: np.ndarray) -> np.ndarray:
-    """A^-1 row by row; nothing finite where there is none, so that the run's guard can name the robot."""
-    if A.shape[-1] == 2:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            minors = A[:, :1, :1] * A[:, 1:, 1:] - A[:, :1, 1:] * A[:, 1:, :1]
-            return _CHECKERED * A[:, ::-1, ::-1].mT / minors
-    try:
-        return np.linalg.inv(A)
-    except np.linalg.LinAlgError:
-        regular = np.linalg.det(A) != 0
-        result = np.full_like(A, np.nan)
-        result[regular] = np.linalg.inv(A[regular])
-        return result
-
-
-def determinant(A: np.ndarray) -> np.ndarray:
-    """det(A) row by row, (n,), of square matrices."""
-    if A.shape[-1] == 2:
-        return A[:, 0, 0] * A[:, 1, 1] - A[:, 0, 1] * A[:, 1, 0]
-    return np.linalg.det(A)
-
-
-def _smallest(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest eigenvalue, (n,), and its eigenvector, (n, m), of symmetric matrices."""
-    if not np.isfinite(A).all():
-        return np.full(len(A), np.nan), np.full(A.shape[:2], np.nan)
-    values, vectors = np.linalg.eigh(A)
-    return values[:, 0], vectors[:, :, 0]
+        return DampedInverse(*posture, damping, algebra)
+    return Inverse(algebra) if square else Pseudoinverse(*posture, algebra)
 
 
 def _rows(name: str, value: ArrayLike | None, robots: Sequence[Robot], default: float) -> list[np.ndarray]:

@@ -1,11 +1,12 @@
 """The rotation group: exponential, logarithm, and the Jacobians of the logarithm with their time derivatives.
 
-All functions work on stacks: rotation vectors are (..., 3), in rad, rotation matrices (..., 3, 3).
+All functions work on stacks: rotation vectors are (..., 3), in rad, rotation matrices (..., 3, 3). None asks
+what its numbers are or goes one of two ways, so the same lines are traced with symbols.
 """
 
 from __future__ import annotations
 
-from math import factorial
+import math
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,15 +14,21 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array
 from ..errors import InputError
 
-#: absolute values of the Bernoulli numbers B_2, B_4, ...; b(a) = sum_k |B_2k| a^(2k-2) / (2k)!
-_BERNOULLI = (1/6, 1/30, 1/42, 1/30, 5/66, 691/2730, 7/6, 3617/510, 43867/798, 174611/330)  # fmt: skip
-_POWERS = np.arange(len(_BERNOULLI))
-_B = np.array([B / factorial(2 * k) for k, B in enumerate(_BERNOULLI, start=1)])
-#: series of b and of b'/a in powers of a^2, one column each
-_SERIES = np.stack((_B, np.append(2 * _POWERS[1:] * _B[1:], 0.0)), axis=1)
-#: below this angle the closed forms lose digits and the series have them all, rad
-_SMALL = 1.0
 _EYE = np.eye(3)
+#: nothing beside the square of any angle but zero, by which one must not divide
+_TINY = 1e-300
+
+# b(a) = 1/a^2 - cot(a/2)/(2a) is sum_k |B_2k| a^(2k-2) / (2k)! with the Bernoulli numbers B_2, B_4, ..., and
+# it is sum_j 2 / ((2 pi j)^2 - a^2). With its first three poles taken out, ten terms of the series have all
+# digits for every angle below 2 pi; the closed form loses them at small angles, the whole series at large.
+_BERNOULLI = (1/6, 1/30, 1/42, 1/30, 5/66, 691/2730, 7/6, 3617/510, 43867/798, 174611/330)  # fmt: skip
+_POLES = (2 * np.pi * np.arange(1, 4)) ** 2
+_POWERS = np.arange(len(_BERNOULLI))
+_SERIES = np.array([B / math.factorial(2 * k) for k, B in enumerate(_BERNOULLI, start=1)]) - 2 * sum(
+    1 / pole ** (_POWERS + 1.0) for pole in _POLES
+)
+#: of the derivative with respect to a^2
+_SLOPE_SERIES = np.append(_POWERS[1:] * _SERIES[1:], 0.0)
 
 
 def _quaternion_products(R: np.ndarray) -> list[list[float]]:
@@ -47,9 +54,8 @@ def skew(w: np.ndarray) -> np.ndarray:
 
 def exp(phi: np.ndarray) -> np.ndarray:
     """Rotation by |phi| about phi: I + sin(a)/a [phi] + (1 - cos(a))/a^2 [phi]^2 with a = |phi|."""
-    half = 0.5 * np.sqrt((phi * phi).sum(-1))[..., None, None]
-    K = skew(phi)
-    s = np.sinc(half / np.pi)
+    half = 0.5 * np.sqrt(_dot(phi, phi) + _TINY)[..., None]
+    K, s = skew(phi), np.sin(half) / half
     return _EYE + (s * np.cos(half)) * K + (0.5 * s * s) * (K @ K)
 
 
@@ -59,24 +65,31 @@ def log(R: np.ndarray) -> np.ndarray:
     By way of the unit quaternion, which is accurate for every angle; at exactly pi one of the two signs.
     """
     q = quaternion(R)
-    v, w = q[..., :3], q[..., 3]
-    length = np.sqrt((v * v).sum(-1))
-    small = length < 1e-12
-    factor = np.where(small, 2.0, 2 * np.arctan2(length, w) / np.where(small, 1.0, length))
-    return factor[..., None] * v
+    v, w = q[..., :3], q[..., 3:]
+    length = np.sqrt(_dot(v, v) + _TINY)
+    return 4 * np.arctan(length / (1 + w)) / length * v
 
 
 def quaternion(R: np.ndarray) -> np.ndarray:
     """Unit quaternion x, y, z, w with w >= 0, (..., 4).
 
     Each row of q q^T is a multiple of the quaternion; the one with the largest diagonal entry has the
-    smallest rounding error.
+    smallest rounding error. It is found in two rounds, by pairs.
     """
-    rows = (R.reshape(-1, 9) @ _QUATERNION).reshape(-1, 4, 4) + np.eye(4)
-    best = rows[:, range(4), range(4)].argmax(axis=1)
-    q = rows[np.arange(len(rows)), best]
-    q = q / np.sqrt((q * q).sum(-1))[:, None]
-    return np.where(q[:, 3:] < 0, -q, q).reshape(*R.shape[:-2], 4)
+    rows = (R.reshape(*R.shape[:-2], 9) @ _QUATERNION).reshape(*R.shape[:-2], 4, 4) + np.eye(4)
+    sizes = rows[..., range(4), range(4)]
+    for half in (2, 1):
+        smaller = _less(sizes[..., :half], sizes[..., half:])
+        rows = _where(smaller[..., None], rows[..., half:, :], rows[..., :half, :])
+        sizes = _where(smaller, sizes[..., half:], sizes[..., :half])
+    q = rows[..., 0, :] / np.sqrt(_dot(rows[..., 0, :], rows[..., 0, :]))
+    return (1 - 2 * _less(q[..., 3:], 0.0)) * q
+
+
+def from_quaternion(q: np.ndarray) -> np.ndarray:
+    """Rotation matrix, (..., 3, 3), of a unit quaternion x, y, z, w, (..., 4)."""
+    K, w = skew(q[..., :3]), q[..., 3:, None]
+    return _EYE + 2 * w * K + 2 * K @ K
 
 
 def left_jacobian_inverse(phi: np.ndarray) -> np.ndarray:
@@ -85,7 +98,7 @@ def left_jacobian_inverse(phi: np.ndarray) -> np.ndarray:
     If E = exp(phi) and E' = [w] E then phi' = Jl^-1(phi) w. That of the right Jacobian is its transpose.
     """
     K = skew(phi)
-    b = _coefficients((phi * phi).sum(-1))[..., :1, None]
+    b = _coefficients(phi)[0]
     return _EYE - 0.5 * K + b * (K @ K)
 
 
@@ -95,10 +108,10 @@ def left_jacobian_inverse_dot(phi: np.ndarray, phi_dot: np.ndarray) -> np.ndarra
     -[phi']/2 + (b'/a)(phi . phi') [phi]^2 + b ([phi][phi'] + [phi'][phi])
     """
     K, K_dot = skew(phi), skew(phi_dot)
-    b, slope = np.moveaxis(_coefficients((phi * phi).sum(-1)), -1, 0)[..., None, None]
-    growth = slope * (phi * phi_dot).sum(-1)[..., None, None]
+    b, slope = _coefficients(phi)
+    growth = slope * _dot(phi, phi_dot)[..., None]
     product = K @ K_dot
-    return -0.5 * K_dot + growth * (K @ K) + b * (product + np.swapaxes(product, -1, -2))
+    return -0.5 * K_dot + growth * (K @ K) + b * (product + product.mT)
 
 
 def rotation_from_rpy(rpy: ArrayLike) -> np.ndarray:
@@ -121,19 +134,25 @@ def rotation_matrix(name: str, value: ArrayLike) -> np.ndarray:
     return R
 
 
-def _coefficients(square: np.ndarray) -> np.ndarray:
-    """b of `left_jacobian_inverse` and (db/da)/a as functions of a^2, (..., 2)."""
-    series = np.minimum(square, _SMALL**2)[..., None] ** _POWERS @ _SERIES
-    large = square > _SMALL**2
-    if not large.any():
-        return series
-    return np.where(large[..., None], _closed_form(np.maximum(square, _SMALL**2)), series)
+def _coefficients(phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """b of `left_jacobian_inverse` and (db/da)/a, each (..., 1, 1)."""
+    square = _dot(phi, phi)
+    poles, powers = 1 / (_POLES - square), square**_POWERS
+    b = 2 * poles.sum(-1, keepdims=True) + (powers * _SERIES).sum(-1, keepdims=True)
+    slope = 4 * (poles * poles).sum(-1, keepdims=True) + 2 * (powers * _SLOPE_SERIES).sum(-1, keepdims=True)
+    return b[..., None], slope[..., None]
 
 
-def _closed_form(square: np.ndarray) -> np.ndarray:
-    """`_coefficients` of large angles."""
-    a = np.sqrt(square)
-    sine = np.sin(0.5 * a)
-    cotangent = 0.5 / (a * np.tan(0.5 * a))
-    slope = (cotangent + 0.25 / (sine * sine) - 2 / square) / square
-    return np.stack((1 / square - cotangent, slope), axis=-1)
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a . b, (..., 1)."""
+    return (a * b).sum(-1, keepdims=True)
+
+
+def _less(a: np.ndarray, b: np.ndarray | float) -> np.ndarray:
+    """1 where a < b, else 0, for symbols too."""
+    return np.less(a, b, dtype=object if a.dtype == object else bool)
+
+
+def _where(condition: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """`one` where a condition is 1, `other` where it is 0, for symbols too; of finite numbers."""
+    return condition * one + (1 - condition) * other

@@ -1,59 +1,41 @@
 """The space in which robots are told what to do: joint positions, or the position of their tips.
 
 A space is bound to the robots of a cell. It then measures their task coordinates and maps what the law wants
-there to joint space. All arrays have one row per robot.
+there to joint space. All arrays have one row per robot; with that axis left out they describe a single robot.
+No formula asks what its numbers are: the compiled engine traces the same lines, bound to tips of symbols.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..checks import choice, instance, positive_number
 from ..errors import InputError
 from ..robots.robot import Robot
-from .redundancy import Damping, InverseMap, Inversion, Redundancy, inverse_map
-from .tips import Tips
-from .validity import Invalid, determinant_sides, too_singular
+from .algebra import LAPACK, Algebra
+from .measurement import Measurement as Measurement
+from .redundancy import Damping, InverseMap, Posture, Redundancy, inverse_map
+from .tips import Kinematics, Tips
 
 AXES = "xyz"
 Joints = tuple[np.ndarray, np.ndarray]
 
 
-@dataclass(slots=True)
-class Measurement:
-    """Task coordinates of all robots and their desired motion, such that e' = xd' - x'.
-
-    Attributes:
-        motion: x and x', (2, n, m).
-        error: e and e', (2, n, m).
-        rates: xd' and xd'', (2, n, m).
-        J, J_inv, J_dot: (n, m, nv), (n, nv, m) and (n, m, nv), or None in joint space. J_inv is J^-1, or a
-            right inverse of a redundant arm's J.
-        inversion: how J_inv was found.
-    """
-
-    motion: np.ndarray
-    error: np.ndarray
-    rates: np.ndarray
-    J: np.ndarray | None = None
-    J_inv: np.ndarray | None = None
-    J_dot: np.ndarray | None = None
-    inversion: Inversion | None = None
-
-    x = property(lambda self: self.motion[0])
-    x_dot = property(lambda self: self.motion[1])
-    e = property(lambda self: self.error[0])
-    e_dot = property(lambda self: self.error[1])
-    xd_dot = property(lambda self: self.rates[0])
-    xd_ddot = property(lambda self: self.rates[1])
-
-
 class BoundSpace(Protocol):
-    """A space bound to the robots of a cell."""
+    """A space bound to the robots of a cell.
+
+    Beside what is below it may offer any of the following, and is asked for it where it does.
+
+    - `limits: Mapping[str, float]` and `watched(task) -> (n, len(limits))`: names and limits of numbers that
+      make a `Measurement` mean nothing once they reach their limits, and these numbers; a run then ends with
+      an error that names time and robot.
+    - `sides(task) -> (n, 1)`: numbers of which the sign says on which side of a singular configuration robots
+      are; a run ends where one has changed within a step. 0 where there are no sides.
+    """
 
     def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
         """Where the robots are and where they should be.
@@ -77,10 +59,6 @@ class Space(Protocol):
     of the following, and is asked for it where it does; what it does not offer is not looked at.
 
     - `units`: unit of each of the m coordinates, where they differ.
-    - `invalid(task) -> Invalid | None`: what makes a `Measurement` mean nothing; the run then ends with an
-      error that names time and robot.
-    - `sides(task, robots) -> (n,)`: on which side of a singular configuration robots are; a run ends where
-      one of them has changed within a step. None where it may.
     - `miss(robot, target, q) -> error, Jacobian`: by how much a robot at q misses a target, (m,), and J,
       (m, nv), with e' = -J v. With it a run begins only if joint positions exist for what is desired.
     - `start(robot, x) -> q`: joint positions, (nv,), of a robot that begins at x, (m,), and has no `q0`.
@@ -149,6 +127,49 @@ class BoundJointSpace:
         return force
 
 
+class BoundTipSpace:
+    """Task coordinates that move with x' = J v; an inverse of J leads from the task to the joints.
+
+    Args:
+        space: which coordinates.
+        tips: where the tips are, in numbers or in symbols.
+        inverse: the way to the joints.
+        square: which robots have as many joints as there are task coordinates, (..., 1).
+    """
+
+    def __init__(self, space: Any, tips: Kinematics, inverse: InverseMap, square: np.ndarray):
+        self._space, self._tips, self._inverse, self._square = space, tips, inverse, square
+        self.limits, self.to_joints = space.limits, inverse.to_joints
+
+    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+        raise NotImplementedError
+
+    def to_torque(self, task: Measurement, force: np.ndarray) -> np.ndarray:
+        return np.matvec(task.J.mT, force)  # type: ignore[union-attr]
+
+    def watched(self, task: Measurement) -> np.ndarray:
+        """What the guard compares with the limits, (..., number of limits)."""
+        return np.concatenate([getattr(task, name) for name in self.limits], axis=-1)
+
+    def sides(self, task: Measurement) -> np.ndarray:
+        """Determinants of square Jacobians, (..., 1); 0 for others, and where they may be singular."""
+        if "condition" not in self.limits or not self._square.any():
+            return 0.0 * self._square
+        J: np.ndarray = task.J  # type: ignore[assignment]
+        return self._square * self._inverse.algebra.determinant(J[..., : J.shape[-2]])
+
+
+class BoundCartesianSpace(BoundTipSpace):
+    """Tip positions along some axes."""
+
+    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+        rows = self._space.cut
+        moved, J, J_dot = self._tips.positions(*motion)
+        moved, J, J_dot = moved[..., rows], J[..., rows, :], J_dot[..., rows, :]
+        inversion = self._inverse.invert(J, J_dot, *motion)
+        return Measurement(moved, desired[:2] - moved, desired[1:], J, inversion.J_inv, J_dot, inversion)
+
+
 class TipSpace:
     """What position and pose of the tip have in common: how joint motion follows from task motion.
 
@@ -163,6 +184,9 @@ class TipSpace:
         InputError: another word, or a limit that is not positive.
     """
 
+    #: what measures these coordinates
+    bound: type[BoundTipSpace]
+
     def __init__(
         self, m: int, max_condition: float, singularity: str | Damping, redundancy: Redundancy | None
     ):
@@ -173,27 +197,17 @@ class TipSpace:
         limit = positive_number("max_condition", max_condition)
         self.max_condition = limit if self.damping is None else np.inf
 
-    def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Error e, (m,), of one robot against a target, (m,), and the J, (m, nv), with e' = -J v."""
-        raise NotImplementedError
+    @property
+    def limits(self) -> Mapping[str, float]:
+        """Names and limits of what the guard of a run watches of a `Measurement`."""
+        return {"condition": self.max_condition} if self.damping is None else {}
 
-    def invalid(self, task: Measurement) -> Invalid | None:
-        """The first robot whose Jacobian is singular; none with damping."""
-        if task.J is None or task.J_inv is None or self.max_condition == np.inf:
-            return None
-        return too_singular(task.J, task.J_inv, self.max_condition)
-
-    def sides(self, task: Measurement, robots: Sequence[Robot]) -> np.ndarray | None:
-        """Signs of the determinants of square Jacobians, (n,), and 0 for others; None with damping."""
-        if task.J is None or self.max_condition == np.inf:
-            return None
-        return determinant_sides(task.J, np.array([robot.nv == self.m for robot in robots]))
-
-    def inverse_map(self, robots: Sequence[Robot]) -> InverseMap:
-        """The way to the joints of these robots.
+    def bind(self, robots: Sequence[Robot]) -> BoundTipSpace:
+        """This space for certain robots.
 
         Raises:
-            InputError: a robot with fewer joints than there are task coordinates.
+            InputError: a robot has fewer joints than there are task coordinates, or a redundancy that does
+                not fit.
         """
         for robot in robots:
             if robot.nv < self.m:
@@ -201,7 +215,26 @@ class TipSpace:
                     f"{self!r}: expected robots with at least {self.m} joints, "
                     f"found robot '{robot.name}' with {robot.nv}"
                 )
-        return inverse_map(robots, self.m, self.redundancy, self.damping)
+        return self.over(Tips(robots), [[robot.nv] for robot in robots], self.redundancy.spread(robots))
+
+    def over(
+        self, tips: Kinematics, joints: ArrayLike, posture: Posture, algebra: Algebra = LAPACK
+    ) -> BoundTipSpace:
+        """This space over any tips, be they of numbers or of symbols.
+
+        Args:
+            tips: where the tips are.
+            joints: how many joints the robots have, (..., 1).
+            posture: see `Redundancy.spread`.
+            algebra: of all these.
+        """
+        square = np.equal(joints, self.m)
+        inverse = inverse_map(bool(square.all()), self.damping, posture, algebra)
+        return self.bound(self, tips, inverse, square)
+
+    def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Error e, (m,), of one robot against a target, (m,), and the J, (m, nv), with e' = -J v."""
+        raise NotImplementedError
 
 
 class CartesianSpace(TipSpace):
@@ -219,6 +252,7 @@ class CartesianSpace(TipSpace):
     """
 
     unit = "m"
+    bound = BoundCartesianSpace
 
     def __init__(
         self,
@@ -232,18 +266,12 @@ class CartesianSpace(TipSpace):
         super().__init__(len(axes), max_condition, singularity, redundancy)
         self.axes = axes
         self.rows = [AXES.index(a) for a in axes]
+        first, last = self.rows[0], self.rows[-1]
+        self.cut = slice(first, last + 1) if self.rows == [*range(first, last + 1)] else self.rows
 
     def labels(self, robots: Sequence[Robot]) -> tuple[str, ...]:
         """The axes."""
         return tuple(self.axes)
-
-    def bind(self, robots: Sequence[Robot]) -> BoundCartesianSpace:
-        """Cartesian space of these robots.
-
-        Raises:
-            InputError: a robot has fewer joints than there are axes, or a redundancy that does not fit.
-        """
-        return BoundCartesianSpace(Tips(robots), self.inverse_map(robots), self.rows)
 
     def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         pose, J, _ = robot.tip_kinematics(q, np.zeros(robot.nv))
@@ -251,35 +279,6 @@ class CartesianSpace(TipSpace):
 
     def __repr__(self) -> str:
         return f"CartesianSpace('{self.axes}')"
-
-
-class BoundTipSpace:
-    """Task coordinates that move with x' = J v; an inverse of J leads from the task to the joints."""
-
-    def __init__(self, tips: Tips, inverse: InverseMap):
-        self._tips, self._inverse = tips, inverse
-        self.to_joints = inverse.to_joints
-
-    def to_torque(self, task: Measurement, force: np.ndarray) -> np.ndarray:
-        return np.vecmat(force, task.J)  # type: ignore[arg-type]
-
-
-class BoundCartesianSpace(BoundTipSpace):
-    """Tip positions along some axes."""
-
-    def __init__(self, tips: Tips, inverse: InverseMap, rows: list[int]):
-        super().__init__(tips, inverse)
-        first, last = rows[0], rows[-1]
-        self._rows = slice(first, last + 1) if rows == list(range(first, last + 1)) else rows
-
-    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
-        q, v = motion
-        rows = self._rows
-        moved, J, J_dot = self._tips.positions(q, v)
-        moved, J, J_dot = moved[:, :, rows], J[:, rows], J_dot[:, rows]
-        inversion = self._inverse.invert(J, J_dot, q, v)
-        error, rates = desired[:2] - moved, desired[1:]
-        return Measurement(moved, error, rates, J, inversion.J_inv, J_dot, inversion)
 
 
 def _damping(singularity: str | Damping) -> Damping | None:

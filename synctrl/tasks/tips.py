@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
@@ -12,6 +13,16 @@ from ..robots.robot import Robot
 
 Positions = tuple[np.ndarray, np.ndarray, np.ndarray]
 Poses = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+class Kinematics(Protocol):
+    """Where tips are and how they move with the joints, in world axes: of all robots of a cell, or of one."""
+
+    def positions(self, q: np.ndarray, v: np.ndarray) -> Positions:
+        """Positions and velocities, (2, ..., 3), J of the velocities and its derivative, (..., 3, nv)."""
+
+    def poses(self, q: np.ndarray, v: np.ndarray) -> Poses:
+        """Positions and velocities, (2, ..., 3); rotation matrices, (..., 3, 3); then (..., 6, nv), twice."""
 
 
 class Tips:

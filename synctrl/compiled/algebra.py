@@ -1,0 +1,93 @@
+"""Arrays of CasADi symbols, and the linear algebra of one robot's matrices of them."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from ..tasks.algebra import Algebra
+
+#: rounds of Jacobi's method after which symmetric matrices of six rows are diagonal to rounding
+SWEEPS = 6
+
+
+def array_of(symbols: Any, *shape: int) -> np.ndarray:
+    """The entries of a CasADi matrix, row by row, as an array of another shape or of its own."""
+    array = np.empty(symbols.shape, dtype=object)
+    for place in np.ndindex(symbols.shape):
+        array[place] = symbols[place]
+    return array.reshape(shape or symbols.shape)
+
+
+def column_of(array: Any) -> Any:
+    """The entries of an array, row by row, as a dense CasADi column."""
+    import casadi as ca
+
+    entries = np.ravel(array)
+    return ca.densify(ca.vertcat(*entries)) if entries.size else ca.SX.zeros(0, 1)
+
+
+def symbols(name: str, *shape: int) -> np.ndarray:
+    """An array of new symbols."""
+    import casadi as ca
+
+    return array_of(ca.SX.sym(name, int(np.prod(shape))), *shape)
+
+
+def _inverse(A: np.ndarray) -> np.ndarray:
+    """By minors up to three rows, by an unrolled QR factorization above."""
+    import casadi as ca
+
+    rows = len(A)
+    given = ca.SX.sym("A", rows, rows)
+    inverse = ca.inv_minor(given) if rows <= 3 else ca.solve(given, ca.SX.eye(rows))
+    function = ca.Function("inverse", [given], [inverse])
+    return array_of(function(ca.reshape(column_of(A.T), rows, rows)))
+
+
+def _determinant(A: np.ndarray) -> np.ndarray:
+    """By Laplace's expansion, row after row; every minor is computed once."""
+    minors: dict[tuple[int, ...], Any] = {(): np.ones(1)}
+    for row, entries in enumerate(A):
+        minors = {
+            columns: sum(
+                (-1) ** (row - k) * entries[j : j + 1] * minors[columns[:k] + columns[k + 1 :]]
+                for k, j in enumerate(columns)
+            )
+            for columns in combinations(range(len(A)), row + 1)
+        }
+    return minors[tuple(range(len(A)))]
+
+
+def _smallest(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """By Jacobi's method: A is turned in one plane after another until it is diagonal."""
+    rows = len(A)
+    A, V, below = A.copy(), np.eye(rows).astype(object), np.tril_indices(rows, -1)
+    for _ in range(1 if rows <= 2 else SWEEPS):
+        for plane in combinations(range(rows), 2):
+            turn = _turn(A, *plane)
+            A[:, plane] = A[:, plane] @ turn
+            A[plane, :] = turn.T @ A[plane, :]
+            A[below] = A.T[below]
+            V[:, plane] = V[:, plane] @ turn
+    found, *others = np.vstack((A.diagonal(), V)).T
+    for other in others:
+        less = np.less(other[:1], found[:1], dtype=object)
+        found = less * other + (1 - less) * found
+    return found[:1], found[1:]
+
+
+def _turn(A: np.ndarray, p: int, q: int) -> np.ndarray:
+    """The rotation by the smaller angle after which A[p, q] is zero, (2, 2)."""
+    gap, off = A[q : q + 1, q] - A[p : p + 1, p], 2 * A[p : p + 1, q]
+    sign = 1 - 2 * np.less(gap, 0, dtype=object)
+    tangent = sign * off / (abs(gap) + np.sqrt(gap**2 + off**2 + 1e-300))
+    cosine = 1 / np.sqrt(1 + tangent**2)
+    sine = tangent * cosine
+    return np.concatenate((cosine, sine, -sine, cosine)).reshape(2, 2)
+
+
+#: of symbols, of one robot
+SYMBOLS = Algebra(_inverse, _determinant, _smallest)

@@ -1,0 +1,55 @@
+"""What equations leave to linear algebra: LAPACK for numbers, something else for symbols."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+#: signs of the cofactors of a matrix with two rows
+_CHECKERED = np.array([[1.0, -1.0], [-1.0, 1.0]])
+
+
+class Algebra(NamedTuple):
+    """Functions of square matrices, (..., m, m), of which there may be one or a stack.
+
+    Attributes:
+        inverse: A^-1, (..., m, m); nothing finite where there is none.
+        determinant: det A, (..., 1).
+        smallest: of a symmetric A the smallest eigenvalue, (..., 1), and its eigenvector, (..., m).
+    """
+
+    inverse: Callable[[np.ndarray], np.ndarray]
+    determinant: Callable[[np.ndarray], np.ndarray]
+    smallest: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+def _inverse(A: np.ndarray) -> np.ndarray:
+    """A^-1, and NaN where there is none, so that the run's guard can name the robot."""
+    if A.shape[-1] == 2:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            determinant = A[..., :1, :1] * A[..., 1:, 1:] - A[..., :1, 1:] * A[..., 1:, :1]
+            return _CHECKERED * A[..., ::-1, ::-1].mT / determinant
+    try:
+        return np.linalg.inv(A)
+    except np.linalg.LinAlgError:
+        regular = np.linalg.det(A) != 0
+        result = np.full_like(A, np.nan)
+        result[regular] = np.linalg.inv(A[regular])
+        return result
+
+
+def _determinant(A: np.ndarray) -> np.ndarray:
+    return np.linalg.det(A)[..., None]
+
+
+def _smallest(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    if not np.isfinite(A).all():
+        return np.full((*A.shape[:-2], 1), np.nan), np.full(A.shape[:-1], np.nan)
+    values, vectors = np.linalg.eigh(A)
+    return values[..., :1], vectors[..., 0]
+
+
+#: of numbers
+LAPACK = Algebra(_inverse, _determinant, _smallest)
