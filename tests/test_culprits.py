@@ -159,15 +159,22 @@ def stop(row: Row, engine: str) -> SimulationError:
     return caught.value
 
 
+def without_time(error: SimulationError) -> tuple[type, str]:
+    return type(error), str(error).replace(f"t = {error.time:g} s", "t")
+
+
 @pytest.mark.parametrize("name", TABLE)
 def test_who_stopped_a_run_is_named_by_both_engines_in_the_same_words(name: str) -> None:
     row = TABLE[name]
     one, other = (stop(row, engine) for engine in ENGINES)
     assert (one.cause, type(one)) == (row.cause, row.kind)
     assert row.robot in (None, one.robot) and row.joint in (None, one.joint)
-    for attribute in ("cause", "robot", "joint", "time"):
+    for attribute in ("cause", "robot", "joint"):
         assert getattr(one, attribute) == getattr(other, attribute)
-    assert (type(one), str(one)) == (type(other), str(other))
+    # at 1e17 rad the sine of a position is made of rounding errors: one engine may notice a step later
+    slack = row.options.get("dt", 1e-3) if row.kind is NonFiniteError else 0.0
+    assert abs(one.time - other.time) <= 1.001 * slack
+    assert without_time(one) == without_time(other)
     assert row.make().cell.names[one.robot] in str(one)
     assert one.joint is None or f"joint {one.joint + 1} of" in str(one)
 
