@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +15,7 @@ from synctrl import Experiment
 from synctrl.experiments import a460_pair, planar_four
 
 PACKAGE = str(Path(synctrl.__file__).parent)
+PAGE = (Path(__file__).parents[1] / "docs" / "architecture.md").read_text("utf-8")
 #: functions of the package from q to tau
 DOZEN = 12
 
@@ -48,6 +50,24 @@ def trip(experiment: Experiment) -> list[str]:
 @pytest.mark.parametrize("make", [planar_four, a460_pair])
 def test_from_joint_positions_to_torque_it_is_a_dozen_calls_at_most(make: Callable[[], Experiment]) -> None:
     assert len(trip(make())) <= DOZEN
+
+
+def test_the_page_about_the_house_has_the_stations_in_order_with_their_files() -> None:
+    rows = re.findall(r"^\| (\d+) \| [– ]*`([\w.]+)` \| `([\w/]+\.py)` \|", PAGE, flags=re.MULTILINE)
+    assert [int(number) for number, _, _ in rows] == list(range(1, len(rows) + 1))
+    assert [name for _, name, _ in rows] == [name.lstrip("_") for name in trip(planar_four())]
+    for _, name, file in rows:
+        outermost = name.partition(".")[0]
+        text = (Path(PACKAGE) / file).read_text("utf-8")
+        assert re.search(rf"^(class|def) _?{outermost}\b", text, flags=re.MULTILINE), (name, file)
+
+
+def test_the_trip_in_joint_space_has_as_many_stations_as_the_page_says() -> None:
+    words = dict(zip(("nine", "ten", "eleven", "twelve"), range(9, 13), strict=True))
+    cartesian, joint = re.search(
+        r"the (\w+) calls of `planar_four`; in joint space there are (\w+)", PAGE
+    ).groups()
+    assert (words[cartesian], words[joint]) == (len(trip(planar_four())), len(trip(a460_pair())))
 
 
 def test_every_station_of_the_trip_is_called_once() -> None:
