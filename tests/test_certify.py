@@ -215,10 +215,11 @@ def lifted(rise: float) -> Experiment:
 
 
 @pytest.mark.parametrize("rise", [0.05, 0.0])
-def test_a_compiled_run_that_begins_at_rest_on_its_path_is_known_again(rise: float) -> None:
+def test_a_compiled_run_from_rest_on_its_path_is_known_again_and_keeps_the_identity(rise: float) -> None:
     pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
     result = lifted(rise).simulate(dt=5e-4, engine="compiled")
     assert np.allclose(replay(result).rows.s_q, result.v_error, rtol=0, atol=1e-12)
+    assert convergence(result).identity_holds
 
 
 def test_a_run_with_slightly_other_gains_is_another_one() -> None:
