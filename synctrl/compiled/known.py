@@ -1,4 +1,4 @@
-"""What generated code stands for, told apart from what a user has replaced.
+"""Is every part of a closed loop one that generated code computes? If not, the part is refused by name.
 
 The compiled engine does not call Python objects, it runs equations that were traced before. It may do so only
 for objects of exactly the package's own types, with exactly their methods: what else a user has plugged in is

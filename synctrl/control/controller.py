@@ -184,7 +184,10 @@ class Controller:
 
     @property
     def unchecked(self) -> Callable[[Reference, np.ndarray, np.ndarray, np.ndarray], Signals]:
-        """What a simulation calls: `signals`, or the `evaluate` of a subclass that has one of its own."""
+        """What a simulation calls: `signals`, which is `evaluate` without its checks.
+
+        A user's subclass may have an `evaluate` of its own; then that is called instead.
+        """
         return self.signals if type(self).evaluate is Controller.evaluate else self.evaluate
 
     def signals(
