@@ -10,7 +10,18 @@ import pytest
 from refusals import refused
 from theory_cells import GAINS, coupling, experiment
 
-from synctrl import Cell, Disturbance, Friction, Result
+from synctrl import (
+    CartesianSpace,
+    Cell,
+    Coupling,
+    Cubic,
+    Disturbance,
+    Experiment,
+    Friction,
+    Member,
+    Result,
+    load_robot,
+)
 from synctrl.analysis import Certificate, certify
 from synctrl.analysis.convergence import convergence
 from synctrl.analysis.replay import replay
@@ -193,3 +204,27 @@ def test_a_push_between_two_logged_instants_is_known_from_the_left(log_dt: float
     left, right = gone_through.logged[k] - 1, gone_through.logged[k]
     np.testing.assert_array_equal(gone_through.rows.disturbance[left, 0], 2.0)
     np.testing.assert_array_equal(gone_through.rows.disturbance[right, 0], 0.0)
+
+
+def lifted(rise: float) -> Experiment:
+    """Two A460 with known parameters that begin at rest on their path, which goes straight up, m."""
+    robot, q0 = load_robot("a460"), np.array([0.3, 1.0, -2.8])
+    start = robot.tip_position(q0)
+    way = Cubic(start, start + np.array([0.0, 0.0, rise]), duration=1.0)
+    member = Member(robot, way, q0=q0, theta_hat0=robot.inertial_parameters)
+    return Experiment(Cell([member] * 2, Coupling.pair(), CartesianSpace()), GAINS, duration=0.01)
+
+
+@pytest.mark.parametrize("rise", [0.05, 0.0])
+def test_a_compiled_run_from_rest_on_its_path_is_known_again_and_keeps_the_identity(rise: float) -> None:
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    result = lifted(rise).simulate(dt=5e-4, engine="compiled")
+    assert np.allclose(replay(result).rows.s_q, result.v_error, rtol=0, atol=1e-12)
+    assert convergence(result).identity_holds
+
+
+def test_a_run_with_slightly_other_gains_is_another_one() -> None:
+    run = experiment(coupling("pair", 2, 2))
+    other = replace(run, gains=replace(GAINS, Lambda=1.001 * GAINS.Lambda))
+    with pytest.raises(InputError, match="expected the one that made the result"):
+        replay(run.simulate(0.03, 1e-3), other)

@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text("utf-8")
-CELL, LOOP = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+CELL, TIPS, LOOP = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
 
 
 def run(code: str, folder: Path) -> str:
@@ -29,6 +29,11 @@ def test_the_cell_of_ones_own_runs_and_synchronizes(tmp_path):
     assert CELL.count("\n") < 30
     together, alone = map(float, re.findall(r"([\d.e-]+) rad", run(CELL, tmp_path)))
     assert together < alone
+
+
+def test_the_cell_of_arms_of_different_kinds_runs_and_is_certified(tmp_path):
+    assert TIPS.count("\n") < 30
+    assert run(TIPS, tmp_path).startswith("cell: certified\n")
 
 
 def test_the_loop_of_ones_own_runs_in_mujoco_and_synchronizes(tmp_path):

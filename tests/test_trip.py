@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +15,7 @@ from synctrl import Experiment
 from synctrl.experiments import a460_pair, planar_four
 
 PACKAGE = str(Path(synctrl.__file__).parent)
+PAGE = (Path(__file__).parents[1] / "docs" / "architecture.md").read_text("utf-8")
 #: functions of the package from q to tau
 DOZEN = 12
 
@@ -48,6 +50,14 @@ def trip(experiment: Experiment) -> list[str]:
 @pytest.mark.parametrize("make", [planar_four, a460_pair])
 def test_from_joint_positions_to_torque_it_is_a_dozen_calls_at_most(make: Callable[[], Experiment]) -> None:
     assert len(trip(make())) <= DOZEN
+
+
+def test_every_station_is_in_the_file_that_the_page_says() -> None:
+    stations = re.findall(r"^\| \d+ \| `(\w+)[\w.]*` \| `([\w/]+\.py)` \|", PAGE, flags=re.MULTILINE)
+    assert len(stations) >= len(trip(planar_four())) - 1
+    for name, file in stations:
+        text = (Path(PACKAGE) / file).read_text("utf-8")
+        assert re.search(rf"^(class|def) {name}\b", text, flags=re.MULTILINE), (name, file)
 
 
 def test_every_station_of_the_trip_is_called_once() -> None:

@@ -69,7 +69,9 @@ def convergence(result: Result | Replay, experiment: Experiment | None = None) -
     N = np.eye(len(w[0])) - S_plus @ S
     gap = np.abs(w - N @ errors["coupled error"] - S_plus @ errors["sync error"])
     share = np.abs(run.loop.controller.beta * x.E[at])
-    size = np.abs(w) + np.abs(N) @ (np.abs(w) + share) + np.abs(S_plus) @ (np.abs(S) @ np.abs(w))
+    # e is a difference of positions, and rounded as these are
+    terms = np.abs(w) + np.matvec(np.abs(x.c[at]), np.abs(result.x) + np.abs(result.x_desired))
+    size = terms + np.abs(N) @ (terms + share) + np.abs(S_plus) @ (np.abs(S) @ terms)
     return Convergence(
         {name: float(np.abs(error[-1]).max()) for name, error in errors.items()},
         {name: float(np.abs(error).max()) for name, error in errors.items()},

@@ -1,4 +1,9 @@
-"""What law and network say of their part in V, and what is done about those that say nothing."""
+"""What law and network say of their part in V, and what is done about those that say nothing.
+
+A law may have a method `proof`, which gives its terms of V and V'. The power of the force of a law without
+one is kept under the name "law"; what a network that is not ideal adds to V' under the name "network". So the
+balance of V closes with any parts, and a certificate can name those for which no proof is known.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""An adaptation for some of the robots that it was bound to, as the specimen has them."""
+"""An adaptation for some of the robots that it was bound to, as the specimen has them.
+
+Generated code is compared with the reference engine on a small closed loop, the specimen, which has one robot
+of each kind. An adaptation of a user's own was bound to the whole cell, and perhaps to numbers of each of its
+robots; so it is not bound anew, but asked for those robots that stand in the specimen.
+"""
 
 from __future__ import annotations
 

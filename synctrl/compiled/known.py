@@ -1,9 +1,11 @@
-"""What generated code stands for, told apart from what a user has replaced.
+"""Is every part of a closed loop one that generated code computes? If not, the part is refused by name.
 
 The compiled engine does not call Python objects, it runs equations that were traced before. It may do so only
 for objects of exactly the package's own types, with exactly their methods: what else a user has plugged in is
 refused by name, even a subclass that changes nothing of importance, for else it would silently run as its
-base. Desired motions, weights and disturbances may be anything: they are called, and tabulated.
+base. Laws and adaptations of a user's own are not refused here: their equations are traced when they are met,
+see `lawful.py` and `learning.py`. Desired motions, weights and disturbances may be anything: they are called,
+and tabulated.
 """
 
 from __future__ import annotations

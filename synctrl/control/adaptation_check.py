@@ -1,4 +1,4 @@
-"""What an adaptation of one's own gives, looked at once before anything runs."""
+"""Does an adaptation of a user's own give what it should? Asked once, before anything runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""The controller of a cell: wires robots, task space, coupling and law together."""
+"""The controller of a cell: wires robots, task space, coupling and law together.
+
+`Controller.signals` is the whole way from joint positions and velocities to torques, and the place from which
+to read the package: every line of it is one part that can be exchanged, asked at one instant for all robots.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +32,21 @@ class Signals:
     """Everything one evaluation of the controller computed, under its name.
 
     Task-space rows are (n, m), rows per pair (p, m), joint-space rows (n, nv), parameters (n, P), the
-    regressors Y are (n, nv, P), the state of the adaptation is (n, Z).
+    regressors Y are (n, nv, P), the state of the adaptation is (n, Z). The fields stand in the order in which
+    they are computed; the properties below them are parts of the fields, under the names of the notation.
+
+    Attributes:
+        reference: what was desired, and the weights of the coupling.
+        task: where the robots were in task space, their errors, and their Jacobians.
+        received: what the network told every robot of the others.
+        errors: all of this as the law sees it.
+        asked: what the law asked for, in task space.
+        v_ref, a_ref, s_q: the same for the joints, and the velocity error v_ref - v.
+        Y: regressors.
+        tau: torques, N·m.
+        theta_hat: estimates of the parameters.
+        z_dot: rate of the adaptation's state.
+        seen: what the adaptation learns from.
     """
 
     reference: Reference
@@ -166,13 +184,20 @@ class Controller:
 
     @property
     def unchecked(self) -> Callable[[Reference, np.ndarray, np.ndarray, np.ndarray], Signals]:
-        """What a simulation calls: `signals`, or the `evaluate` of a subclass that has one of its own."""
+        """What a simulation calls: `signals`, which is `evaluate` without its checks.
+
+        A user's subclass may have an `evaluate` of its own; then that is called instead.
+        """
         return self.signals if type(self).evaluate is Controller.evaluate else self.evaluate
 
     def signals(
         self, reference: Reference, motion: np.ndarray, z: np.ndarray, integral: np.ndarray
     ) -> Signals:
-        """`evaluate` without its checks, for many evaluations: numbers that are not finite go through."""
+        """`evaluate` without its checks, for many evaluations: numbers that are not finite go through.
+
+        `space` is the task space bound to the robots, `cell.task`; `task` is what it measures at this
+        instant. z is what the adaptation remembers, and `integral` what the network does.
+        """
         q, v = motion
         space, weights = self.cell.task, reference.weights
         task = space.measure(motion, reference.desired)

@@ -2,7 +2,9 @@
 
 Every function is plain array arithmetic on rows, one row per robot: e is (n, m) and c is (n, m, m). With the
 leading axis left out they describe a single robot, and they never ask what their numbers are, so the same
-lines can be traced with symbols. Gains are diagonal, given as vectors. The order is
+lines can be traced with symbols: that is how the compiled engine makes C of them. Gains are diagonal, given
+as vectors. A torque is computed in the order below, by `Controller.signals`; the right column says where each
+line is. A prime is a derivative with respect to time, so w' is called `w_dot`.
 
     w, w'              weighted errors                            compute_weighted_errors
     E, sigma, sigma'   what a robot hears of the others           the network

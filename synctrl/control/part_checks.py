@@ -1,4 +1,4 @@
-"""What a law and a network give, looked at once before anything runs."""
+"""Do a law and a network give arrays of the right shape? Asked once, before anything runs."""
 
 from __future__ import annotations
 

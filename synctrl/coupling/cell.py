@@ -97,6 +97,15 @@ class Cell:
         space: where the task is given; joint space by default.
         name: for titles.
 
+    Attributes:
+        members, coupling, space, name: as given.
+        robots, names: those of the members.
+        labels: names of the m task coordinates, as the space has them.
+        task: the space bound to these robots, see `BoundSpace`; it is asked at every instant of a run.
+        parameters: what is adapted of every robot, see `Parameters`.
+        theta: the true values of these, which the controller does not know, (n, P).
+        q0, v0, theta_hat0: where the robots and the estimates start, (n, nv), (n, nv) and (n, P).
+
     Raises:
         InputError: sizes that do not fit together; the message names the member.
         CouplingError: a coupling for another number of robots.

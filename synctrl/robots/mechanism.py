@@ -1,4 +1,8 @@
-"""Mechanism: the numbers of a robot's model that do not change during a run, wherever it stands."""
+"""Mechanism: the numbers of a robot's model that do not change during a run, wherever it stands.
+
+These numbers become constants of generated code, so robots that agree in them share it. Where a robot stands,
+and what its bodies weigh, differs from robot to robot and is an input of the code.
+"""
 
 from __future__ import annotations
 

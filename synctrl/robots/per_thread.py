@@ -1,4 +1,8 @@
-"""What every thread has one of its own of, such as the memory in which an algorithm leaves its results."""
+"""Objects of which every thread has its own, such as the memory in which an algorithm leaves its results.
+
+Robots and forests may be shared among threads, but Pinocchio's algorithms write into a `pin.Data`: two
+threads that wrote into the same one would read each other's numbers.
+"""
 
 from __future__ import annotations
 

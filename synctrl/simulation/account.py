@@ -1,4 +1,9 @@
-"""What a plant says of its own state in a result, looked at before it is believed."""
+"""What a plant says of its own state in a result, looked at before it is believed.
+
+A plant of a user's own may carry a state through a run that nobody else understands, see `Plant`. At the end
+of the run its methods `report` and `outputs` say what became of it. Both are code of the user's, so what they
+give is checked here before it gets into a `Result`.
+"""
 
 from __future__ import annotations
 

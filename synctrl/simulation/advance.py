@@ -1,15 +1,23 @@
-"""The one loop through time: from each joint of the clock to the next, with events in between.
+"""The one loop through time: from each instant of the clock to the next, with events in between.
 
-At a joint the state arrives as x-. What falls there happens in this order:
+The clock's instants are the multiples of dt and, between them, every instant at which something jumps, so
+within a step everything is smooth. At an instant the state arrives as x-, its limit from the left. What falls
+there happens in this order:
 
 1. the plant changes: loads are picked up and put down, and its own events move its state;
-2. desired motions break, and torques from outside begin and end;
+2. desired motions break, and torques from outside, which the code calls pushes, begin and end;
 3. messages of the network arrive, with continuous control;
 4. the controller takes a sample, with sampled control, and messages that are due with it.
 
-That gives x+, from which the state goes on to the next joint. The row of a logged instant is x+, with the
+That gives x+, from which the state goes on to the next instant. The row of a logged instant is x+, with the
 torque and the push that act from it on. What falls on the end of a run belongs to a run that goes on from
 there; only a sample that is due is still taken, and its torque is in the last row.
+
+Of these only events of the plant (`step.loop.meet`) and what the controller does (`control.begin`) are calls
+that the loop below makes. The rest is in the step itself, because it does not move the state but changes what
+the state will do: `step.loop` has the plant with the loads of this step, `step.stages` the desired motion
+and `step.push` the torque from outside. `steps.py` looks loop and push up in the middle of the step, which is
+on the right side of every jump; what is desired at its end is taken from just before it.
 """
 
 from __future__ import annotations
@@ -108,7 +116,7 @@ def advance(
 
     Args:
         loop: the closed loop.
-        clock: its joints.
+        clock: its instants.
         schedule: torques from outside.
         control: what the controller does.
         solver: how a step is made.

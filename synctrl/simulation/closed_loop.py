@@ -20,6 +20,11 @@ from .state import Layout, State
 class ClosedLoop:
     """y' = f(t, y) with y = (q, v, z, memory of the network, state of the plant's own), see `State`.
 
+    `derive` is f: `look` asks the controller what it computes in a state, and `respond` asks the plant how it
+    moves under the torque. Sampled control calls these two at instants of its own. `evaluate` is `derive`
+    for a flat y. At instants between the steps `meet` lets an event of the plant move the state, and
+    `settle` lets the adaptation, for example, project its estimates.
+
     Args:
         controller: the controller of a cell.
         plant: the true cell.

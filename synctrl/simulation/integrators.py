@@ -23,7 +23,7 @@ from .steps import Step
 ADAPTIVE = ("RK45", "RK23", "DOP853", "Radau", "BDF", "LSODA")
 #: weights of the four stages, times 6
 _SIMPSON = np.array([1.0, 2.0, 2.0, 1.0])
-#: steps of an adaptive method from one joint of the clock to the next, after which it is taken to be stuck
+#: steps of an adaptive method from one instant of the clock to the next, after which it is taken to be stuck
 MAX_TRIES = 10_000
 
 

@@ -1,4 +1,4 @@
-"""Steps of a run: from each joint of its clock to the next, with all that a rate needs in between."""
+"""Steps of a run: from each instant of its clock to the next, with all that a rate needs in between."""
 
 from __future__ import annotations
 
@@ -22,13 +22,15 @@ class Step(NamedTuple):
 
     Attributes:
         t, t_next: its start and end, s.
-        stages: what is desired at its start, in its middle, and just before its end.
-        loop: the closed loop with the plant as it is in between.
-        push: torque from outside, (n, nv), N·m.
+        stages: what is desired at its start, in its middle, and just before its end, which are the three
+            instants at which the Runge-Kutta method evaluates rates.
+        loop: the closed loop with the plant as it is in between, with the loads that it carries then.
+        push: torque from outside in between, (n, nv), N·m.
         number: which multiple of dt it begins at or after.
-        checked: whether it begins at that multiple.
+        checked: whether it begins at that multiple: there the run is watched, and samples fall.
         logged: whether it begins at an instant that is logged.
-        joined: whether all goes on smoothly from the step before.
+        joined: whether all goes on smoothly from the step before, so that its error can be estimated across
+            the instant between them.
     """
 
     t: float

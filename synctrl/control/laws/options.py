@@ -1,4 +1,9 @@
-"""Which law a controller has, of a law and of the options that are shorthand for the paper's."""
+"""From what a user says of the law, a law or options of the paper's law, to the law that a controller has.
+
+`Controller` and `Experiment` take `law=`. Beside it they take `reference_acceleration=` and `k_r_space=`, so
+that the paper's law with one option changed needs no `SunMills(...)`. Here both are brought together, and a
+contradiction between them is refused.
+"""
 
 from __future__ import annotations
 

@@ -86,7 +86,9 @@ WEIGHTS = ("c", "c_dot", "c_ddot", "c_inv")
 
 
 class Asked(NamedTuple):
-    """What a law asks for, one row per robot.
+    """What a law asks of the robots in task space; `law.compute_joint_command` makes torques of it.
+
+    There is one row per robot.
 
     Attributes:
         xref_dot, xref_ddot: reference velocity and acceleration, (n, m), task unit per s and s^2.

@@ -1,4 +1,9 @@
-"""The paper's law: coupled errors, and a force on synchronization errors, eqs. (7)-(13) and (28)-(32)."""
+"""The paper's law: coupled errors, and a force on synchronization errors, eqs. (7)-(13) and (28)-(32).
+
+What comes before this law, (7) and (28), is in `control/network.py`; what comes after it, the torque (13) and
+(32) in joint space, in `control/law.py` and `control/controller.py`; the adaptation (14) is
+`control/adaptation/gradient.py`. The theory page in `docs` has the way through all of the paper's equations.
+"""
 
 from __future__ import annotations
 
@@ -61,17 +66,26 @@ class BoundSunMills:
         self.reference_acceleration = reference_acceleration
 
     def command(self, errors: Errors) -> Asked:
-        x, Lambda, beta = errors, self.Lambda, self.beta
-        c, c_dot, c_ddot, c_inv = x.weights
-        e, shares = x.error[0], beta * x.shares
-        e_star = x.weighted + shares[:2]  # (10), (29), and the derivative
-        u = np.matvec(c, x.rates) + shares[1:] + Lambda * e_star  # (11), (30), and the derivative
-        u += np.matvec(c_dot, np.array((e, x.rates[0] + x.error[1])))
+        """e*, u, the reference motion and the force; e* and u have two rows, the quantity and its derivative.
+
+            e* = c e + beta E                      e*' = (c e)' + beta sigma
+            u  = c xd' + c' e + beta sigma + Lambda e*
+            u' = c xd'' + c' (xd' + e') + c'' e + beta sigma' + Lambda e*'
+            xref' = c^-1 u                         xref'' = c^-1 (u' - c' xref')
+
+        With `reference_acceleration="paper"` x' stands for xref' in the last of these.
+        """
+        Lambda, beta_shares = self.Lambda, self.beta * errors.shares  # beta E, beta sigma, beta sigma'
+        c, c_dot, c_ddot, c_inv = errors.weights
+        e, e_dot = errors.error
+        e_star = errors.weighted + beta_shares[:2]  # (10), (29), and the derivative
+        u = np.matvec(c, errors.rates) + beta_shares[1:] + Lambda * e_star  # (11), (30), and the derivative
+        u += np.matvec(c_dot, np.array((e, errors.rates[0] + e_dot)))
         u[1] += np.matvec(c_ddot, e)
         xref_dot = np.matvec(c_inv, u[0])
-        turned = xref_dot if self.reference_acceleration == "exact" else x.x_dot  # (13) prints x'
-        xref_ddot = np.matvec(c_inv, u[1] - np.matvec(c_dot, turned))
-        force = np.matvec(c.mT, self.K_eps * x.shares[1])  # the last term of (13) and (32)
+        velocity = xref_dot if self.reference_acceleration == "exact" else errors.x_dot  # (13) prints x'
+        xref_ddot = np.matvec(c_inv, u[1] - np.matvec(c_dot, velocity))
+        force = np.matvec(c.mT, self.K_eps * errors.shares[1])  # the last term of (13) and (32)
         return Asked(xref_dot, xref_ddot, force, e_star[0], u)
 
     def proof(self, along: Along) -> Proof:
