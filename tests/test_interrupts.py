@@ -416,10 +416,12 @@ def test_an_interrupted_run_can_be_sent_to_another_process():
 
 
 CHILD = """
+import signal
 import sys
 from synctrl.errors import RunInterrupted
 from synctrl.experiments import planar_four
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it otherwise
 told = []
 
 def progress(t):
@@ -440,9 +442,12 @@ def test_ctrl_c_ends_a_run_at_once_and_keeps_it(engine):
     child = subprocess.Popen(
         [sys.executable, "-c", CHILD, engine], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
-    assert child.stdout.readline() == "running\n"
-    child.send_signal(signal.SIGINT)
-    out, err = child.communicate(timeout=120)
+    try:
+        assert child.stdout.readline() == "running\n"
+        child.send_signal(signal.SIGINT)
+        out, err = child.communicate(timeout=120)
+    finally:
+        child.kill()
     assert (child.returncode, err) == (0, "")
     named, rows, reached, told = out.split()
     assert named == "True"
