@@ -88,6 +88,7 @@ def interrupt(experiment, value, flag):
     """Send this process what Ctrl-C sends it, the first time a run comes to value 2."""
     if value == 2 and not Path(flag).exists():
         Path(flag).touch()
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job ignores it otherwise
         signal.raise_signal(signal.SIGINT)
     return experiment
 

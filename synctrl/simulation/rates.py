@@ -28,6 +28,7 @@ from ..control.laws import no_errors
 from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.cell import Reference
 from ..robots.regressors import make_regressors
+from ..tasks.measurement import Measurement
 from .closed_loop import ClosedLoop
 
 #: largest product of rate and step that was ever seen to do with the classical Runge-Kutta method, whose own
@@ -71,22 +72,16 @@ def loop_rates(
             what is desired.
     """
     reference = loop.cell.references(np.array([t]))[0]
-    J, Y = _maps(loop, reference, motion, driven)
-    shared = _task_rates(loop)
+    task = loop.cell.task.measure(motion, reference.desired)
+    J, Y = _jacobians(loop, task), _regressors(loop, reference, task, motion, driven)
     found = []
     for i, robot in enumerate(loop.cell.robots):
-        nv = robot.nv
+        nv, J_i = robot.nv, J[i, :, : robot.nv]
         M = robot.mass_matrix(motion[0, i, :nv])
-        damping, springs = _matrices(loop, reference, i, J[i, :, :nv], Y[i, :nv])
-        friction = np.diag(rest_friction(loop)[i, :nv])
-        found += [Rate(name, i, None, rate) for name, rate in shared]
-        found += [_rate("K_r", i, M, damping), _rate("friction", i, M, friction)]
-        if type(loop.controller.law) is not BoundSunMills:
-            dampers, spring = (J[i, :, :nv].T @ A @ J[i, :, :nv] for A in _answers(loop, reference, i))
-            damping, springs = damping + dampers, [*springs, ("law", spring)]
-            found.append(_rate("law", i, M, dampers))
-        against = damping + friction + 1e-12 * np.eye(nv) if sampled else M
-        found += [_rate(name, i, against, spring, True, sampled) for name, spring in springs]
+        resistance, dampers = _dampers(loop, reference, i, J_i, M)
+        against = resistance + 1e-12 * np.eye(nv) if sampled else M
+        springs = _springs(loop, reference, i, J_i, Y[i, :nv])
+        found += dampers + [_rate(name, i, against, spring, True, sampled) for name, spring in springs]
     return found
 
 
@@ -102,11 +97,14 @@ def damping_rate(loop: ClosedLoop, t: float, motion: np.ndarray, sampled: bool =
     It is the largest eigenvalue of M^-1 (D + F), plus Lambda and beta lambda_n. Where torque is held, a step
     knows nothing but the friction.
     """
-    own: dict[int, float] = {}
-    for rate in loop_rates(loop, t, motion):
-        if not rate.spring and (rate.gain == "friction" or not sampled):
-            own[rate.robot] = own.get(rate.robot, 0.0) + rate.rate
-    return max(own.values())
+    reference = loop.cell.references(np.array([t]))[0]
+    J = _jacobians(loop, loop.cell.task.measure(motion, reference.desired))
+    sums = []
+    for i, robot in enumerate(loop.cell.robots):
+        M = robot.mass_matrix(motion[0, i, : robot.nv])
+        _, dampers = _dampers(loop, reference, i, J[i, :, : robot.nv], M)
+        sums.append(sum(rate.rate for rate in dampers if rate.gain == "friction" or not sampled))
+    return max(sums)
 
 
 def _task_rates(loop: ClosedLoop) -> list[tuple[str, float]]:
@@ -123,33 +121,55 @@ def _largest_share(loop: ClosedLoop) -> float:
     return float(np.linalg.norm(loop.cell.coupling.matrix, 2) ** 2)
 
 
-def _maps(
-    loop: ClosedLoop, reference: Reference, motion: np.ndarray, driven: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Jacobians, (n, m, nv), and regressors, (n, nv, P), of all robots."""
+def _jacobians(loop: ClosedLoop, task: Measurement) -> np.ndarray:
+    """Jacobians of all robots, (n, m, nv); in joint space identities."""
     cell = loop.cell
-    task = cell.task.measure(motion, reference.desired)
+    return np.broadcast_to(np.eye(cell.m, cell.nv), (cell.n, cell.m, cell.nv)) if task.J is None else task.J
+
+
+def _regressors(
+    loop: ClosedLoop, reference: Reference, task: Measurement, motion: np.ndarray, driven: bool
+) -> np.ndarray:
+    """Regressors of all robots, (n, nv, P)."""
+    cell, controller = loop.cell, loop.controller
     wanted = cell.task.to_joints(task, *task.rates)
     if driven:
-        memory, z = loop.controller.network.start(), loop.controller.adaptation.start()
-        signals = loop.controller.evaluate(reference, motion, z, memory)
+        signals = controller.evaluate(
+            reference, motion, controller.adaptation.start(), controller.network.start()
+        )
         wanted = signals.v_ref, signals.a_ref
-    Y = make_regressors(cell.parameters, [robot.nv for robot in cell.robots])(motion[0], motion[1], *wanted)
-    J = np.broadcast_to(np.eye(cell.m, cell.nv), (cell.n, cell.m, cell.nv)) if task.J is None else task.J
-    return J, Y
+    return make_regressors(cell.parameters, [robot.nv for robot in cell.robots])(
+        motion[0], motion[1], *wanted
+    )
 
 
-def _matrices(
-    loop: ClosedLoop, reference: Reference, i: int, J: np.ndarray, Y: np.ndarray
-) -> tuple[np.ndarray, list[tuple[str, np.ndarray]]]:
-    """Damping, (nv, nv), and springs of a robot."""
-    controller = loop.controller
-    nv = J.shape[1]
-    K_r, K_eps = (np.minimum(gain, HUGE) for gain in (controller.K_r[i], controller.K_eps))
+def _dampers(
+    loop: ClosedLoop, reference: Reference, i: int, J: np.ndarray, M: np.ndarray
+) -> tuple[np.ndarray, list[Rate]]:
+    """What resists the velocities of a robot, (nv, nv), and the rates of all that damps it."""
+    controller, nv = loop.controller, J.shape[1]
+    K_r = np.minimum(controller.K_r[i], HUGE)
     damping = np.diag(K_r[:nv]) if controller.k_r_space == "joint" else J.T @ np.diag(K_r) @ J
+    friction = np.diag(rest_friction(loop)[i, :nv])
+    found = [Rate(name, i, None, rate) for name, rate in _task_rates(loop)]
+    found += [_rate("K_r", i, M, damping), _rate("friction", i, M, friction)]
+    if type(controller.law) is not BoundSunMills:
+        force = J.T @ _answers(loop, reference, i)[0] @ J
+        damping = damping + force
+        found.append(_rate("law", i, M, force))
+    return damping + friction, found
+
+
+def _springs(
+    loop: ClosedLoop, reference: Reference, i: int, J: np.ndarray, Y: np.ndarray
+) -> list[tuple[str, np.ndarray]]:
+    """What pulls a robot back, (nv, nv) each, by the name of its gain."""
     cJ = reference.c[i] @ J
-    coupling = _largest_share(loop) * cJ.T @ np.diag(K_eps) @ cJ
-    return damping, [("K_eps", coupling), ("Gamma", _learned(loop, i, Y))]
+    coupling = _largest_share(loop) * cJ.T @ np.diag(np.minimum(loop.controller.K_eps, HUGE)) @ cJ
+    found = [("K_eps", coupling), ("Gamma", _learned(loop, i, Y))]
+    if type(loop.controller.law) is not BoundSunMills:
+        found.append(("law", J.T @ _answers(loop, reference, i)[1] @ J))
+    return found
 
 
 def _answers(loop: ClosedLoop, reference: Reference, i: int) -> tuple[np.ndarray, np.ndarray]:
