@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +64,20 @@ def test_the_figure_shows_the_terms_that_act_and_marks_the_growth(certificates) 
     assert any("disturbance" in text.get_text() for text in figure.axes[0].texts)
     shown = next(line for line in figure.axes[0].get_lines() if line.get_label() == "V")
     np.testing.assert_array_equal(shown.get_ydata(), pushed.lyapunov.V)
+
+
+def test_numbers_beside_the_powers_do_not_overlap(certificates) -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    for certificate in certificates.values():
+        figure = lyapunov_figure(certificate.lyapunov)
+        FigureCanvasAgg(figure).draw()
+        panel = figure.axes[1]
+        low, high = panel.get_ylim()
+        labels = [tick.label1 for tick in panel.yaxis.get_major_ticks() if low <= tick.get_loc() <= high]
+        boxes = sorted(((b := label.get_window_extent()).y0, b.y1) for label in labels if label.get_text())
+        assert len(boxes) > 2
+        assert all(top < bottom for (_, top), (bottom, _) in pairwise(boxes))
 
 
 def test_a_run_in_which_nothing_happens_can_be_drawn() -> None:

@@ -58,6 +58,7 @@ def growth_mark(figure: Figure, growth: Growth) -> Figure:
         textcoords="offset points",
         fontsize=8,
         color=ACCENT,
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
     )
     return figure
 
@@ -74,7 +75,9 @@ def _energies(panel: Axes, record: Lyapunov, shown: Terms) -> None:
 
 def _powers(panel: Axes, record: Lyapunov, shown: Terms) -> None:
     largest = float(np.abs(list(record.power.values())).max())
-    panel.set_yscale("symlog", linthresh=max(LINEAR * largest, float(record.rounding.max()), 1e-300))
+    linear = max(LINEAR * largest, float(record.rounding.max()), 1e-300)
+    # a power of ten, so that zero is as far from the first tick as that is from the next
+    panel.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(linear)))
     for name, color in shown:
         inside = "-" if name in record.inside else "--"
         panel.plot(record.t, record.power[name], inside, color=color, label=name)
