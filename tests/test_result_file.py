@@ -18,6 +18,7 @@ from refusals import refused
 
 from synctrl import Cell, Disturbance, Experiment, Result
 from synctrl.errors import InputError, ResultError, SimulationError
+from synctrl.paper.step_section import step_section
 from synctrl.show.plots import common_limits, save, tracking_errors
 from synctrl.simulation.result import LAYOUT
 
@@ -344,6 +345,14 @@ def test_a_step_that_was_too_long_is_shown_whatever_else_is_known(result, tmp_pa
     info = {key: value for key, value in result.info.items() if key != missing} | {"step_error": step}
     run = Result.load(replace(result, info=info).save(tmp_path / "run.npz"))
     assert consume(run, None, ["step_section"]) == {"step_section": "done"}
+
+
+def test_runs_of_one_title_are_told_apart_in_the_table_of_steps(result):
+    step = {"estimate": 0.1, "limit": 1e-3, "robot": 1, "joint": 0, "time": 0.1, "advised_step": 5e-4}
+    run = replace(result, info={**result.info, "step_error": step})
+    other = replace(run, info={**run.info, "title": "another"})
+    *_, table = step_section({"first_run": run, "second_run": run, "third_run": other}).blocks
+    assert [row[0] for row in table.rows] == ["first run", "second run", "another"]
 
 
 def test_a_run_whose_steps_could_not_be_looked_at_survives_the_disk(result, tmp_path):

@@ -24,7 +24,7 @@ def step_section(runs: Mapping[str, Result]) -> Section:
     for name, run in runs.items():
         instance(f"runs, {name}", run, Result, "a Result")
     known = {name: run for name, run in runs.items() if (run.info.get("step_error") or {}).get("estimate")}
-    over = [run for run in known.values() if run.info["step_error"]["advised_step"] is not None]
+    over = {n: run for n, run in known.items() if run.info["step_error"]["advised_step"] is not None}
     estimated = Text(
         "Every run estimates what its worst step errs in velocity, as a share of the largest velocity of the "
         "run, from derivatives that it computes anyway. The error itself is about a third of that."
@@ -34,14 +34,19 @@ def step_section(runs: Mapping[str, Result]) -> Section:
     return Section(TITLE, (estimated, verdict, *([_table(over)] if over else [])))
 
 
-def _table(runs: list[Result]) -> Table:
+def _table(runs: Mapping[str, Result]) -> Table:
+    titles = [str(run.info["title"]) for run in runs.values()]
+    names = [
+        name.replace("_", " ") if titles.count(t) > 1 else t for name, t in zip(runs, titles, strict=True)
+    ]
     head = ("run", "step, ms", "estimate, %", "limit, %", "at", "t, s", "advised step, ms")
-    return Table(head, tuple(_row(run, run.info["step_error"]) for run in runs))
+    rows = zip(names, runs.values(), strict=True)
+    return Table(head, tuple(_row(name, run, run.info["step_error"]) for name, run in rows))
 
 
-def _row(run: Result, found: Mapping[str, Any]) -> tuple[str, ...]:
+def _row(name: str, run: Result, found: Mapping[str, Any]) -> tuple[str, ...]:
     return (
-        str(run.info["title"]),
+        name,
         f"{1e3 * run.info['dt']:g}" if "dt" in run.info else "",
         f"{100 * found['estimate']:.2g}",
         f"{100 * found['limit']:.2g}",
