@@ -30,16 +30,10 @@ from benchmark_report import Table, is_installed, machine, markdown
 from naive_loop import BareCalls, NaiveLoop
 
 from synctrl import Experiment, load_robot
-from synctrl.errors import SimulationError
 from synctrl.compiled.run import Compiled
+from synctrl.errors import SimulationError
 from synctrl.experiments import (
-    a460_pair,
-    mixed_four,
-    mobile_robot,
-    panda_four,
-    planar_four,
-    rigid_object,
-    ur5_payload,
+    a460_pair, mixed_four, mobile_robot, panda_four, planar_four, rigid_object, ur5_payload,
 )  # fmt: skip
 from synctrl.files import write_whole
 from synctrl.simulation.run import run_reference
