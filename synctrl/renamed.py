@@ -32,6 +32,8 @@ _MOVES = (
     ("simulation", "sweep", "prepared"),
 )
 _URDF = "checks", "document", "meshes", "reader", "writer", "xml"
+#: modules that are a part of another one now
+_PARTS = {"experiments.judged": "paper.judge", "show.judge_plots": "paper.judge_section"}
 
 
 def _pairs() -> Iterator[tuple[str, str]]:
@@ -39,6 +41,7 @@ def _pairs() -> Iterator[tuple[str, str]]:
     for old, new, names in _MOVES:
         yield from ((f"{old}.{name}", f"{new}.{name}") for name in names.split())
     yield from ((f"robots.urdf_{name}", f"robots.urdf.{name}") for name in _URDF)
+    yield from _PARTS.items()
 
 
 #: old names and new ones
@@ -47,21 +50,23 @@ MOVED = {f"{__package__}.{old}": f"{__package__}.{new}" for old, new in _pairs()
 _ROOM, _NEW_ROOM = f"{__package__}.simulation.compiled", f"{__package__}.compiled"
 
 
-def names_elsewhere(module: str, new_home: str, *names: str) -> Callable[[str], Any]:
-    """The `__getattr__` of a module, some of whose names are in another module now.
+def names_elsewhere(module: str, new_home: str, *names: str, **renamed: str) -> Callable[[str], Any]:
+    """The `__getattr__` of a module, some of whose names are in another module now, or are other names.
 
     Args:
         module: its `__name__`.
-        new_home: the other module, seen from this one, `.law` or `..coupling.cell`.
+        new_home: the other module, seen from this one, `.law` or `..coupling.cell`; or this one itself.
         names: what has moved.
+        renamed: what has another name there, and which.
     """
+    today = {**dict(zip(names, names, strict=True)), **renamed}
 
     def find(name: str) -> Any:
-        if name not in names:
+        if name not in today:
             raise AttributeError(f"module '{module}' has no attribute '{name}'")
         home = import_module(new_home, module.rpartition(".")[0])
-        tell(f"{module}.{name}", f"{home.__name__}.{name}")
-        return getattr(home, name)
+        tell(f"{module}.{name}", f"{home.__name__}.{today[name]}")
+        return getattr(home, today[name])
 
     return find
 

@@ -92,7 +92,7 @@ def tune(
 
     Raises:
         InputError: a value of the wrong kind.
-        SweepError: no run stayed below the torque limit and ran to its end.
+        SweepError: no run stayed within the torque limit, ran to its end and has the measure.
     """
     finder = _Search(Study(experiment, _factors(search), **options), minimize, torque_limit, population)
     crew = CrewOptions(workers=workers, backend=backend, client=client)
@@ -157,20 +157,21 @@ class _Search:
     def cost(self, row: Mapping[str, Any]) -> float:
         """What is compared: up to 1 within the torque limit, from there to 2 outside, to 3 if the run stops.
 
+        It is 1 for a run within the limit that has no such measure, because it never settles, for example.
         Differential evolution only asks which of two is smaller, so that any increasing function will do.
         """
         value, torque = row[self.minimize], row["peak_torque"]
-        if row["status"] != COMPLETED or value is None or torque is None:
+        if row["status"] != COMPLETED or torque is None:
             return 3 - (row["stop_time"] or 0.0) / self.study.base.duration
         if torque > self.limit:
             return 2 - self.limit / torque
-        return value / (1 + value)
+        return 1.0 if value is None else value / (1 + value)
 
     def best(self) -> Tuned:
         """The best run of all.
 
         Raises:
-            SweepError: none was within the limit and ran to its end.
+            SweepError: none was within the limit, ran to its end and has the measure.
         """
         best = min(self.history, key=self.cost)
         if self.cost(best) >= 1:
@@ -178,7 +179,7 @@ class _Search:
             least = f"the smallest peak torque was {min(torques):.4g} N·m" if torques else "all runs stopped"
             raise SweepError(
                 f"none of {len(self.history)} runs stayed within a torque of {self.limit:g} N·m to its "
-                f"end; {least}; search other ranges, or allow more torque",
+                f"end and has a {self.minimize}; {least}; search other ranges, or allow more torque",
                 subject="tune",
             )
         values = {factor.name: best[factor.name] for factor in self.study.factors}

@@ -23,6 +23,23 @@ MOVED = {
     "synctrl.simulation.simulate": ("synctrl.simulation.run", ["run_reference"]),
     "synctrl.coupling.weights": ("synctrl.coupling.weight_checks", ["check_weights"]),
 }
+#: names by the module that had them, the module that has them now, and what they are called there
+RENAMED = [
+    ("synctrl.analysis.lyapunov", "lyapunov_of", "synctrl.analysis.lyapunov", "lyapunov"),
+    ("synctrl.analysis.convergence", "convergence_of", "synctrl.analysis.convergence", "convergence"),
+    (
+        "synctrl.analysis.gain_condition",
+        "gain_condition_of",
+        "synctrl.analysis.gain_condition",
+        "gain_condition",
+    ),
+    ("synctrl.analysis.claims", "Quantity", "synctrl.paper.claims", "Finding"),
+    ("synctrl.analysis.judge", "Comparison", "synctrl.paper.judge", "Agreement"),
+    ("synctrl.experiments.batch", "Job", "synctrl.paper.batch", "PlannedRun"),
+    ("synctrl.experiments.reproduction", "JOBS", "synctrl.paper.reproduction", "PLANNED"),
+    ("synctrl.experiments.reproduction", "judge_jobs", "synctrl.paper.reproduction", "judge_runs"),
+    ("synctrl.show.report", "Row", "synctrl.paper.report", "SideBySide"),
+]
 #: what version 0.1 exported
 EXPORTED = {
     "synctrl": (
@@ -66,6 +83,13 @@ def test_a_name_that_has_moved_is_the_same_thing_and_says_where_it_is(old, name)
     with pytest.warns(DeprecationWarning, match=f"{old}.{name} is deprecated: use {MOVED[old][0]}.{name}"):
         found = getattr(import_module(old), name)
     assert found is getattr(import_module(MOVED[old][0]), name)
+
+
+@pytest.mark.parametrize(("old", "name", "home", "today"), RENAMED)
+def test_a_name_that_is_another_one_now_is_the_same_thing_and_says_which(old, name, home, today):
+    with pytest.warns(DeprecationWarning, match=f"{home}.{name} is deprecated: use {home}.{today}"):
+        found = getattr(import_module(old), name)
+    assert found is getattr(import_module(home), today)
 
 
 @pytest.mark.parametrize("old", MOVED)

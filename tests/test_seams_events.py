@@ -111,7 +111,8 @@ def test_a_jump_of_v_at_an_event_is_no_growth_and_is_named(log_dt):
     assert (np.diff(record.V) > 1e-3).any()
     assert certificate.growth is None and record.closes
     assert certificate.verdict == ("outside the theorem" if log_dt == 5e-4 else "not certified")
-    assert certificate.outside == ("events of the plant Kicked move the state, 2 times, first until "
+    intervals = f"2 of {len(run.t) - 1} intervals of the log"
+    assert certificate.outside == (f"events of the plant Kicked move the state in {intervals}, first until "
                                    f"t = {run.t[record.events[0] + 1]:g} s: V jumps there",)  # fmt: skip
     assert first_growth(replace(record, events=())) is not None
 
@@ -119,7 +120,7 @@ def test_a_jump_of_v_at_an_event_is_no_growth_and_is_named(log_dt):
 def test_the_events_of_both_parts_are_named():
     run = catching(network=Posted(0.02)).simulate(0.15, dt=5e-4)
     certificate = certify(run)
-    assert "events of the plant Catching and the network Posted move the state, 8 times" in str(certificate)
+    assert "events of the plant Catching and the network Posted move the state in 8 of " in str(certificate)
     assert certificate.closes and certificate.growth is None
 
 

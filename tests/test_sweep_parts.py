@@ -19,9 +19,11 @@ from synctrl.control.adaptation import Gradient, Natural
 from synctrl.control.laws import ChungSlotine, SunMills
 from synctrl.control.network import Ideal
 from synctrl.errors import InputError, ResultError
+from synctrl.simulation.plant import Plant
 from synctrl.simulation.result import LAYOUT
 from synctrl.sweep import (
     Choice,
+    Factor,
     Grid,
     Sweep,
     Uniform,
@@ -237,6 +239,28 @@ class Unplain(Leaky):
 def test_what_is_no_list_of_different_parts_is_an_input_error(wrong, subject):
     with refused(InputError, subject):
         wrong()
+
+
+class OfOneRobot(Plant):
+    """A plant that gives the accelerations of its first robot alone, which numpy would take for all."""
+
+    def move(self, q, v, tau, hidden):
+        v_dot, hidden_dot = super().move(q, v, tau, hidden)
+        return v_dot[0], hidden_dot
+
+
+def plugged_in(experiment, wrong):
+    return replace(experiment, plant_type=OfOneRobot if wrong else Plant)
+
+
+def test_a_plant_that_a_factor_plugs_in_is_refused_where_a_single_run_refuses_it():
+    with pytest.raises(InputError, match="its acceleration"):
+        plugged_in(start(), True).simulate(dt=DT)
+    factors = [Factor("wrong", Grid([0, 1]), plugged_in)]
+    sweep = Sweep(start(), factors, dt=DT, engine="pinocchio", bands=BANDS)
+    good, bad = sweep.run_one(0), sweep.run_one(1)
+    assert (good["status"], bad["status"]) == ("completed", "refused")
+    assert "its acceleration" in bad["cause"]
 
 
 @pytest.mark.parametrize("factor", [gain, gain_scale])

@@ -88,6 +88,20 @@ def test_a_torque_limit_that_no_run_keeps_is_an_error_with_the_smallest_torque()
         tuned(torque_limit=1e-6)
 
 
+def test_a_measure_that_no_run_has_is_named_as_the_cause():
+    bands = {"tracking_error": 1e-12, "sync_error": 1e-12}
+    with pytest.raises(SweepError, match="has a sync_settling_time"):
+        tuned(minimize="sync_settling_time", bands=bands, generations=1)
+
+
+def test_a_run_without_the_measure_is_worse_than_those_with_it_and_better_than_those_outside_the_limit():
+    study = Study(base(), [gain("beta", Uniform(1, 2))], dt=DT)
+    cost = _Search(study, "sync_settling_time", 10.0, 5).cost
+    settled = {"status": "completed", "stop_time": None, "sync_settling_time": 1e3, "peak_torque": 10.0}
+    never, outside = {**settled, "sync_settling_time": None}, {**settled, "peak_torque": 10.1}
+    assert cost(settled) < cost(never) < cost(outside)
+
+
 def test_a_search_goes_on_from_its_folder(free, tmp_path):
     again = tuned(folder=tmp_path, generations=1)
     written = (tmp_path / "runs.jsonl").read_bytes()

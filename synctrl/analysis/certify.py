@@ -138,8 +138,8 @@ def _events(run: Replay) -> list[str]:
     parts = {f"the plant {type(loop.plant).__qualname__}": loop.events.size > 0}
     parts[f"the network {loop.controller.network_settings['name']}"] = loop.messages.sent
     names = " and ".join(name for name, has_events in parts.items() if has_events)
-    count = len(run.events)
-    return [f"events of {names} move the state, {count} times, first until t = {t:g} s: V jumps there"]
+    share = f"{len(run.events)} of {len(run.result.t) - 1} intervals of the log"
+    return [f"events of {names} move the state in {share}, first until t = {t:g} s: V jumps there"]
 
 
 def _in_words(run: Replay, name: str) -> str:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..renamed import names_elsewhere
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .replay import Replay, replay
@@ -79,3 +80,6 @@ def convergence(result: Result | Replay, experiment: Experiment | None = None) -
         float(4 * sum(S.shape) * EPS * size.max()),
         round(float(np.trace(N))),
     )
+
+
+__getattr__ = names_elsewhere(__name__, ".convergence", convergence_of="convergence")

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance, positive_number
 from ..errors import InputError
+from ..renamed import names_elsewhere
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .replay import Replay, replay
@@ -243,3 +244,6 @@ def _corner(name: str, corner: ArrayLike, cell: object) -> np.ndarray:
     if array.shape not in (shape, shape[1:]):
         raise InputError(f"expected shape {shape[1:]} or {shape}, found {array.shape}", subject=name)
     return np.broadcast_to(array, shape)
+
+
+__getattr__ = names_elsewhere(__name__, ".gain_condition", gain_condition_of="gain_condition")

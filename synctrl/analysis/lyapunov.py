@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..control.laws import Proof
+from ..renamed import names_elsewhere
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
@@ -283,3 +284,6 @@ def _halving(t: np.ndarray, rate: np.ndarray) -> float:
     """How much the integral of a rate changes when every second instant is left out."""
     half = np.unique(np.append(np.arange(0, len(t), 2), len(t) - 1))
     return float(np.abs(_integral(t[half], rate[half]) - _integral(t, rate)[half]).max())
+
+
+__getattr__ = names_elsewhere(__name__, ".lyapunov", lyapunov_of="lyapunov")

@@ -16,6 +16,7 @@ from typing import Any, Self
 
 from ..errors import SimulationError, StepWarning
 from ..files import reported
+from ..renamed import names_elsewhere
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 
@@ -147,3 +148,6 @@ def _check_writable(folder: Path) -> None:
     with reported("write into the folder", folder):
         folder.mkdir(parents=True, exist_ok=True)
         TemporaryFile(dir=folder).close()
+
+
+__getattr__ = names_elsewhere(__name__, ".batch", Job="PlannedRun")

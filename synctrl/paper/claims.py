@@ -15,6 +15,7 @@ import numpy as np
 
 from ..analysis.metrics import metrics, row_names
 from ..errors import InputError
+from ..renamed import names_elsewhere
 from ..simulation.result import Result
 
 #: "much smaller": by at least this factor
@@ -161,3 +162,6 @@ def error_name(run: Result, pair: int, axis: int) -> str:
 def scalar(gain: Any) -> str:
     """A gain as one number."""
     return f"{np.mean(gain):g}"
+
+
+__getattr__ = names_elsewhere(__name__, ".claims", Quantity="Finding")

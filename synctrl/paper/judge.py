@@ -14,6 +14,7 @@ from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
 from ..errors import InputError
+from ..renamed import names_elsewhere
 from ..robots.robot import load_robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
@@ -88,3 +89,6 @@ def compare_runs(ours: Result, theirs: Result) -> Agreement:
 
 def _relative(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
     return np.abs(ours - theirs).max(axis=(1, 2)) / np.abs(ours).max()
+
+
+__getattr__ = names_elsewhere(__name__, ".judge", Comparison="Agreement")

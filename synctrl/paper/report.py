@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from ..errors import InputError
 from ..files import reported, write_whole
+from ..renamed import names_elsewhere
 from ..show.panels import ten_to
 from ..show.plots import save
 from ..show.style import display
@@ -241,3 +242,6 @@ def _shown(quantity: Finding) -> str:
     """A figure in the unit that people read."""
     unit, factor = display(quantity.unit)
     return f"{number(factor * quantity.value)} {unit}".strip()
+
+
+__getattr__ = names_elsewhere(__name__, ".report", Row="SideBySide")

@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from ..experiments.a460_full import a460_full_pair
 from ..experiments.a460_pair import a460_pair
 from ..experiments.planar_four import GAINS, planar_four
+from ..renamed import names_elsewhere
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .batch import PlannedRun
@@ -63,3 +64,6 @@ def judged(runs: Mapping[str, Result]) -> list[Agreement]:
     """How far the plants agree in the runs of `judge_runs`."""
     pairs = [(run, runs.get(f"{name}_mujoco")) for name, run in runs.items()]
     return [compare_runs(ours, theirs) for ours, theirs in pairs if theirs is not None]
+
+
+__getattr__ = names_elsewhere(__name__, ".reproduction", JOBS="PLANNED", judge_jobs="judge_runs")

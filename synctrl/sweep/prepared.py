@@ -45,14 +45,13 @@ class Prepared:
         run = self._plan(experiment, None)
         run.check()
         self._known = list(_paths(experiment))
-        self._engine = find_engine(engine)
-        if engine == "compiled":
-            self._engine = _ready(run)
+        self._engine = _ready(run) if engine == "compiled" else find_engine(engine)
 
     def simulate(self, experiment: Experiment, control_period: float | None = None) -> Result:
         """Run a variation of the experiment.
 
-        Whether its paths can be reached is looked at again only if it has other paths or arms.
+        Whether its paths can be reached, and its plant fits, is looked at again only if it has other paths,
+        arms or kinds of plant.
 
         Raises:
             see `Experiment.simulate`
@@ -78,9 +77,9 @@ def _ready(run: Run) -> Engine:
 
 
 def _paths(experiment: Experiment) -> Iterator[Any]:
-    """What decides whether desired motions can be reached, and weights inverted."""
+    """What decides whether desired motions can be reached, weights inverted, and the plant asked."""
     cell = experiment.cell
-    yield from (cell.coupling, cell.space)
+    yield from (cell.coupling, cell.space, experiment.plant_type)
     for member in cell.members:
         model = member.robot.model
         yield member.trajectory
