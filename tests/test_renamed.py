@@ -12,7 +12,7 @@ import pytest
 from synctrl import Controller
 from synctrl.control.adaptation import Natural
 from synctrl.errors import InputError
-from synctrl.experiments import a460_pair
+from synctrl.experiments import a460_pair, planar_four
 from synctrl.renamed import names_elsewhere
 
 #: names by the module that had them, and the module that has them now
@@ -96,6 +96,14 @@ def test_a_name_that_is_another_one_now_is_the_same_thing_and_says_which(old, na
 def test_other_names_are_as_unknown_as_before(old):
     with pytest.raises(AttributeError, match=f"module '{old}' has no attribute 'nothing'"):
         import_module(old).nothing  # noqa: B018
+
+
+def test_arguments_of_the_papers_cells_have_the_places_that_they_had():
+    for made in (
+        a460_pair(True, True, None, "paper", "task"),
+        planar_four(True, None, 0.1, "text", None, "paper", "task"),
+    ):
+        assert (made.reference_acceleration, made.k_r_space) == ("paper", "task")
 
 
 @pytest.fixture(scope="module")

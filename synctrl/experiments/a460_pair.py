@@ -23,7 +23,7 @@ from ..robots.robot import Robot, load_robot
 from ..simulation.simulate import Experiment
 from ..tasks.spaces import JointSpace
 from ..tasks.trajectories import Cubic
-from .parts import ControllerParts, ready_experiment
+from .parts import ControllerParts, Parts, ready_experiment
 
 INITIAL = np.deg2rad([[73.3340, 60.3330, -169.8120], [15.2520, 71.6830, -181.9800]])  # Table I
 FINAL = np.deg2rad([[90.0, 63.6090, -174.7290], [-2.9730, 74.1070, -185.1080]])
@@ -42,8 +42,10 @@ def a460_pair(
     synchronized: bool = True,
     friction: bool = True,
     gains: Gains | None = None,
+    reference_acceleration: str | None = None,
+    k_r_space: str | None = None,
     adapt_friction: bool = False,
-    **parts: Unpack[ControllerParts],
+    **parts: Unpack[Parts],
 ) -> Experiment:
     """The two-arm cell of section V-A, in joint space with epsilon = e_1 - e_2, eq. (45).
 
@@ -51,8 +53,9 @@ def a460_pair(
         synchronized: False sets beta = K_eps = 0, the paper's independent adaptive control.
         friction: whether the plant has friction, which is outside the controller's model.
         gains: by default the paper's.
+        reference_acceleration, k_r_space: options of the law, see `Experiment`.
         adapt_friction: whether the controller's model has friction too, see `FrictionParameters`.
-        parts: parts and options of the controller, see `ControllerParts`.
+        parts: `adaptation`, `law`, `network`, see `Experiment`.
     """
     boolean("friction", friction)
     boolean("adapt_friction", adapt_friction)
@@ -62,7 +65,10 @@ def a460_pair(
         members = [_knowing_friction(member) for member in members]
     cell = Cell(members, Coupling.pair(c=(1.0, -1.0)), JointSpace(), name="A460 pair")
     remarks = [*["without friction"] * (not friction), *["friction adapted"] * adapt_friction]
-    return ready_experiment(cell, DURATION, _gains(adapt_friction), gains, synchronized, parts, *remarks)
+    options: ControllerParts = {
+        **parts, "reference_acceleration": reference_acceleration, "k_r_space": k_r_space,
+    }  # fmt: skip
+    return ready_experiment(cell, DURATION, _gains(adapt_friction), gains, synchronized, options, *remarks)
 
 
 def _member(robot: Robot, i: int, friction: Friction) -> Member:

@@ -15,12 +15,17 @@ from ..simulation.disturbances import Disturbance
 from ..simulation.simulate import Experiment
 
 
-class ControllerParts(TypedDict, total=False):
-    """Parts and options of the controller, as `Experiment` takes them."""
+class Parts(TypedDict, total=False):
+    """Parts of the controller, as `Experiment` takes them."""
 
     adaptation: Adaptation | None
     law: Law | None
     network: Network | None
+
+
+class ControllerParts(Parts, total=False):
+    """Parts and options of the controller."""
+
     reference_acceleration: str | None
     k_r_space: str | None
 

@@ -22,7 +22,7 @@ from ..simulation.disturbances import Disturbance
 from ..simulation.simulate import Experiment
 from ..tasks.spaces import CartesianSpace
 from ..tasks.trajectories import ExponentialApproach
-from .parts import ControllerParts, ready_experiment
+from .parts import ControllerParts, Parts, ready_experiment
 
 R, D = 5.0, 1.0  # m
 TURN = 0.02  # rad, how far each desired path goes along its circle
@@ -45,7 +45,9 @@ def planar_four(
     phi: float = 0.1,
     radii: str = "text",
     gains: Gains | None = None,
-    **parts: Unpack[ControllerParts],
+    reference_acceleration: str | None = None,
+    k_r_space: str | None = None,
+    **parts: Unpack[Parts],
 ) -> Experiment:
     """The four-arm cell of section V-B, in Cartesian space with the ring (47)-(48).
 
@@ -56,7 +58,8 @@ def planar_four(
         radii: "text" puts robots 2 and 3 on the larger circle as (46) and (47) do, "table" 2 and 4 as
             Table II.
         gains: by default the paper's.
-        parts: parts and options of the controller, see `ControllerParts`.
+        reference_acceleration, k_r_space: options of the law, see `Experiment`.
+        parts: `adaptation`, `law`, `network`, see `Experiment`.
 
     Raises:
         InputError: an unknown word, or a number that is not finite.
@@ -70,8 +73,11 @@ def planar_four(
     cell = Cell(members, coupling, CartesianSpace("xy"), name="four planar arms")
     remarks = () if disturbance is None else ("disturbed",)
     disturbances = _disturbances(disturbance)
+    options: ControllerParts = {
+        **parts, "reference_acceleration": reference_acceleration, "k_r_space": k_r_space,
+    }  # fmt: skip
     return ready_experiment(
-        cell, DURATION, GAINS, gains, synchronized, parts, *remarks, disturbances=disturbances
+        cell, DURATION, GAINS, gains, synchronized, options, *remarks, disturbances=disturbances
     )
 
 
