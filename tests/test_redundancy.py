@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from synctrl import CartesianSpace, Damping, PoseSpace, Redundancy, load_robot
 from synctrl.errors import InputError
+from synctrl.tasks.algebra import LAPACK
 from synctrl.tasks.redundancy import Inverse
 
 UR5, PANDA, PLANAR = load_robot("ur5"), load_robot("panda"), load_robot("planar2r")
@@ -176,6 +177,16 @@ def test_damped_reference_velocities_stay_bounded_through_a_singular_configurati
         <= np.linalg.norm(xref_dot, axis=1).max() / (2 * damping.largest) * 1.1
     )
     assert np.isfinite(a_ref).all()
+
+
+def test_a_robot_whose_jacobian_is_no_number_leaves_the_damping_of_the_others_as_it_is():
+    A = np.random.default_rng(0).normal(size=(3, 2, 2))
+    A = A @ A.mT
+    whole = LAPACK.smallest(A)
+    A[1, 0, 1] = np.nan
+    for found, expected in zip(LAPACK.smallest(A), whole, strict=True):
+        assert np.isnan(found[1]).all()
+        np.testing.assert_array_equal(found[[0, 2]], expected[[0, 2]])
 
 
 def test_weights_and_postures_that_do_not_fit_are_refused_with_the_robot_named():
