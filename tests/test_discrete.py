@@ -433,6 +433,16 @@ def test_a_torque_that_is_not_finite_is_an_error_and_changes_nothing():
     assert all((controller.state[name] == array).all() for name, array in known.items())
 
 
+def test_a_part_that_fails_when_the_torque_is_known_changes_nothing(monkeypatch):
+    controller, q, v = started("hold", learning(small(), Leaky(0.1, 0.1)))
+    controller.step(0.0, q, v)
+    known = controller.state
+    monkeypatch.setattr(controller.controller.adaptation, "settle", lambda z: z[:, 10_000])
+    with pytest.raises(IndexError):
+        controller.step(3 * PERIOD, q + 0.1, v)
+    assert all((controller.state[name] == array).all() for name, array in known.items())
+
+
 # -- memory -----------------------------------------------------------------------------------------------
 
 

@@ -126,8 +126,7 @@ class DiscreteController:
             memory = self._heard(reference, motion, self._samples + missed)
             signals = self.controller.unchecked(reference, motion, self.z, memory)
         check_signals(self.cell, time, signals)
-        self._samples, self.held = self._samples + missed, self.held + missed
-        self._advance(motion[0], memory, signals)
+        self._advance(motion[0], memory, signals, missed)
         return self._tau.copy()
 
     def sample(self, t: float, motion: np.ndarray) -> Signals:
@@ -278,13 +277,14 @@ class DiscreteController:
         """Before this time a message is due with a sample or with one before; roundings do not matter."""
         return self._t0 + (sample + GRID) * self.period
 
-    def _advance(self, q: np.ndarray, memory: np.ndarray, signals: Signals) -> None:
-        """Keep what is commanded, and what will be known at the next sample."""
+    def _advance(self, q: np.ndarray, memory: np.ndarray, signals: Signals, missed: int = 0) -> None:
+        """Keep what is commanded, and what will be known at the next sample; or nothing, if a part fails."""
         tau = np.clip(signals.tau, -self._limits, self._limits)
-        self._tau = tau if self.include_gravity else tau - self._gravity(q)
-        self.z = self.controller.adaptation.settle(self.z + self.period * signals.z_dot)
+        tau = tau if self.include_gravity else tau - self._gravity(q)
+        z = self.controller.adaptation.settle(self.z + self.period * signals.z_dot)
+        self._tau, self.z, self.signals = tau, z, signals
         self.memory = memory + self.period * signals.memory_dot
-        self._samples, self.signals = self._samples + 1, signals
+        self._samples, self.held = self._samples + missed + 1, self.held + missed
 
     def _gravity(self, q: np.ndarray) -> np.ndarray:
         g = np.zeros(self._shape)
