@@ -32,7 +32,14 @@ from synctrl import (
     load_robot,
 )
 from synctrl.control.adaptation import Natural
-from synctrl.errors import InputError, NonFiniteError, ResultError, SingularJacobianError, SynctrlError
+from synctrl.errors import (
+    InputError,
+    NonFiniteError,
+    OrientationError,
+    ResultError,
+    SingularJacobianError,
+    SynctrlError,
+)
 from synctrl.experiments import (
     a460_full_pair,
     a460_pair,
@@ -45,6 +52,7 @@ from synctrl.experiments import (
 )
 from synctrl.simulation.plant import Plant
 from synctrl.simulation.result import LAYOUT
+from synctrl.tasks import rotations
 
 PERIOD = 4e-3
 
@@ -421,6 +429,19 @@ def test_a_singular_jacobian_is_an_error_as_in_a_simulation():
         stretched[1, 1] = angle
         with refused(SingularJacobianError, robot=1, time=PERIOD):
             controller.step(PERIOD, stretched, v)
+    assert all((controller.state[name] == array).all() for name, array in known.items())
+
+
+def test_an_orientation_error_near_half_a_turn_is_an_error_as_in_a_simulation():
+    experiment = ur5_payload()
+    controller, q, v = started(experiment=experiment)
+    controller.step(0.0, q, v)
+    known = controller.state
+    turned = experiment.cell.reference_table(np.array([PERIOD])).desired[0].copy()
+    R = rotations.exp(turned[0, 1, 3:])
+    turned[0, 1, 3:] = rotations.log(R @ rotations.exp(np.array([0.0, 0.0, 3.1])))
+    with refused(OrientationError, robot=1, time=PERIOD):
+        controller.step(PERIOD, q, v, turned)
     assert all((controller.state[name] == array).all() for name, array in known.items())
 
 

@@ -111,9 +111,9 @@ class DiscreteController:
         Raises:
             InputError: another shape, or a time that is no number; and, unless faults are held, a measurement
                 that is not finite, a time that is early or runs backwards, or a missed period.
-            SingularJacobianError: a Jacobian with a larger condition number than the cell's space allows.
+            SingularJacobianError, OrientationError: as in a simulation, which ends here.
             NonFiniteError: the law has no finite torque here.
-            SimulationError: a desired motion or weight of the user's fails.
+            SimulationError: a space of the user's ends the run, or a motion or weight of theirs fails.
         """
         time, motion = self._time(t), measurement(q, v, self._shape)
         wanted = None if desired is None else finite_array("desired", desired, (3, self.cell.n, self.cell.m))

@@ -6,8 +6,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..coupling.cell import Cell
-from ..errors import InputError, NonFiniteError, SingularJacobianError
+from ..errors import InputError, NonFiniteError, OrientationError, SimulationError, SingularJacobianError
+from ..tasks.measurement import Beyond, first_beyond
 from .controller import Signals
+
+#: what the package's spaces watch: the kind of error, and what it is about
+_ENDS = {
+    "condition": (SingularJacobianError, "condition number of the Jacobian"),
+    "orientation": (OrientationError, "orientation error"),
+}
 
 
 def measurement(q: ArrayLike, v: ArrayLike, shape: tuple[int, int]) -> np.ndarray:
@@ -59,9 +66,13 @@ def check_signals(cell: Cell, t: float, signals: Signals) -> None:
 
     Raises:
         SingularJacobianError: a Jacobian with a larger condition number than the cell's space allows.
+        OrientationError: an orientation error so large that its direction is about to be undefined.
+        SimulationError: something else by which the space says that its coordinates mean nothing.
         NonFiniteError: a torque, or a rate of an estimate or integral, that is not finite.
     """
-    _check_jacobians(cell, t, signals)
+    beyond = first_beyond(cell.task, signals.task)
+    if beyond is not None:
+        raise _meaningless(cell, t, beyond)
     for what, rows in (("torque", signals.tau), ("rate of the estimates", signals.z_dot)):
         bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
         if bad.size:
@@ -83,21 +94,16 @@ def _numbers(name: str, value: ArrayLike, shape: tuple[int, int]) -> np.ndarray:
     return array
 
 
-def _check_jacobians(cell: Cell, t: float, signals: Signals) -> None:
-    """As a simulation stops there, by the Frobenius norm."""
-    limit = getattr(cell.task, "limits", {}).get("condition")
-    if limit is None:
-        return
-    condition = signals.task.condition[:, 0]
-    good = condition < limit
-    if not good.all():
-        i = int(np.argmin(good))
-        raise SingularJacobianError(
-            f"the Jacobian of {cell.names[i]} is singular at t = {t:g} s: its condition number is "
-            f"{condition[i]:.3g}, expected below {limit:g}; stop the robots and reset the controller",
-            time=t,
-            robot=i,
-        )
+def _meaningless(cell: Cell, t: float, beyond: Beyond) -> SimulationError:
+    """The error with which a simulation stops there too."""
+    name, i, value, limit = beyond
+    kind, what = _ENDS.get(name, (SimulationError, name))
+    return kind(
+        f"the {what} of {cell.names[i]} is {value:.3g} at t = {t:g} s, where {cell.space!r} expects it below "
+        f"{limit:g}; stop the robots and reset the controller",
+        time=t,
+        robot=i,
+    )
 
 
 def _undefined(cell: Cell, t: float, what: str, robot: int) -> NonFiniteError:
