@@ -37,6 +37,19 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | No
     return array
 
 
+def per_joint(name: str, value: ArrayLike, nv: int) -> np.ndarray:
+    """`value`, a number or one per joint, as a read-only float array, (nv,).
+
+    Raises:
+        InputError: not numbers, another shape, or not finite.
+    """
+    array = finite_array(name, value)
+    if array.shape not in ((), (nv,)):
+        expected, found = f"a number or shape ({nv},)", _show(array.shape)
+        raise InputError(f"expected {expected}, found {found}", subject=name, found=array.shape)
+    return np.broadcast_to(array, (nv,))
+
+
 def symmetric_matrix(name: str, value: ArrayLike, size: int) -> np.ndarray:
     """`value` as a read-only symmetric float array, (size, size)."""
     array = finite_array(name, value, (size, size))

@@ -13,6 +13,7 @@ REFUSALS = {
     "no numbers": (checks.finite_array, ("dt", "1"), None),
     "another shape": (checks.finite_array, ("dt", [1.0, 2.0], (3,)), (2,)),
     "not finite": (checks.finite_array, ("dt", [1.0, np.inf]), np.inf),
+    "not one per joint": (checks.per_joint, ("dt", [1.0, 2.0], 3), (2,)),
     "not symmetric": (checks.symmetric_matrix, ("dt", [[1.0, 2.0], [0.0, 1.0]], 2), None),
     "no number": (checks.finite_number, ("dt", True), None),
     "not above zero": (checks.positive_number, ("dt", -0.5), -0.5),
