@@ -195,6 +195,9 @@ def test_weights_and_postures_that_do_not_fit_are_refused_with_the_robot_named()
         Redundancy(posture=[np.zeros(7)]): "expected 2 rows, one per robot, found 1",
         Redundancy(weights=-np.ones(7)): "expected numbers above 0, found -1",
         Redundancy(weights=3.0): "expected .* rows",
+        Redundancy(weights=np.array(3.0)): "expected .* rows",
+        Redundancy(posture=[]): "expected .* rows",
+        Redundancy(posture=np.zeros((0, 7))): "expected .* rows",
     }
     for wrong, message in cases.items():
         with pytest.raises(InputError, match=message):
