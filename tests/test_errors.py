@@ -6,8 +6,21 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from synctrl import checks
-from synctrl.errors import InputError, RobotError
+from synctrl import (
+    AxisRotation,
+    CartesianSpace,
+    Circle,
+    FunctionTrajectory,
+    Hold,
+    JointSpace,
+    Redundancy,
+    SynchronizationFunction,
+    checks,
+    load_robot,
+)
+from synctrl.errors import InputError, RobotError, SynctrlError
+
+ARM = load_robot("planar2r")
 
 REFUSALS = {
     "no numbers": (checks.finite_array, ("dt", "1"), None),
@@ -26,6 +39,30 @@ REFUSALS = {
     "unknown word": (checks.choice, ("dt", "c", ("a", "b")), None),
     "two lines": (checks.label, ("dt", "a\nb"), None),
 }
+
+#: a refusal for every argument that parts of a cell are made of
+ARGUMENTS = {
+    "axes": lambda: CartesianSpace("xw"),
+    "redundancy, weights": lambda: Redundancy(weights=[-1.0, 1.0]).spread([ARM]),
+    "redundancy, posture": lambda: Redundancy(posture=[]).spread([ARM]),
+    "start": lambda: AxisRotation(2 * np.eye(3), (0, 0, 1), Hold([0.0])),
+    "center": lambda: Circle([0.0], 1.0, 1.0),
+    "first, second": lambda: Circle([0.0, 0.0], 1.0, 1.0, first=[1.0, 1.0]),
+    "position": lambda: FunctionTrajectory(lambda t: [np.nan], lambda t: [0.0], lambda t: [0.0]),
+    "function": lambda: SynchronizationFunction(3, 2, 1),
+    "robots": lambda: SynchronizationFunction(np.add, 1, 1),
+    "A_dot, A_ddot": lambda: SynchronizationFunction.from_matrices([1, -1], 1, A_dot=np.zeros),
+    "trajectories": lambda: SynchronizationFunction.from_matrices([1, -1], 1).coupling([Hold([0])], 1.0),
+    "joint space": lambda: JointSpace().bind([ARM, load_robot("wheel")]),
+    "CartesianSpace('xyz')": lambda: CartesianSpace("xyz").bind([ARM]),
+}
+
+
+@pytest.mark.parametrize(("subject", "make"), ARGUMENTS.items(), ids=ARGUMENTS)
+def test_a_refusal_names_the_argument_and_begins_its_message_with_it(subject, make):
+    with refused(SynctrlError, subject) as caught:
+        make()
+    assert str(caught.value).startswith(f"{subject}: ")
 
 
 @pytest.mark.parametrize(("check", "arguments", "found"), REFUSALS.values(), ids=REFUSALS)

@@ -206,7 +206,7 @@ class DiscreteController:
         try:
             self.state = found
         except InputError as error:
-            raise ResultError(f"'{path}' has no state of this controller: {error}") from error
+            raise ResultError(f"'{path}' has no state of this controller: {error}", file=path) from error
 
     @property
     def sync_integral(self) -> np.ndarray:
