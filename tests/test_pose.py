@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -167,6 +169,14 @@ def test_pose_trajectories_of_many_times_are_those_of_each_time(seed):
         for trajectory in (body, Attached(body, [1, 2, 3], exp(np.ones(3)))):
             for part, rows in zip(trajectory(t), zip(*map(trajectory, t), strict=True), strict=True):
                 np.testing.assert_allclose(part, rows, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["fixed", "between", "steady"])
+def test_turns_about_an_axis_can_be_sent_to_another_process(name):
+    turn = orientations(3)[name]
+    times = np.linspace(0.0, 3.0, 7)
+    for one, other in zip(turn(times), pickle.loads(pickle.dumps(turn))(times), strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, finite_number, instance, positive_number
 from ..errors import InputError, TrajectoryError
 from . import rotations
-from .trajectories import Cubic, FunctionTrajectory, Hold, Motion, Trajectory
+from .trajectories import Cubic, Hold, Motion, Trajectory
 
 
 class Turning(NamedTuple):
@@ -74,12 +74,24 @@ class AxisRotation:
     @classmethod
     def steady(cls, start: ArrayLike, axis: ArrayLike, speed: float) -> Self:
         """A turn at constant speed, rad/s."""
-        w = finite_number("speed", speed)
-        return cls(start, axis, FunctionTrajectory(lambda t: [w * t], lambda t: [w], lambda t: [0.0]))
+        return cls(start, axis, _SteadyAngle(finite_number("speed", speed)))
 
     def __call__(self, t: ArrayLike) -> Turning:
         angle, speed, growth = self.angle(t)
         return Turning(rotations.exp(angle * self.axis) @ self.start, speed * self.axis, growth * self.axis)
+
+
+class _SteadyAngle:
+    """The angle of a turn at constant speed, rad/s, from 0 on."""
+
+    dimension, breaks = 1, ()
+
+    def __init__(self, speed: float):
+        self.speed = speed
+
+    def __call__(self, t: ArrayLike) -> Motion:
+        angle = self.speed * np.asarray(t, dtype=float)[..., None]
+        return Motion(angle, np.full_like(angle, self.speed), np.zeros_like(angle))
 
 
 class FunctionOrientation:
