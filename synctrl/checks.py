@@ -19,6 +19,22 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | No
     Raises:
         InputError: not numbers, another shape, or not finite.
     """
+    array = numbers(name, value, shape)
+    if not np.isfinite(array).all():
+        where = np.argwhere(~np.isfinite(array))[0]
+        entry = f" at index {tuple(int(k) for k in where)}" if array.ndim else ""
+        found = array[tuple(where)]
+        raise InputError(f"expected finite numbers, found {found}{entry}", subject=name, found=float(found))
+    array.flags.writeable = False
+    return array
+
+
+def numbers(name: str, value: ArrayLike, shape: tuple[int | None, ...] | None = None) -> np.ndarray:
+    """`value` as a new float array of the given shape; whether its numbers are finite is not asked.
+
+    Raises:
+        InputError: not numbers, or another shape.
+    """
     try:
         if value is None or np.asarray(value).dtype.kind in "USc":  # neither "1" nor 1j is a number here
             raise TypeError
@@ -28,12 +44,6 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | No
     if shape is not None and not _fits(array.shape, shape):
         expected, found = _show(shape), _show(array.shape)
         raise InputError(f"expected shape {expected}, found {found}", subject=name, found=array.shape)
-    if not np.isfinite(array).all():
-        where = np.argwhere(~np.isfinite(array))[0]
-        entry = f" at index {tuple(int(k) for k in where)}" if array.ndim else ""
-        found = array[tuple(where)]
-        raise InputError(f"expected finite numbers, found {found}{entry}", subject=name, found=float(found))
-    array.flags.writeable = False
     return array
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..checks import numbers
 from ..coupling.cell import Cell
 from ..errors import InputError, NonFiniteError, OrientationError, SimulationError, SingularJacobianError
 from ..tasks.measurement import Beyond, first_beyond
@@ -25,7 +26,7 @@ def measurement(q: ArrayLike, v: ArrayLike, shape: tuple[int, int]) -> np.ndarra
     """
     motion = np.empty((2, *shape))
     for row, name, value in zip(motion, "qv", (q, v), strict=True):
-        row[...] = _numbers(name, value, shape)
+        row[...] = numbers(name, value, shape)
     return motion
 
 
@@ -37,7 +38,7 @@ def check_limits(limits: ArrayLike | None, shape: tuple[int, int]) -> np.ndarray
     """
     if limits is None:
         return np.full(shape, np.inf)
-    array = _numbers("torque_limits", limits, shape).copy()
+    array = numbers("torque_limits", limits, shape)
     if not (array >= 0).all():
         raise InputError(
             f"expected numbers of at least 0, found {array[~(array >= 0)][0]:g}", subject="torque_limits"
@@ -80,18 +81,6 @@ def check_signals(cell: Cell, t: float, signals: Signals) -> None:
     if not np.isfinite(signals.epsilon).all():
         pair = int(np.argmin(np.isfinite(signals.epsilon).all(axis=1)))
         raise _undefined(cell, t, "synchronization error", int(cell.coupling.edges[pair].min()))
-
-
-def _numbers(name: str, value: ArrayLike, shape: tuple[int, int]) -> np.ndarray:
-    try:
-        if value is None or np.asarray(value).dtype.kind in "USc":
-            raise TypeError
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"expected numbers, found {value!r}", subject=name) from error
-    if array.shape != shape:
-        raise InputError(f"expected shape {shape}, one row per robot, found {array.shape}", subject=name)
-    return array
 
 
 def _meaningless(cell: Cell, t: float, beyond: Beyond) -> SimulationError:
