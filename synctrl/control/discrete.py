@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike
 from ..checks import boolean, choice, finite_array, finite_number, instance, positive_number
 from ..coupling.cell import Reference
 from ..errors import InputError, ResultError
+from .adaptation_check import check_adaptation
 from .controller import Controller, Signals
-from .measured import check_limits, check_signals, measurement, not_finite
+from .measured import check_limits, check_signals, gravity_torque, measurement, not_finite
 from .messages import Messages
 from .state_file import read_state, write_state
 
@@ -59,7 +60,8 @@ class DiscreteController:
         signals: what the last sample computed, or None before the first.
 
     Raises:
-        InputError: a period that is not positive, limits of another shape, an unknown word.
+        InputError: a period that is not positive, limits of another shape, an unknown word, or an adaptation
+            whose arrays do not fit.
     """
 
     def __init__(
@@ -72,6 +74,7 @@ class DiscreteController:
         faults: str = "error",
     ):
         instance("controller", controller, Controller, "a Controller")
+        check_adaptation(controller)
         self.controller, self.cell = controller, controller.cell
         self.period = positive_number("period", period)
         self.include_gravity = boolean("include_gravity", include_gravity)
@@ -280,17 +283,11 @@ class DiscreteController:
     def _advance(self, q: np.ndarray, memory: np.ndarray, signals: Signals, missed: int = 0) -> None:
         """Keep what is commanded, and what will be known at the next sample; or nothing, if a part fails."""
         tau = np.clip(signals.tau, -self._limits, self._limits)
-        tau = tau if self.include_gravity else tau - self._gravity(q)
+        tau = tau if self.include_gravity else tau - gravity_torque(self.cell, q)
         z = self.controller.adaptation.settle(self.z + self.period * signals.z_dot)
         self._tau, self.z, self.signals = tau, z, signals
         self.memory = memory + self.period * signals.memory_dot
         self._samples, self.held = self._samples + missed + 1, self.held + missed
-
-    def _gravity(self, q: np.ndarray) -> np.ndarray:
-        g = np.zeros(self._shape)
-        for row, robot, q_i in zip(g, self.cell.robots, q, strict=True):
-            row[: robot.nv] = robot.gravity(q_i[: robot.nv])
-        return g
 
 
 def _count(name: str, value: float) -> int:

@@ -83,6 +83,14 @@ def check_signals(cell: Cell, t: float, signals: Signals) -> None:
         raise _undefined(cell, t, "synchronization error", int(cell.coupling.edges[pair].min()))
 
 
+def gravity_torque(cell: Cell, q: np.ndarray) -> np.ndarray:
+    """Torque of gravity as the robots' descriptions have it, (n, nv), N·m, at joint positions q, (n, nv)."""
+    g = np.zeros(q.shape)
+    for row, robot, q_i in zip(g, cell.robots, q, strict=True):
+        row[: robot.nv] = robot.gravity(q_i[: robot.nv])
+    return g
+
+
 def _meaningless(cell: Cell, t: float, beyond: Beyond) -> SimulationError:
     """The error with which a simulation stops there too."""
     name, i, value, limit = beyond
