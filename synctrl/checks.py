@@ -93,7 +93,7 @@ def non_negative_number(name: str, value: object) -> float:
 
 def count(name: str, value: object, least: int = 1) -> int:
     """`value` as a whole number of at least `least`."""
-    instance(name, value, int, "a whole number")
+    instance(name, value, (int, np.integer), "a whole number")
     if isinstance(value, bool) or value < least:  # type: ignore[operator]
         raise InputError(
             f"expected a whole number of at least {least}, found {value!r}", subject=name, found=value

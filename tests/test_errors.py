@@ -10,6 +10,7 @@ from synctrl import (
     AxisRotation,
     CartesianSpace,
     Circle,
+    Coupling,
     FunctionTrajectory,
     Hold,
     JointSpace,
@@ -53,11 +54,13 @@ ARGUMENTS = {
     "robots": lambda: SynchronizationFunction(np.add, 1, 1),
     "A_dot, A_ddot": lambda: SynchronizationFunction.from_matrices([1, -1], 1, A_dot=np.zeros),
     "trajectories": lambda: SynchronizationFunction.from_matrices([1, -1], 1).coupling([Hold([0])], 1.0),
+    "edges": lambda: Coupling(2, [(0, 1e300)], [(1, 1)], [1, 1]),
     "joint space": lambda: JointSpace().bind([ARM, load_robot("wheel")]),
     "CartesianSpace('xyz')": lambda: CartesianSpace("xyz").bind([ARM]),
 }
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(("subject", "make"), ARGUMENTS.items(), ids=ARGUMENTS)
 def test_a_refusal_names_the_argument_and_begins_its_message_with_it(subject, make):
     with refused(SynctrlError, subject) as caught:
@@ -70,6 +73,11 @@ def test_a_check_says_which_argument_is_at_fault_and_begins_its_message_with_it(
     with refused(InputError, "dt", found=found) as caught:
         check(*arguments)
     assert str(caught.value).startswith("dt: expected ")
+
+
+@pytest.mark.parametrize("whole", [3, np.int64(3), np.uint8(3)])
+def test_a_whole_number_of_numpy_counts_as_one(whole):
+    assert (checks.count("dt", whole), checks.index("dt", whole, 4)) == (3, 3)
 
 
 def test_an_error_about_no_part_alone_has_its_message_and_no_subject():
