@@ -19,6 +19,22 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | No
     Raises:
         InputError: not numbers, another shape, or not finite.
     """
+    array = numbers(name, value, shape)
+    if not np.isfinite(array).all():
+        where = np.argwhere(~np.isfinite(array))[0]
+        entry = f" at index {tuple(int(k) for k in where)}" if array.ndim else ""
+        found = array[tuple(where)]
+        raise InputError(f"expected finite numbers, found {found}{entry}", subject=name, found=float(found))
+    array.flags.writeable = False
+    return array
+
+
+def numbers(name: str, value: ArrayLike, shape: tuple[int | None, ...] | None = None) -> np.ndarray:
+    """`value` as a new float array of the given shape; whether its numbers are finite is not asked.
+
+    Raises:
+        InputError: not numbers, or another shape.
+    """
     try:
         if value is None or np.asarray(value).dtype.kind in "USc":  # neither "1" nor 1j is a number here
             raise TypeError
@@ -28,13 +44,20 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | No
     if shape is not None and not _fits(array.shape, shape):
         expected, found = _show(shape), _show(array.shape)
         raise InputError(f"expected shape {expected}, found {found}", subject=name, found=array.shape)
-    if not np.isfinite(array).all():
-        where = np.argwhere(~np.isfinite(array))[0]
-        entry = f" at index {tuple(int(k) for k in where)}" if array.ndim else ""
-        found = array[tuple(where)]
-        raise InputError(f"expected finite numbers, found {found}{entry}", subject=name, found=float(found))
-    array.flags.writeable = False
     return array
+
+
+def per_joint(name: str, value: ArrayLike, nv: int) -> np.ndarray:
+    """`value`, a number or one per joint, as a read-only float array, (nv,).
+
+    Raises:
+        InputError: not numbers, another shape, or not finite.
+    """
+    array = finite_array(name, value)
+    if array.shape not in ((), (nv,)):
+        expected, found = f"a number or shape ({nv},)", _show(array.shape)
+        raise InputError(f"expected {expected}, found {found}", subject=name, found=array.shape)
+    return np.broadcast_to(array, (nv,))
 
 
 def symmetric_matrix(name: str, value: ArrayLike, size: int) -> np.ndarray:
@@ -70,7 +93,7 @@ def non_negative_number(name: str, value: object) -> float:
 
 def count(name: str, value: object, least: int = 1) -> int:
     """`value` as a whole number of at least `least`."""
-    instance(name, value, int, "a whole number")
+    instance(name, value, (int, np.integer), "a whole number")
     if isinstance(value, bool) or value < least:  # type: ignore[operator]
         raise InputError(
             f"expected a whole number of at least {least}, found {value!r}", subject=name, found=value

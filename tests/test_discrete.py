@@ -32,7 +32,14 @@ from synctrl import (
     load_robot,
 )
 from synctrl.control.adaptation import Natural
-from synctrl.errors import InputError, NonFiniteError, ResultError, SingularJacobianError, SynctrlError
+from synctrl.errors import (
+    InputError,
+    NonFiniteError,
+    OrientationError,
+    ResultError,
+    SingularJacobianError,
+    SynctrlError,
+)
 from synctrl.experiments import (
     a460_full_pair,
     a460_pair,
@@ -45,6 +52,7 @@ from synctrl.experiments import (
 )
 from synctrl.simulation.plant import Plant
 from synctrl.simulation.result import LAYOUT
+from synctrl.tasks import rotations
 
 PERIOD = 4e-3
 
@@ -424,12 +432,35 @@ def test_a_singular_jacobian_is_an_error_as_in_a_simulation():
     assert all((controller.state[name] == array).all() for name, array in known.items())
 
 
+def test_an_orientation_error_near_half_a_turn_is_an_error_as_in_a_simulation():
+    experiment = ur5_payload()
+    controller, q, v = started(experiment=experiment)
+    controller.step(0.0, q, v)
+    known = controller.state
+    turned = experiment.cell.reference_table(np.array([PERIOD])).desired[0].copy()
+    R = rotations.exp(turned[0, 1, 3:])
+    turned[0, 1, 3:] = rotations.log(R @ rotations.exp(np.array([0.0, 0.0, 3.1])))
+    with refused(OrientationError, robot=1, time=PERIOD):
+        controller.step(PERIOD, q, v, turned)
+    assert all((controller.state[name] == array).all() for name, array in known.items())
+
+
 def test_a_torque_that_is_not_finite_is_an_error_and_changes_nothing():
     controller, q, v = started()
     controller.step(0.0, q, v)
     known = controller.state
     with refused(NonFiniteError, time=PERIOD):
         controller.step(PERIOD, q, np.full(v.shape, 1e300))
+    assert all((controller.state[name] == array).all() for name, array in known.items())
+
+
+def test_a_part_that_fails_when_the_torque_is_known_changes_nothing(monkeypatch):
+    controller, q, v = started("hold", learning(small(), Leaky(0.1, 0.1)))
+    controller.step(0.0, q, v)
+    known = controller.state
+    monkeypatch.setattr(controller.controller.adaptation, "settle", lambda z: z[:, 10_000])
+    with pytest.raises(IndexError):
+        controller.step(3 * PERIOD, q + 0.1, v)
     assert all((controller.state[name] == array).all() for name, array in known.items())
 
 

@@ -6,13 +6,28 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from synctrl import checks
-from synctrl.errors import InputError, RobotError
+from synctrl import (
+    AxisRotation,
+    CartesianSpace,
+    Circle,
+    Coupling,
+    FunctionTrajectory,
+    Hold,
+    JointSpace,
+    Redundancy,
+    SynchronizationFunction,
+    checks,
+    load_robot,
+)
+from synctrl.errors import InputError, RobotError, SynctrlError
+
+ARM = load_robot("planar2r")
 
 REFUSALS = {
     "no numbers": (checks.finite_array, ("dt", "1"), None),
     "another shape": (checks.finite_array, ("dt", [1.0, 2.0], (3,)), (2,)),
     "not finite": (checks.finite_array, ("dt", [1.0, np.inf]), np.inf),
+    "not one per joint": (checks.per_joint, ("dt", [1.0, 2.0], 3), (2,)),
     "not symmetric": (checks.symmetric_matrix, ("dt", [[1.0, 2.0], [0.0, 1.0]], 2), None),
     "no number": (checks.finite_number, ("dt", True), None),
     "not above zero": (checks.positive_number, ("dt", -0.5), -0.5),
@@ -26,12 +41,43 @@ REFUSALS = {
     "two lines": (checks.label, ("dt", "a\nb"), None),
 }
 
+#: a refusal for every argument that parts of a cell are made of
+ARGUMENTS = {
+    "axes": lambda: CartesianSpace("xw"),
+    "redundancy, weights": lambda: Redundancy(weights=[-1.0, 1.0]).spread([ARM]),
+    "redundancy, posture": lambda: Redundancy(posture=[]).spread([ARM]),
+    "start": lambda: AxisRotation(2 * np.eye(3), (0, 0, 1), Hold([0.0])),
+    "center": lambda: Circle([0.0], 1.0, 1.0),
+    "first, second": lambda: Circle([0.0, 0.0], 1.0, 1.0, first=[1.0, 1.0]),
+    "position": lambda: FunctionTrajectory(lambda t: [np.nan], lambda t: [0.0], lambda t: [0.0]),
+    "function": lambda: SynchronizationFunction(3, 2, 1),
+    "robots": lambda: SynchronizationFunction(np.add, 1, 1),
+    "A_dot, A_ddot": lambda: SynchronizationFunction.from_matrices([1, -1], 1, A_dot=np.zeros),
+    "trajectories": lambda: SynchronizationFunction.from_matrices([1, -1], 1).coupling([Hold([0])], 1.0),
+    "edges": lambda: Coupling(2, [(0, 1e300)], [(1, 1)], [1, 1]),
+    "joint space": lambda: JointSpace().bind([ARM, load_robot("wheel")]),
+    "CartesianSpace('xyz')": lambda: CartesianSpace("xyz").bind([ARM]),
+}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("subject", "make"), ARGUMENTS.items(), ids=ARGUMENTS)
+def test_a_refusal_names_the_argument_and_begins_its_message_with_it(subject, make):
+    with refused(SynctrlError, subject) as caught:
+        make()
+    assert str(caught.value).startswith(f"{subject}: ")
+
 
 @pytest.mark.parametrize(("check", "arguments", "found"), REFUSALS.values(), ids=REFUSALS)
 def test_a_check_says_which_argument_is_at_fault_and_begins_its_message_with_it(check, arguments, found):
     with refused(InputError, "dt", found=found) as caught:
         check(*arguments)
     assert str(caught.value).startswith("dt: expected ")
+
+
+@pytest.mark.parametrize("whole", [3, np.int64(3), np.uint8(3)])
+def test_a_whole_number_of_numpy_counts_as_one(whole):
+    assert (checks.count("dt", whole), checks.index("dt", whole, 4)) == (3, 3)
 
 
 def test_an_error_about_no_part_alone_has_its_message_and_no_subject():

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pinocchio as pin
 import pytest
 from flows import derivative, desired_flow, joint_flow, tumbling
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from refusals import refused
 
 from synctrl import (
     Attached,
@@ -166,6 +169,29 @@ def test_pose_trajectories_of_many_times_are_those_of_each_time(seed):
         for trajectory in (body, Attached(body, [1, 2, 3], exp(np.ones(3)))):
             for part, rows in zip(trajectory(t), zip(*map(trajectory, t), strict=True), strict=True):
                 np.testing.assert_allclose(part, rows, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["fixed", "between", "steady"])
+def test_turns_about_an_axis_can_be_sent_to_another_process(name):
+    turn = orientations(3)[name]
+    times = np.linspace(0.0, 3.0, 7)
+    for one, other in zip(turn(times), pickle.loads(pickle.dumps(turn))(times), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize(
+    ("subject", "make"),
+    {
+        "angle": lambda: AxisRotation(np.eye(3), (0, 0, 1), 0.3),
+        "position": lambda: PoseTrajectory([0.0, 0.0, 0.0]),
+        "orientation": lambda: PoseTrajectory(Hold([0, 0, 0]), np.eye(3)),
+        "rotation": lambda: FunctionOrientation(np.eye(3), np.zeros(3), np.zeros(3)),
+        "breaks": lambda: FunctionOrientation(lambda t: np.eye(3), np.zeros, np.zeros, ["soon"]),
+    }.items(),
+)
+def test_what_is_no_part_of_a_pose_trajectory_is_refused_by_name(subject, make):
+    with refused(InputError, subject):
+        make()
 
 
 def test_malformed_pose_trajectories_are_refused():

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from synctrl import CartesianSpace, Damping, PoseSpace, Redundancy, load_robot
 from synctrl.errors import InputError
+from synctrl.tasks.algebra import LAPACK
 from synctrl.tasks.redundancy import Inverse
 
 UR5, PANDA, PLANAR = load_robot("ur5"), load_robot("panda"), load_robot("planar2r")
@@ -178,12 +179,25 @@ def test_damped_reference_velocities_stay_bounded_through_a_singular_configurati
     assert np.isfinite(a_ref).all()
 
 
+def test_a_robot_whose_jacobian_is_no_number_leaves_the_damping_of_the_others_as_it_is():
+    A = np.random.default_rng(0).normal(size=(3, 2, 2))
+    A = A @ A.mT
+    whole = LAPACK.smallest(A)
+    A[1, 0, 1] = np.nan
+    for found, expected in zip(LAPACK.smallest(A), whole, strict=True):
+        assert np.isnan(found[1]).all()
+        np.testing.assert_array_equal(found[[0, 2]], expected[[0, 2]])
+
+
 def test_weights_and_postures_that_do_not_fit_are_refused_with_the_robot_named():
     cases = {
         Redundancy(posture=np.zeros(6)): "posture of 'panda'.*shape \\(7,\\), found \\(6,\\)",
         Redundancy(posture=[np.zeros(7)]): "expected 2 rows, one per robot, found 1",
         Redundancy(weights=-np.ones(7)): "expected numbers above 0, found -1",
         Redundancy(weights=3.0): "expected .* rows",
+        Redundancy(weights=np.array(3.0)): "expected .* rows",
+        Redundancy(posture=[]): "expected .* rows",
+        Redundancy(posture=np.zeros((0, 7))): "expected .* rows",
     }
     for wrong, message in cases.items():
         with pytest.raises(InputError, match=message):

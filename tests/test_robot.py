@@ -382,3 +382,11 @@ def test_a_frame_that_is_missing_is_the_same_error_in_another_process():
     error = pickle.loads(pickle.dumps(FrameNotFound("arm", "tipp", ["tip", "base"])))
     assert (error.robot, error.frame, error.available) == ("arm", "tipp", ("tip", "base"))
     assert "did you mean 'tip'" in str(error)
+
+
+@pytest.mark.parametrize("armature", [[0.1], [0.1, 0.1, 0.1], np.zeros((2, 2)), -0.1, [0.1, np.nan], None])
+def test_rotors_are_one_number_or_one_per_joint_of_at_least_0(armature):
+    robot = load_robot("planar2r")
+    with refused(InputError, "armature"):
+        robot.with_armature(armature)
+    assert (robot.with_armature(0.1).armature == robot.with_armature([0.1, 0.1]).armature).all()

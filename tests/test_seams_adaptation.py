@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from seams.leaky_adaptation import Leaky
 
-from synctrl import Experiment, Result
+from synctrl import Controller, DiscreteController, Experiment, Result
 from synctrl.analysis.certify import certify
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.control.adaptation import Gradient, Natural
@@ -164,6 +164,10 @@ def test_arrays_that_do_not_fit_are_refused_with_the_adaptation_before_anything_
 
     with pytest.raises(InputError, match=f"adaptation BoundLeaky, {says}"):
         with_adaptation(a460_pair(), Unfit(0.3, 0.1))
+    pair = a460_pair()
+    controller = Controller(pair.cell, pair.gains.replace(Gamma=None), adaptation=Unfit(0.3, 0.1))
+    with pytest.raises(InputError, match=f"adaptation BoundLeaky, {says}"):
+        DiscreteController(controller, 1e-3)
 
 
 class Clipped(Leaky):

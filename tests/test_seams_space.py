@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from refusals import refused
 from seams.degrees import DEGREES, BoundDegrees, Degrees
 
 from synctrl import (
@@ -145,6 +146,14 @@ def test_what_a_space_calls_invalid_ends_the_run_in_its_own_words(options):
     assert stop.value.time == pytest.approx(whole.t[beyond][0])
     assert stop.value.robot == int(np.abs(whole.x[beyond][0]).max(axis=1).argmax())
     assert len(stop.value.result.t) == np.argmax(beyond)
+
+
+def test_a_digital_controller_refuses_what_a_space_calls_invalid():
+    controller = experiment(Narrow(1.0)).controller(1e-3)
+    q, v = controller.cell.q0, controller.cell.v0
+    controller.reset(0.0, q, v)
+    with refused(SimulationError, time=0.0, robot=0):
+        controller.step(0.0, q, v)
 
 
 def test_a_space_that_finds_nothing_invalid_changes_nothing():

@@ -8,6 +8,7 @@ from cells import smooth_motion
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import seeds
+from refusals import refused
 
 from synctrl import Coupling, Cubic, FunctionOrientation, SmoothOrientation, SmoothTrajectory
 from synctrl.coupling.weights import SmoothWeights
@@ -129,6 +130,12 @@ def test_weights_alone_are_enough_for_a_coupling() -> None:
     expected = Coupling.pair(known).weights(TIMES, 2)
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-6)
+
+
+def test_smooth_weights_for_another_number_of_coordinates_are_refused() -> None:
+    coupling = Coupling.pair(SmoothWeights.from_function(lambda t: [1.0, -2.0 - np.sin(t)], 2.0, 3))
+    with refused(CouplingError, "c"):
+        coupling.weights(TIMES, 2)
 
 
 def test_weights_that_have_no_derivatives_are_refused() -> None:

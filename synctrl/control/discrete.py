@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike
 from ..checks import boolean, choice, finite_array, finite_number, instance, positive_number
 from ..coupling.cell import Reference
 from ..errors import InputError, ResultError
+from .adaptation_check import check_adaptation
 from .controller import Controller, Signals
-from .measured import check_limits, check_signals, measurement, not_finite
+from .measured import check_limits, check_signals, gravity_torque, measurement, not_finite
 from .messages import Messages
 from .state_file import read_state, write_state
 
@@ -59,7 +60,8 @@ class DiscreteController:
         signals: what the last sample computed, or None before the first.
 
     Raises:
-        InputError: a period that is not positive, limits of another shape, an unknown word.
+        InputError: a period that is not positive, limits of another shape, an unknown word, or an adaptation
+            whose arrays do not fit.
     """
 
     def __init__(
@@ -72,6 +74,7 @@ class DiscreteController:
         faults: str = "error",
     ):
         instance("controller", controller, Controller, "a Controller")
+        check_adaptation(controller)
         self.controller, self.cell = controller, controller.cell
         self.period = positive_number("period", period)
         self.include_gravity = boolean("include_gravity", include_gravity)
@@ -111,9 +114,9 @@ class DiscreteController:
         Raises:
             InputError: another shape, or a time that is no number; and, unless faults are held, a measurement
                 that is not finite, a time that is early or runs backwards, or a missed period.
-            SingularJacobianError: a Jacobian with a larger condition number than the cell's space allows.
+            SingularJacobianError, OrientationError: as in a simulation, which ends here.
             NonFiniteError: the law has no finite torque here.
-            SimulationError: a desired motion or weight of the user's fails.
+            SimulationError: a space of the user's ends the run, or a motion or weight of theirs fails.
         """
         time, motion = self._time(t), measurement(q, v, self._shape)
         wanted = None if desired is None else finite_array("desired", desired, (3, self.cell.n, self.cell.m))
@@ -126,8 +129,7 @@ class DiscreteController:
             memory = self._heard(reference, motion, self._samples + missed)
             signals = self.controller.unchecked(reference, motion, self.z, memory)
         check_signals(self.cell, time, signals)
-        self._samples, self.held = self._samples + missed, self.held + missed
-        self._advance(motion[0], memory, signals)
+        self._advance(motion[0], memory, signals, missed)
         return self._tau.copy()
 
     def sample(self, t: float, motion: np.ndarray) -> Signals:
@@ -207,7 +209,7 @@ class DiscreteController:
         try:
             self.state = found
         except InputError as error:
-            raise ResultError(f"'{path}' has no state of this controller: {error}") from error
+            raise ResultError(f"'{path}' has no state of this controller: {error}", file=path) from error
 
     @property
     def sync_integral(self) -> np.ndarray:
@@ -278,19 +280,14 @@ class DiscreteController:
         """Before this time a message is due with a sample or with one before; roundings do not matter."""
         return self._t0 + (sample + GRID) * self.period
 
-    def _advance(self, q: np.ndarray, memory: np.ndarray, signals: Signals) -> None:
-        """Keep what is commanded, and what will be known at the next sample."""
+    def _advance(self, q: np.ndarray, memory: np.ndarray, signals: Signals, missed: int = 0) -> None:
+        """Keep what is commanded, and what will be known at the next sample; or nothing, if a part fails."""
         tau = np.clip(signals.tau, -self._limits, self._limits)
-        self._tau = tau if self.include_gravity else tau - self._gravity(q)
-        self.z = self.controller.adaptation.settle(self.z + self.period * signals.z_dot)
+        tau = tau if self.include_gravity else tau - gravity_torque(self.cell, q)
+        z = self.controller.adaptation.settle(self.z + self.period * signals.z_dot)
+        self._tau, self.z, self.signals = tau, z, signals
         self.memory = memory + self.period * signals.memory_dot
-        self._samples, self.signals = self._samples + 1, signals
-
-    def _gravity(self, q: np.ndarray) -> np.ndarray:
-        g = np.zeros(self._shape)
-        for row, robot, q_i in zip(g, self.cell.robots, q, strict=True):
-            row[: robot.nv] = robot.gravity(q_i[: robot.nv])
-        return g
+        self._samples, self.held = self._samples + missed + 1, self.held + missed
 
 
 def _count(name: str, value: float) -> int:

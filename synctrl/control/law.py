@@ -19,23 +19,14 @@ itself, and its derivative. For a pair or ring these are the sums over the robot
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..tasks.spaces import BoundSpace
 from .laws import Asked
 
 Array = np.ndarray
-
-
-class TaskMaps(Protocol):
-    """The ways from task space to joint space, as a `BoundSpace` has them."""
-
-    def to_joints(self, task: Any, xref_dot: Array, xref_ddot: Array) -> tuple[Array, Array]:
-        """v_ref and a_ref, (n, nv), of a reference velocity and acceleration in task space, (n, m)."""
-
-    def to_torque(self, task: Any, force: Array) -> Array:
-        """Joint torques, (n, nv), of forces in task space, (n, m)."""
 
 
 class JointCommand(NamedTuple):
@@ -61,7 +52,7 @@ def compute_weighted_errors(c: Array, c_dot: Array, error: Array) -> Array:
 
 
 def compute_joint_command(
-    asked: Asked, task: Any, v: Array, space: TaskMaps, K_r: Array, k_r_space: str
+    asked: Asked, task: Any, v: Array, space: BoundSpace, K_r: Array, k_r_space: str
 ) -> JointCommand:
     """Reference motion of the joints, and K_r s_q + J^T f, the last two terms of (13) and (32).
 

@@ -5,9 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..checks import numbers
 from ..coupling.cell import Cell
-from ..errors import InputError, NonFiniteError, SingularJacobianError
+from ..errors import InputError, NonFiniteError, OrientationError, SimulationError, SingularJacobianError
+from ..tasks.measurement import Beyond, first_beyond
 from .controller import Signals
+
+#: what the package's spaces watch: the kind of error, and what it is about
+_ENDS = {
+    "condition": (SingularJacobianError, "condition number of the Jacobian"),
+    "orientation": (OrientationError, "orientation error"),
+}
 
 
 def measurement(q: ArrayLike, v: ArrayLike, shape: tuple[int, int]) -> np.ndarray:
@@ -18,7 +26,7 @@ def measurement(q: ArrayLike, v: ArrayLike, shape: tuple[int, int]) -> np.ndarra
     """
     motion = np.empty((2, *shape))
     for row, name, value in zip(motion, "qv", (q, v), strict=True):
-        row[...] = _numbers(name, value, shape)
+        row[...] = numbers(name, value, shape)
     return motion
 
 
@@ -30,7 +38,7 @@ def check_limits(limits: ArrayLike | None, shape: tuple[int, int]) -> np.ndarray
     """
     if limits is None:
         return np.full(shape, np.inf)
-    array = _numbers("torque_limits", limits, shape).copy()
+    array = numbers("torque_limits", limits, shape)
     if not (array >= 0).all():
         raise InputError(
             f"expected numbers of at least 0, found {array[~(array >= 0)][0]:g}", subject="torque_limits"
@@ -59,9 +67,13 @@ def check_signals(cell: Cell, t: float, signals: Signals) -> None:
 
     Raises:
         SingularJacobianError: a Jacobian with a larger condition number than the cell's space allows.
+        OrientationError: an orientation error so large that its direction is about to be undefined.
+        SimulationError: something else by which the space says that its coordinates mean nothing.
         NonFiniteError: a torque, or a rate of an estimate or integral, that is not finite.
     """
-    _check_jacobians(cell, t, signals)
+    beyond = first_beyond(cell.task, signals.task)
+    if beyond is not None:
+        raise _meaningless(cell, t, beyond)
     for what, rows in (("torque", signals.tau), ("rate of the estimates", signals.z_dot)):
         bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
         if bad.size:
@@ -71,33 +83,24 @@ def check_signals(cell: Cell, t: float, signals: Signals) -> None:
         raise _undefined(cell, t, "synchronization error", int(cell.coupling.edges[pair].min()))
 
 
-def _numbers(name: str, value: ArrayLike, shape: tuple[int, int]) -> np.ndarray:
-    try:
-        if value is None or np.asarray(value).dtype.kind in "USc":
-            raise TypeError
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"expected numbers, found {value!r}", subject=name) from error
-    if array.shape != shape:
-        raise InputError(f"expected shape {shape}, one row per robot, found {array.shape}", subject=name)
-    return array
+def gravity_torque(cell: Cell, q: np.ndarray) -> np.ndarray:
+    """Torque of gravity as the robots' descriptions have it, (n, nv), N·m, at joint positions q, (n, nv)."""
+    g = np.zeros(q.shape)
+    for row, robot, q_i in zip(g, cell.robots, q, strict=True):
+        row[: robot.nv] = robot.gravity(q_i[: robot.nv])
+    return g
 
 
-def _check_jacobians(cell: Cell, t: float, signals: Signals) -> None:
-    """As a simulation stops there, by the Frobenius norm."""
-    limit = getattr(cell.task, "limits", {}).get("condition")
-    if limit is None:
-        return
-    condition = signals.task.condition[:, 0]
-    good = condition < limit
-    if not good.all():
-        i = int(np.argmin(good))
-        raise SingularJacobianError(
-            f"the Jacobian of {cell.names[i]} is singular at t = {t:g} s: its condition number is "
-            f"{condition[i]:.3g}, expected below {limit:g}; stop the robots and reset the controller",
-            time=t,
-            robot=i,
-        )
+def _meaningless(cell: Cell, t: float, beyond: Beyond) -> SimulationError:
+    """The error with which a simulation stops there too."""
+    name, i, value, limit = beyond
+    kind, what = _ENDS.get(name, (SimulationError, name))
+    return kind(
+        f"the {what} of {cell.names[i]} is {value:.3g} at t = {t:g} s, where {cell.space!r} expects it below "
+        f"{limit:g}; stop the robots and reset the controller",
+        time=t,
+        robot=i,
+    )
 
 
 def _undefined(cell: Cell, t: float, what: str, robot: int) -> NonFiniteError:

@@ -53,8 +53,8 @@ def _named(role: str, part: Any) -> Iterator[None]:
         raise
     except Exception as error:  # whatever a user's code raises
         raise InputError(
-            f"{role} {type(part).__qualname__}: expected one that works where there are no errors, found "
-            f"{type(error).__name__}: {error}"
+            f"expected one that works where there are no errors, found {type(error).__name__}: {error}",
+            subject=f"{role} {type(part).__qualname__}",
         ) from error
 
 
@@ -62,6 +62,6 @@ def _check_shapes(role: str, part: Any, parts: Mapping[str, tuple[Any, tuple[int
     for name, (value, shape) in parts.items():
         if np.shape(value) != shape:
             raise InputError(
-                f"{role} {type(part).__qualname__}, {name}: expected an array of shape {shape}, found "
-                f"{np.shape(value)}"
+                f"expected an array of shape {shape}, found {np.shape(value)}",
+                subject=f"{role} {type(part).__qualname__}, {name}",
             )

@@ -11,6 +11,8 @@ from ..checks import finite_array
 from ..errors import CouplingError, CouplingWarning, InputError, warn
 
 Edge = tuple[int, int]
+#: beyond it numbers are no longer those of robots, and may not fit an integer
+LARGEST = 2**31
 
 
 def cycle(n: int) -> list[Edge]:
@@ -65,12 +67,10 @@ def indices(name: str, value: np.ndarray) -> np.ndarray:
     Raises:
         InputError: numbers that are not whole.
     """
-    whole = value.astype(int)
-    if (whole != value).any():
-        raise InputError(
-            f"expected whole numbers of robots, found {value[whole != value][0]:g}", subject=name
-        )
-    return whole
+    wrong = (value != np.round(value)) | (np.abs(value) > LARGEST)
+    if wrong.any():
+        raise InputError(f"expected whole numbers of robots, found {value[wrong][0]:g}", subject=name)
+    return value.astype(int)
 
 
 def check_rows(name: str, n: int, edges: np.ndarray, signs: np.ndarray) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array, instance, label
+from ..checks import finite_array, instance, label, per_joint
 from ..errors import InputError
 from ..robots.friction import Friction
 from ..robots.robot import Robot
@@ -105,9 +105,5 @@ def check_friction(name: str, friction: Any, robot: Robot) -> None:
         InputError: no Friction, or coefficients for another number of joints.
     """
     instance(f"{name}, friction", friction, Friction, "a Friction")
-    for part, coefficients in (("viscous", friction.viscous), ("coulomb", friction.coulomb)):
-        if coefficients.shape not in ((), (robot.nv,)):
-            raise InputError(
-                f"expected a number or shape ({robot.nv},), found {coefficients.shape}",
-                subject=f"{name}, friction, {part}",
-            )
+    for part in ("viscous", "coulomb"):
+        per_joint(f"{name}, friction, {part}", getattr(friction, part), robot.nv)

@@ -58,8 +58,10 @@ def _motion(cell: Cell, robot: int, times: np.ndarray) -> Motion:
         parts = zip(MOTION_PARTS, cell.motion(robot, times), strict=True)
         return Motion(*(finite_array(part, value, (len(times), cell.m)) for part, value in parts))
     except InputError as error:
-        name, end = cell.names[robot], times.max()
-        raise TrajectoryError(f"{name}, trajectory, {error}, between t = 0 s and {end:g} s") from None
+        where, end = f"{cell.names[robot]}, trajectory", times.max()
+        failure = TrajectoryError(f"{where}, {error}, between t = 0 s and {end:g} s")
+        failure.subject, failure.found = where, error.found
+        raise failure from None
 
 
 def _error(cell: Cell, name: str, order: int, misfit: Misfit) -> TrajectoryError:

@@ -45,11 +45,13 @@ class SynchronizationFunction:
 
     def __init__(self, function: Callable[..., ArrayLike], robots: int, dimension: int, unit: str = ""):
         if not callable(function):
-            raise InputError(f"function: expected f(x_1, ..., x_n, t), found {type(function).__name__}")
+            raise InputError(
+                f"expected f(x_1, ..., x_n, t), found {type(function).__name__}", subject="function"
+            )
         for name, value, lowest in (("robots", robots, 2), ("dimension", dimension, 1)):
             instance(name, value, (int, np.integer), "a whole number")
             if value < lowest:
-                raise InputError(f"{name}: expected at least {lowest}, found {value}")
+                raise InputError(f"expected at least {lowest}, found {value}", subject=name, found=value)
         self.function, self.unit = function, unit
         self.robots, self.dimension = int(robots), int(dimension)
         self._matrices: MatrixFunction | None = None
@@ -76,7 +78,7 @@ class SynchronizationFunction:
             unit: unit of A.
         """
         if (A_dot is None) != (A_ddot is None):
-            raise InputError("A_dot, A_ddot: expected both or none, found one")
+            raise InputError("expected both or none, found one", subject="A_dot, A_ddot")
         A_of_t, b_of_t = _as_function(A), _as_function(b)
         robots = np.atleast_1d(finite_array("A", A_of_t(0.0))).shape[0]
 
@@ -190,7 +192,7 @@ class SynchronizationFunction:
     def _couple(self, source: WeightSource, graph: GraphLike | None) -> Coupling:
         if graph is not None:
             if not callable(graph):
-                raise InputError(f"graph: expected, for example, Coupling.ring, found {graph!r}")
+                raise InputError(f"expected, for example, Coupling.ring, found {graph!r}", subject="graph")
             coupling = graph(self.robots, c=source, unit=self.unit)
         elif self.robots == 2:
             coupling = Coupling.pair(source, self.unit)
@@ -205,8 +207,8 @@ class SynchronizationFunction:
         """Desired positions, (T, n, m)."""
         instance("trajectories", trajectories, Sequence, "one for each robot")
         if len(trajectories) != self.robots:
-            found = len(trajectories)
-            raise InputError(f"trajectories: expected one for each of {self.robots} robots, found {found}")
+            expected = f"expected one for each of {self.robots} robots"
+            raise InputError(f"{expected}, found {len(trajectories)}", subject="trajectories")
         coordinates = tuple(f"coordinate {k}" for k in range(1, self.dimension + 1))
         for i, trajectory in enumerate(trajectories, start=1):
             check_trajectory(f"robot {i}", trajectory, coordinates)

@@ -158,6 +158,11 @@ class SmoothWeights:
         return cls(smooth)
 
     def at(self, times: np.ndarray, m: int) -> Weights:
+        made_for = self._c.shape[-1]
+        if made_for != m:
+            raise CouplingError(
+                f"expected weights for {m} coordinates, found some for {made_for}", subject="c"
+            )
         outside = self._c.first_outside(times)
         if outside is not None:
             raise CouplingError(

@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from ..checks import boolean, instance
+from ..checks import boolean, instance, per_joint
 from ..errors import InputError
 from .friction import Friction
 from .parameters import FullParameters, Parameters
@@ -103,7 +103,8 @@ class FrictionParameters:
         return with_friction_columns(Y_b, v, v_ref, a_ref, self.smoothing, self.armature)
 
     def _true_values(self, friction: Friction) -> np.ndarray:
-        parts = [_spread(self.robot, name, getattr(friction, name)) for name in ("viscous", "coulomb")]
+        names = "viscous", "coulomb"
+        parts = [per_joint(f"friction, {name}", getattr(friction, name), self.robot.nv) for name in names]
         return np.concatenate([self.base.theta, *parts, *([self.robot.armature] if self.armature else [])])
 
 
@@ -142,11 +143,3 @@ def _unknown() -> InputError:
         "that has it, whose `theta` are then the true values",
         subject="friction",
     )
-
-
-def _spread(robot: Robot, name: str, value: np.ndarray) -> np.ndarray:
-    if value.shape not in ((), (1,), (robot.nv,)):
-        raise InputError(
-            f"expected a number or shape ({robot.nv},), found {value.shape}", subject=f"friction, {name}"
-        )
-    return np.broadcast_to(value, (robot.nv,)).copy()

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, instance
+from ..checks import finite_array, instance, per_joint
 from ..errors import FrameNotFound, InputError
 from .catalog import load_description
 from .model_checks import check_inertia, check_joints, check_numbering
@@ -122,9 +122,9 @@ class Robot:
             armature: rotor inertia times the square of the gear ratio, number or (nv,), kg·m^2.
 
         Raises:
-            InputError: a value below 0.
+            InputError: another size, not finite, or a value below 0.
         """
-        values = np.broadcast_to(finite_array("armature", armature), (self.nv,))
+        values = per_joint("armature", armature, self.nv)
         if values.min() < 0:
             raise InputError(f"expected at least 0 kg·m^2, found {values.min():g}", subject="armature")
         model = pin.Model(self.model)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from math import isfinite
 from typing import Any, NamedTuple, cast
 
@@ -10,8 +10,10 @@ import numpy as np
 
 from ..coupling.cell import Cell
 from ..errors import NonFiniteError, OrientationError, SimulationError, SingularJacobianError
+from ..tasks.measurement import first_beyond
+from ..tasks.measurement import limits_of as limits_of
 from ..tasks.pose import MAX_ANGLE
-from ..tasks.spaces import BoundSpace, Measurement
+from ..tasks.spaces import Measurement
 from .advance import Sample
 from .closed_loop import ClosedLoop
 
@@ -33,11 +35,6 @@ class Finding(NamedTuple):
     value: float = 0.0
 
 
-def limits_of(space: BoundSpace) -> Mapping[str, float]:
-    """Names and limits of what a space watches, in the order in which a guard looks at them."""
-    return getattr(space, "limits", {})
-
-
 def checks(watched: Iterable[str]) -> tuple[str, ...]:
     """What a guard may find, in the order in which it looks; driver.c counts them from 1."""
     return ("state", *watched, "side", "torque")
@@ -52,7 +49,6 @@ class Guard:
 
     def __init__(self, loop: ClosedLoop):
         self._loop, self._space = loop, cast(Any, loop.cell.task)
-        self._limits = limits_of(self._space)
         self._has_sides, self._sides = hasattr(self._space, "sides"), np.zeros((loop.cell.n, 1))
         self._v = np.zeros((loop.cell.n, loop.cell.nv))
 
@@ -83,14 +79,8 @@ class Guard:
 
     def _beyond(self, task: Measurement) -> Finding | None:
         """The first number that has reached its limit, or is none."""
-        if not self._limits:
-            return None
-        values = self._space.watched(task)
-        beyond = ~(values < [*self._limits.values()])
-        if not beyond.any():
-            return None
-        check, robot = divmod(int(beyond.T.argmax()), len(values))
-        return Finding([*self._limits][check], robot, float(values[robot, check]))
+        found = first_beyond(self._space, task)
+        return None if found is None else Finding(found.name, found.robot, found.value)
 
     def _crossed(self, task: Measurement) -> Finding | None:
         """The first robot on the other side of a singular configuration than at the instant before."""

@@ -45,10 +45,11 @@ def _determinant(A: np.ndarray) -> np.ndarray:
 
 
 def _smallest(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    if not np.isfinite(A).all():
-        return np.full((*A.shape[:-2], 1), np.nan), np.full(A.shape[:-1], np.nan)
-    values, vectors = np.linalg.eigh(A)
-    return values[..., :1], vectors[..., 0]
+    """NaN only for the matrices that are not finite, so that the run's guard can name the robot."""
+    finite = np.isfinite(A).all(axis=(-2, -1), keepdims=True)
+    values, vectors = np.linalg.eigh(np.where(finite, A, 0.0))
+    found = finite[..., 0]
+    return np.where(found, values[..., :1], np.nan), np.where(found, vectors[..., 0], np.nan)
 
 
 #: of numbers

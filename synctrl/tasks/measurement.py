@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,6 +48,46 @@ class Measurement:
     def condition(self) -> np.ndarray:
         """Condition numbers of the Jacobians by the Frobenius norm, (..., 1)."""
         return np.sqrt(_sum_of_squares(self.J) * _sum_of_squares(self.J_inv))
+
+
+def limits_of(space: Any) -> Mapping[str, float]:
+    """Names and limits of what a `BoundSpace` watches, in the order in which they are looked at."""
+    return getattr(space, "limits", {})
+
+
+class Beyond(NamedTuple):
+    """A number of a robot that makes its task coordinates mean nothing.
+
+    Attributes:
+        name: what it is, as the space calls it.
+        robot: index of the robot, counted from 0.
+        value: the number, NaN if it is none.
+        limit: what it should have been below.
+    """
+
+    name: str
+    robot: int
+    value: float
+    limit: float
+
+
+def first_beyond(space: Any, task: Measurement) -> Beyond | None:
+    """The first number that has reached its limit, or is none, in the order of the space's limits.
+
+    Args:
+        space: a `BoundSpace`; one without `limits` has nothing to look at.
+        task: what it measured.
+    """
+    limits = limits_of(space)
+    if not limits:
+        return None
+    values = space.watched(task)
+    beyond = ~(values < [*limits.values()])
+    if not beyond.any():
+        return None
+    k, robot = divmod(int(beyond.T.argmax()), len(values))
+    name, limit = [*limits.items()][k]
+    return Beyond(name, robot, float(values[robot, k]), limit)
 
 
 def _sum_of_squares(A: Any) -> np.ndarray:

@@ -8,7 +8,7 @@ derivative of the rotation vector.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, finite_number, instance, positive_number
 from ..errors import InputError, TrajectoryError
 from . import rotations
-from .trajectories import Cubic, FunctionTrajectory, Hold, Motion, Trajectory
+from .trajectories import Cubic, Hold, Motion, Trajectory
 
 
 class Turning(NamedTuple):
@@ -47,16 +47,13 @@ class AxisRotation:
         angle: trajectory of one number, the angle, rad.
 
     Raises:
-        InputError: `start` is no rotation matrix, the axis is zero, or `angle` has another dimension.
+        InputError: `start` is no rotation matrix, the axis is zero, or `angle` no trajectory of one number.
     """
 
     def __init__(self, start: ArrayLike, axis: ArrayLike, angle: Trajectory):
         self.start = rotations.rotation_matrix("start", start)
         self.axis = _unit("axis", axis)
-        if angle.dimension != 1:
-            raise InputError(
-                f"expected a trajectory of 1 number, found one of {angle.dimension}", subject="angle"
-            )
+        _check_dimension("angle", angle, 1)
         self.angle = angle
         self.breaks = tuple(angle.breaks)
 
@@ -77,12 +74,24 @@ class AxisRotation:
     @classmethod
     def steady(cls, start: ArrayLike, axis: ArrayLike, speed: float) -> Self:
         """A turn at constant speed, rad/s."""
-        w = finite_number("speed", speed)
-        return cls(start, axis, FunctionTrajectory(lambda t: [w * t], lambda t: [w], lambda t: [0.0]))
+        return cls(start, axis, _SteadyAngle(finite_number("speed", speed)))
 
     def __call__(self, t: ArrayLike) -> Turning:
         angle, speed, growth = self.angle(t)
         return Turning(rotations.exp(angle * self.axis) @ self.start, speed * self.axis, growth * self.axis)
+
+
+class _SteadyAngle:
+    """The angle of a turn at constant speed, rad/s, from 0 on."""
+
+    dimension, breaks = 1, ()
+
+    def __init__(self, speed: float):
+        self.speed = speed
+
+    def __call__(self, t: ArrayLike) -> Motion:
+        angle = self.speed * np.asarray(t, dtype=float)[..., None]
+        return Motion(angle, np.full_like(angle, self.speed), np.zeros_like(angle))
 
 
 class FunctionOrientation:
@@ -96,6 +105,7 @@ class FunctionOrientation:
         breaks: instants at which a derivative jumps, s.
 
     Raises:
+        InputError: no functions, or breaks that are no numbers.
         TrajectoryError: not a rotation matrix, or not three finite numbers, at t = 0 or in a later call.
     """
 
@@ -107,7 +117,9 @@ class FunctionOrientation:
         breaks: tuple[float, ...] = (),
     ):
         self._functions = (rotation, velocity, acceleration)
-        self.breaks = tuple(finite_number("breaks", b) for b in breaks)
+        for name, function in zip(("rotation", "velocity", "acceleration"), self._functions, strict=True):
+            instance(name, function, Callable, "a function of time")  # type: ignore[arg-type]
+        self.breaks = tuple(finite_array("breaks", breaks, (None,)).tolist())
         self(0.0)
 
     def __call__(self, t: ArrayLike) -> Turning:
@@ -137,18 +149,19 @@ class PoseTrajectory:
         orientation: trajectory of the orientation; by default that of the world's axes.
 
     Raises:
-        InputError: a position trajectory of another dimension.
+        InputError: a position that is no trajectory of 3 numbers, or an orientation that is none.
     """
 
     dimension = 6
 
     def __init__(self, position: Trajectory, orientation: Orientation | None = None):
-        if position.dimension != 3:
-            raise InputError(
-                f"expected a trajectory of 3 numbers, found one of {position.dimension}", subject="position"
-            )
+        _check_dimension("position", position, 3)
         self.position = position
         self.orientation = AxisRotation.fixed(np.eye(3)) if orientation is None else orientation
+        if not callable(self.orientation) or not hasattr(self.orientation, "breaks"):
+            raise InputError(
+                f"expected an orientation such as AxisRotation, found {orientation!r}", subject="orientation"
+            )
         self.breaks = tuple(sorted({*position.breaks, *self.orientation.breaks}))
 
     def __call__(self, t: ArrayLike) -> Motion:
@@ -190,6 +203,15 @@ class Attached:
 def _pose_motion(position: Motion, turning: Turning) -> Motion:
     parts = (rotations.log(turning.R), turning.w, turning.w_dot)
     return Motion(*(np.concatenate(pair, axis=-1) for pair in zip(position, parts, strict=True)))
+
+
+def _check_dimension(name: str, trajectory: Any, m: int) -> None:
+    """Refuse what is no trajectory of m numbers."""
+    dimension = getattr(trajectory, "dimension", None)
+    if dimension != m:
+        numbers = f"{m} number{'s' * (m != 1)}"
+        found = repr(trajectory) if dimension is None else f"one of {dimension}"
+        raise InputError(f"expected a trajectory of {numbers}, found {found}", subject=name)
 
 
 def _unit(name: str, vector: ArrayLike) -> np.ndarray:

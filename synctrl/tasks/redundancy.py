@@ -64,7 +64,8 @@ class Redundancy:
         """
         weights = _rows("weights", self.weights, robots, 1.0)
         if any((row <= 0).any() for row in weights):
-            raise InputError(f"redundancy, weights: expected numbers above 0, found {min(map(min, weights))}")
+            lowest = min(map(min, weights))
+            raise InputError(f"expected numbers above 0, found {lowest}", subject="redundancy, weights")
         gain = 0.0 if self.posture is None else self.gain
         posture = _rows("posture", self.posture, robots, 0.0)
         gains = [np.full(robot.nv, gain) for robot in robots]
@@ -263,14 +264,14 @@ def _rows(name: str, value: ArrayLike | None, robots: Sequence[Robot], default: 
     """One (nv,) per robot, from one for all or a list of them."""
     if value is None:
         return [np.full(robot.nv, default) for robot in robots]
-    if not isinstance(value, (Sequence, np.ndarray)) or isinstance(value, str) or np.ndim(value[0]) > 1:
-        raise InputError(
-            f"redundancy, {name}: expected one row of numbers, or a list of rows, found {value!r}"
-        )
-    rows: Any = value if np.ndim(value[0]) else [value] * len(robots)
+    where = f"redundancy, {name}"
+    given: Any = list(value) if isinstance(value, np.ndarray) and value.ndim else value
+    if not isinstance(given, (list, tuple)) or not len(given) or np.ndim(given[0]) > 1:
+        raise InputError(f"expected one row of numbers, or a list of rows, found {value!r}", subject=where)
+    rows = given if np.ndim(given[0]) else [given] * len(robots)
     if len(rows) != len(robots):
-        raise InputError(f"redundancy, {name}: expected {len(robots)} rows, one per robot, found {len(rows)}")
+        raise InputError(f"expected {len(robots)} rows, one per robot, found {len(rows)}", subject=where)
     return [
-        finite_array(f"redundancy, {name} of '{robot.name}'", row, (robot.nv,))
+        finite_array(f"{where} of '{robot.name}'", row, (robot.nv,))
         for robot, row in zip(robots, rows, strict=True)
     ]

@@ -76,7 +76,7 @@ class SmoothOrientation:
             try:
                 return rotations.rotation_matrix("rotation", value)[None]
             except InputError as error:
-                raise TrajectoryError(f"orientation at t = {t:g} s: {error}") from error
+                raise TrajectoryError(f"{error}", subject=f"orientation at t = {t:g} s") from error
 
         self._function, self.breaks = _certified(matrices, duration, breaks)
         self.duration = self._function.duration

@@ -101,8 +101,9 @@ class JointSpace:
         if len(counts) != 1:
             found = ", ".join(f"'{robot.name}': {robot.nv}" for robot in robots)
             raise InputError(
-                f"joint space: expected robots with the same number of joints, found {found}; "
-                "synchronize such robots in Cartesian space"
+                f"expected robots with the same number of joints, found {found}; "
+                "synchronize such robots in Cartesian space",
+                subject="joint space",
             )
         return BoundJointSpace()
 
@@ -212,8 +213,9 @@ class TipSpace:
         for robot in robots:
             if robot.nv < self.m:
                 raise InputError(
-                    f"{self!r}: expected robots with at least {self.m} joints, "
-                    f"found robot '{robot.name}' with {robot.nv}"
+                    f"expected robots with at least {self.m} joints, "
+                    f"found robot '{robot.name}' with {robot.nv}",
+                    subject=repr(self),
                 )
         return self.over(Tips(robots), [[robot.nv] for robot in robots], self.redundancy.spread(robots))
 
@@ -262,7 +264,7 @@ class CartesianSpace(TipSpace):
         redundancy: Redundancy | None = None,
     ):
         if not isinstance(axes, str) or not axes or set(axes) - set(AXES) or len(set(axes)) != len(axes):
-            raise InputError(f"axes: expected different letters out of x, y, z, found {axes!r}")
+            raise InputError(f"expected different letters out of x, y, z, found {axes!r}", subject="axes")
         super().__init__(len(axes), max_condition, singularity, redundancy)
         self.axes = axes
         self.rows = [AXES.index(a) for a in axes]

@@ -140,7 +140,9 @@ class Circle:
         self.center = finite_array("center", center, (None,))
         self.dimension = m = self.center.size
         if m < 2:
-            raise TrajectoryError(f"center: a circle needs a task of at least 2 dimensions, found {m}")
+            raise TrajectoryError(
+                f"a circle needs a task of at least 2 dimensions, found {m}", subject="center"
+            )
         self.radius = positive_number("radius", radius)
         self.speed = finite_number("speed", speed)
         self.phase = finite_number("phase", phase)
@@ -149,7 +151,7 @@ class Circle:
         axes = np.array([self.first, self.second])
         if not np.allclose(axes @ axes.T, np.eye(2), atol=1e-9):
             raise TrajectoryError(
-                f"first, second: expected orthonormal axes, found {self.first} and {self.second}"
+                f"expected orthonormal axes, found {self.first} and {self.second}", subject="first, second"
             )
 
     def __call__(self, t: ArrayLike) -> Motion:
@@ -206,7 +208,9 @@ def finite_value(name: str, function: Callable, t: float, shape: tuple[int, ...]
     try:
         return finite_array(name, function(t), shape)
     except InputError as error:
-        raise TrajectoryError(f"{error} at t = {t:g} s") from error
+        failure = TrajectoryError(f"{error} at t = {t:g} s")
+        failure.subject, failure.found = name, error.found
+        raise failure from error
 
 
 def _times(factor: np.ndarray, vector: np.ndarray) -> np.ndarray:
