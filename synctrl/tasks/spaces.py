@@ -7,6 +7,7 @@ No formula asks what its numbers are: the compiled engine traces the same lines,
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
@@ -128,7 +129,7 @@ class BoundJointSpace:
         return force
 
 
-class BoundTipSpace:
+class BoundTipSpace(ABC):
     """Task coordinates that move with x' = J v; an inverse of J leads from the task to the joints.
 
     Args:
@@ -142,8 +143,8 @@ class BoundTipSpace:
         self._space, self._tips, self._inverse, self._square = space, tips, inverse, square
         self.limits, self.to_joints = space.limits, inverse.to_joints
 
-    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
-        raise NotImplementedError
+    @abstractmethod
+    def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement: ...
 
     def to_torque(self, task: Measurement, force: np.ndarray) -> np.ndarray:
         return np.matvec(task.J.mT, force)  # type: ignore[union-attr]
@@ -171,7 +172,7 @@ class BoundCartesianSpace(BoundTipSpace):
         return Measurement(moved, desired[:2] - moved, desired[1:], J, inversion.J_inv, J_dot, inversion)
 
 
-class TipSpace:
+class TipSpace(ABC):
     """What position and pose of the tip have in common: how joint motion follows from task motion.
 
     Args:
@@ -234,9 +235,9 @@ class TipSpace:
         inverse = inverse_map(bool(square.all()), self.damping, posture, algebra)
         return self.bound(self, tips, inverse, square)
 
+    @abstractmethod
     def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Error e, (m,), of one robot against a target, (m,), and the J, (m, nv), with e' = -J v."""
-        raise NotImplementedError
 
 
 class CartesianSpace(TipSpace):
