@@ -253,6 +253,13 @@ def test_all_that_damps_through_torque_that_is_held_counts_together_whatever_the
         assert own.longest == pytest.approx(HELD / sum(rate.rate for rate in damping))
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_law_that_drives_robots_apart_is_no_gain_and_keeps_no_cause_from_being_found(engine: str) -> None:
+    row = Row(lambda: small_with(Braking(-300.0)), "unstable", options={"control_period": 2e-3})
+    error = stop(row, engine)
+    assert (type(error), error.cause) == (NonFiniteError, "unstable")
+
+
 # -- what users wrote ---------------------------------------------------------------------------------------
 
 #: from this instant on functions of a user's give no numbers, s
