@@ -14,6 +14,7 @@ from ..control.messages import Messages
 from ..control.network import BoundNetwork
 from ..coupling.cell import Reference
 from ..errors import InputError, NonFiniteError
+from .clock import before
 from .plant import Plant
 from .state import Layout, State
 
@@ -131,9 +132,9 @@ class ClosedLoop:
         return signals
 
     def final(self, t: float, state: State) -> Signals:
-        """`derive` at time t, s, for what the controller computes."""
-        nothing = np.zeros((self.cell.n, self.cell.nv))
-        return self.derive(self.cell.references(np.array([t]))[0], state, nothing, self.state())
+        """`derive` at the end of a run, s, with its last loads, for what the controller computes."""
+        reference, nothing = self.cell.references(np.array([t]))[0], np.zeros((self.cell.n, self.cell.nv))
+        return self.at(before(t)).derive(reference, state, nothing, self.state())
 
     def look(self, reference: Reference, state: State) -> Signals:
         """What the controller computes in a state, of which it may keep views."""
