@@ -247,3 +247,17 @@ def test_robots_that_are_not_those_of_the_cell_are_refused() -> None:
             replace(experiment, plant_type=partial(HeldJointsPlant, robots=robots, pid=WRIST))
     with refused(InputError, "I", found=-1.0):
         Pid(1.0, -1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("subject", "changes"),
+    [
+        ("pid, P", {"pid": Pid([1.0, 2.0], 0.0, 0.0)}),
+        ("pid, I", {"pid": Pid(1.0, np.ones((2, 3)), 0.0)}),
+        ("at", {"at": [0.1, 0.2]}),
+    ],
+)
+def test_numbers_that_do_not_fit_the_held_joints_are_refused_by_name(subject: str, changes: dict) -> None:
+    given = {"robots": [load_robot("a460_full")] * 2, "pid": WRIST, **changes}
+    with refused(InputError, subject):
+        replace(a460_pair(), plant_type=partial(HeldJointsPlant, **given))

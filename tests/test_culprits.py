@@ -26,6 +26,7 @@ from synctrl import (
     load_robot,
 )
 from synctrl.control.laws import Asked, SunMills
+from synctrl.control.laws.sun_mills import BoundSunMills
 from synctrl.coupling.weights import Weights
 from synctrl.errors import (
     CouplingError,
@@ -35,6 +36,9 @@ from synctrl.errors import (
     SingularJacobianError,
 )
 from synctrl.experiments import a460_pair, planar_four, ur5_payload
+from synctrl.simulation.disturbances import DisturbanceSchedule
+from synctrl.simulation.rates import HELD, loop_rates
+from synctrl.simulation.stop import Stop
 from synctrl.tasks.trajectories import Motion
 
 ARM = load_robot("planar2r")
@@ -55,6 +59,12 @@ def small(*pushes: Disturbance, members: dict[str, Any] | None = None, **gains: 
     ]
     made = Cell(changed, cell.coupling, cell.space, cell.name)
     return Experiment(made, SMALL_GAINS.replace(**gains), 0.5, pushes)
+
+
+def small_with(law: Any) -> Experiment:
+    """The small cell with friction under another law."""
+    cell = small(members={"friction": [Friction(0.1), Friction(0.2)]}).cell
+    return Experiment(cell, SMALL_GAINS, 0.5, law=law)
 
 
 def in_joint_space(**gains: Any) -> Experiment:
@@ -206,6 +216,48 @@ def test_what_was_computed_until_then_says_why_too() -> None:
     error = stop(TABLE["a light joint of robot 2"], "pinocchio")
     assert error.result.status == f"stopped: {error}"
     assert np.isfinite(error.result.q).all()
+
+
+class Braking(SunMills):
+    """The paper's law with a brake on what robots do differently; one below zero drives them."""
+
+    def __init__(self, brake: float):
+        super().__init__()
+        self.brake = brake
+
+    def bind(self, cell: Cell, gains: Gains) -> Any:
+        bound, size = super().bind(cell, gains), self.brake
+
+        class Bound:
+            def command(self, errors: Any) -> Asked:
+                asked = bound.command(errors)
+                brake = size * np.matvec(errors.c.mT, errors.sigma_dot)
+                return asked._replace(force=asked.force + brake)
+
+        return Bound()
+
+
+@pytest.mark.parametrize("law", [SunMills(), Braking(3.0)])
+def test_all_that_damps_through_torque_that_is_held_counts_together_whatever_the_law(law: Any) -> None:
+    loop, period = small_with(law).closed_loop(), 2e-3
+    cell, motion = loop.cell, np.stack((loop.cell.q0, loop.cell.v0))
+    nothing = {"v": np.zeros((0, cell.n, cell.nv))}
+    error, pushes = NonFiniteError("", time=0.0), DisturbanceSchedule(cell, [])
+    run = Stop(loop, pushes, error, nothing, loop.initial_state(), 1e-3, period)
+    held = [each for each in run.excesses(False) if each.held and not each.rate.spring]
+    rates = loop_rates(loop, 0.0, motion, sampled=True)
+    for i in range(cell.n):
+        (own,) = (each for each in held if each.rate.robot == i)
+        damping = [r for r in rates if r.robot == i and not r.spring and r.gain != "friction"]
+        assert len(damping) == (3 if isinstance(loop.controller.law, BoundSunMills) else 4)
+        assert own.longest == pytest.approx(HELD / sum(rate.rate for rate in damping))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_law_that_drives_robots_apart_is_no_gain_and_keeps_no_cause_from_being_found(engine: str) -> None:
+    row = Row(lambda: small_with(Braking(-300.0)), "unstable", options={"control_period": 2e-3})
+    error = stop(row, engine)
+    assert (type(error), error.cause) == (NonFiniteError, "unstable")
 
 
 # -- what users wrote ---------------------------------------------------------------------------------------

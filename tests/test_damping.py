@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -20,6 +22,7 @@ from synctrl import (
     Redundancy,
     load_robot,
 )
+from synctrl.control.laws import SunMills
 from synctrl.simulation.damping import spans
 from synctrl.simulation.result import LAYOUT
 
@@ -74,6 +77,27 @@ CASES = {
     "mixed": (mixed, {}),
     "poses": (poses, {}),
 }
+
+
+class OtherCommand(SunMills):
+    """The paper's law, which logs something else than c xref' as its command."""
+
+    def bind(self, cell, gains):
+        bound = super().bind(cell, gains)
+
+        class Bound:
+            def command(self, errors):
+                asked = bound.command(errors)
+                return asked._replace(u=2 * asked.u)
+
+        return Bound()
+
+
+@pytest.mark.filterwarnings("ignore::synctrl.errors.StepWarning")
+def test_the_velocity_that_is_lost_is_that_which_the_law_asks_for_whatever_it_calls_its_command():
+    run, other = planar().simulate(), replace(planar(), law=OtherCommand()).simulate()
+    np.testing.assert_array_equal(other.q, run.q)
+    assert other.info["damping"] == run.info["damping"] != []
 
 
 @pytest.mark.filterwarnings("ignore::synctrl.errors.StepWarning")

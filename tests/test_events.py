@@ -207,6 +207,21 @@ def test_with_sampled_control_a_message_arrives_at_the_first_sample_that_is_not_
         np.testing.assert_array_equal(heard[row(run, t)], weighted(run.tracking_error[row(run, t)]))
 
 
+@pytest.mark.parametrize("options", [{}, SAMPLED, {"integrator": "DOP853"}], ids=["rk4", "sampled", "DOP853"])
+def test_until_the_end_of_a_run_the_plant_is_asked_with_the_loads_that_are_carried_then(options):
+    asked = []
+
+    class Telling(Plant):
+        def move(self, q, v, tau, hidden):
+            asked.append(self.robots)
+            return super().move(q, v, tau, hidden)
+
+    experiment = loaded(0.08, 0.16, plant_type=Telling)
+    experiment.simulate(0.12, dt=1e-3, **options)
+    expected = experiment.closed_loop().at(0.1).plant.robots[1].inertial_parameters
+    np.testing.assert_array_equal(asked[-1][1].inertial_parameters, expected)
+
+
 def test_from_the_edge_of_a_disturbance_on_its_torque_is_in_the_row():
     run = pushed(0.08, 0.16).simulate(dt=1e-3)
     acts = (run.t > 0.08 - 1e-9) & (run.t < 0.16 - 1e-9)

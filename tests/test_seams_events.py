@@ -231,6 +231,16 @@ class Flat(Plant):
         return q, v[0], hidden
 
 
+class Short(Flat):
+    def meet(self, t, q, v, hidden):
+        return q, v
+
+
+class Mute(Flat):
+    def meet(self, t, q, v, hidden):
+        return None
+
+
 class Broken(Flat):
     def meet(self, t, q, v, hidden):
         raise ZeroDivisionError("no hands")
@@ -246,6 +256,8 @@ class Torn(Flat):
     ("kind", "error", "says"),
     [
         (Flat, InputError, r"Flat: expected \(2, 3\) numbers as its velocities after the event at 0\.002 s"),
+        (Short, InputError, r"Short: expected 3, \(positions, .*\) after the event at 0\.002 s, found 2"),
+        (Mute, InputError, r"Mute: expected 3, \(positions, .*\) after the event .*, found NoneType"),
         (Broken, SimulationError, r"Broken\.meet.*no hands"),
         (Torn, NonFiniteError, r"Torn gives .*inf.* as its velocities after the event at 0\.002 s"),
     ],

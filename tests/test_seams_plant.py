@@ -149,6 +149,31 @@ def test_a_rate_of_another_size_than_the_state_is_refused_before_the_run():
         lagging(Wrong).simulate(0.01)
 
 
+@pytest.mark.parametrize(
+    ("made", "found"),
+    [(lambda a, b: a, "ndarray"), (lambda a, b: None, "NoneType"), (lambda a, b: (a, b, b), "3")],
+    ids=["one array", "nothing", "three"],
+)
+def test_a_plant_that_gives_no_pair_of_rates_is_refused_before_the_run(made, found):
+    def move(self, *given):
+        return made(*LaggingMotors.move(self, *given))
+
+    with pytest.raises(InputError, match=rf"Made: expected 2, \(acceleration, .*\), found {found}$"):
+        lagging(type("Made", (LaggingMotors,), {"move": move})).simulate(0.01)
+
+
+class Listing(LaggingMotors):
+    """Motors that list how fast their state changes."""
+
+    def move(self, q, v, tau, hidden):
+        v_dot, rate = super().move(q, v, tau, hidden)
+        return v_dot, rate.tolist()
+
+
+def test_a_rate_may_be_a_list_of_numbers():
+    np.testing.assert_array_equal(lagging(Listing).simulate(0.01).q, lagging().simulate(0.01).q)
+
+
 @pytest.mark.parametrize("start", [[0.0] * 8, None, 1.0, np.zeros((2, 4)), np.full(8, np.nan)], ids=repr)
 def test_a_state_that_is_no_row_of_finite_numbers_is_refused_by_name(start):
     with pytest.raises(InputError, match="plant Started, hidden0: expected"):

@@ -28,6 +28,7 @@ class Kind:
         space: of the task.
         matrix: map from theta to inertial parameters, (10 bodies, P), or None for all of them.
         base_rotation: rotation of the first joint's placement if all robots share it, else None.
+        gravity: in the world's axes, m/s^2.
         reference_acceleration, k_r_space: options of the controller.
         smoothing: velocity at which adapted Coulomb friction reaches tanh(1), or None without it.
         rotors: whether rotors are adapted too.

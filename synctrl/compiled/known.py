@@ -82,8 +82,8 @@ def check_untouched(loop: ClosedLoop) -> None:
     """
     for kind in {type(part.value) for part in _parts(loop)}:
         _check_class(kind)
-    for role, name, function, module in _functions(loop):
-        if not _belongs(name, function, module):
+    for role, function, module in _functions(loop):
+        if not _belongs(function, module):
             raise _replaced(role, function)
 
 
@@ -121,17 +121,17 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
             yield Part(f"parameters of {name} without friction", parameters.base, RIGID)
 
 
-def _functions(loop: ClosedLoop) -> Iterator[tuple[str, str, Any, str]]:
-    """Functions that generated code was traced from: role, name, function, and the module it was found in."""
+def _functions(loop: ClosedLoop) -> Iterator[tuple[str, Any, str]]:
+    """Functions that generated code was traced from: role, function, and the module it was found in."""
     bases = {base for part in _parts(loop) for base in type(part.value).__mro__}
     ours = {base.__module__ for base in bases if _is_ours(base.__module__)}
     for module in sorted(ours | {lines.__name__ for lines in LINES}):
         for name, function in vars(sys.modules[module]).items():
             if callable(function) and name[0].islower() and not isinstance(function, type):
-                yield f"function '{name}' of {module}", name, function, module
+                yield f"function '{name}' of {module}", function, module
 
 
-def _belongs(name: str, function: Any, module: str) -> bool:
+def _belongs(function: Any, module: str) -> bool:
     """Whether a function is of this module, or was imported into it from another of ours or of Python's."""
     home = _home(function)
     if home == module:
@@ -185,9 +185,9 @@ def _check_class(kind: type) -> None:
 
 def _check_controller(controller: Controller) -> None:
     """Refuse a controller whose parts no longer say what it does: it made some of them into others."""
+    own = [part for part in (controller, controller.law) if isinstance(part, (Controller, BoundSunMills))]
     for name in ("Lambda", "beta", "K_eps"):
         then = getattr(controller.gains, name)
-        own = [part for part in (controller, controller.law) if isinstance(part, (Controller, BoundSunMills))]
         if any(_changed(getattr(part, name), then, controller.cell.m) for part in own):
             raise InputError(
                 f"engine='compiled' does not have a controller whose {name} was changed after its law was "

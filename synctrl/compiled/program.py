@@ -139,7 +139,7 @@ class CompiledLoop:
             n=cell.n,
             p=coupling.pairs,
             arity=coupling.edges.shape[1],
-            rubs=int(plant.viscous.any() or plant.coulomb.any()),
+            rubs=int(plant.rubs),
             saturates=int(plant.saturate),
             **found,
         )

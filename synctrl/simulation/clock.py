@@ -98,7 +98,7 @@ class Clock:
 
     def sampled_at_end(self, every: int) -> bool:
         """Whether a controller that acts at every so many multiples of dt acts at the end."""
-        return self.count % every == 0 and abs(self.count * self.dt - self.end) <= 2e-9 * self.dt
+        return self.count % every == 0 and abs(self.count * self.dt - self.end) <= 2 * TIE * self.dt
 
     def spread(self, number: int) -> np.ndarray:
         """So many multiples of dt, evenly from 0 to the end, (number,), s; whatever is logged."""
@@ -174,7 +174,7 @@ def make_clock(
     if duration / dt > MAX_STEPS:
         raise InputError(f"{duration:g} s in steps of {dt:g} s are more than {MAX_STEPS} steps", subject="dt")
     every = 1 if log_dt is None else multiple("log_dt", log_dt, dt)
-    bare = Clock(dt, int(np.ceil(duration / dt - 1e-9)), duration, every=every)
+    bare = Clock(dt, int(np.ceil(duration / dt - TIE)), duration, every=every)
     near = [(_nearest(bare, instant, least=1), float(instant)) for instant in breaks]
     moved = {k: instant for k, instant in near if _close(bare.at(k), instant, dt)}
     end = moved.get(bare.count, duration)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..control.messages import Messages
 from ..control.network import BoundNetwork
 from ..coupling.cell import Reference
 from ..errors import InputError, NonFiniteError
+from .clock import before
 from .plant import Plant
 from .state import Layout, State
 
@@ -64,23 +66,26 @@ class ClosedLoop:
         """Refuse a plant whose rates do not fit its state; one that fails ends the run later.
 
         Raises:
-            InputError: of another shape.
+            InputError: of another shape, or not as many.
         """
         q, hidden = self.cell.q0, self.plant.hidden0
         try:
             rates = self.plant.move(q, self.cell.v0, np.zeros(q.shape), hidden)
         except Exception:  # the run will say so, and hand over what it has
             return
-        shapes = {"acceleration": q.shape, "rate of its own state": hidden.shape}
-        for (what, expected), rate in zip(shapes.items(), rates, strict=True):
-            self._check_shape(f"its {what}", expected, rate)
+        self._check_given({"acceleration": q.shape, "rate of its own state": hidden.shape}, rates)
 
-    def _check_shape(self, what: str, expected: tuple[int, ...], found: np.ndarray) -> None:
-        if np.shape(found) != expected:
-            raise InputError(
-                f"plant, {type(self.plant).__qualname__}: expected {expected} numbers as {what}, "
-                f"found {np.shape(found)}"
-            )
+    def _check_given(self, shapes: Mapping[str, tuple[int, ...]], found: Any, when: str = "") -> None:
+        """Refuse what the plant gives unless it is a tuple of arrays of these shapes."""
+        where = f"plant, {type(self.plant).__qualname__}"
+        if not isinstance(found, (tuple, list)) or len(found) != len(shapes):
+            seen = f"{len(found)}" if isinstance(found, (tuple, list)) else type(found).__qualname__
+            raise InputError(f"{where}: expected {len(shapes)}, ({', '.join(shapes)}){when}, found {seen}")
+        for (what, expected), part in zip(shapes.items(), found, strict=True):
+            if np.shape(part) != expected:
+                raise InputError(
+                    f"{where}: expected {expected} numbers as its {what}{when}, found {np.shape(part)}"
+                )
 
     def state(self, y: np.ndarray | None = None) -> State:
         """The parts of y, or of a new y that holds nothing yet."""
@@ -127,9 +132,9 @@ class ClosedLoop:
         return signals
 
     def final(self, t: float, state: State) -> Signals:
-        """`derive` at time t, s, for what the controller computes."""
-        nothing = np.zeros((self.cell.n, self.cell.nv))
-        return self.derive(self.cell.references(np.array([t]))[0], state, nothing, self.state())
+        """`derive` at the end of a run, s, with its last loads, for what the controller computes."""
+        reference, nothing = self.cell.references(np.array([t]))[0], np.zeros((self.cell.n, self.cell.nv))
+        return self.at(before(t)).derive(reference, state, nothing, self.state())
 
     def look(self, reference: Reference, state: State) -> Signals:
         """What the controller computes in a state, of which it may keep views."""
@@ -147,7 +152,7 @@ class ClosedLoop:
         tau = self.plant.applied(tau) + disturbance
         v_dot, hidden_dot = self.plant.move(state.q, state.v, tau, state.hidden)
         rate.q[...], rate.v[...] = state.v, v_dot
-        if hidden_dot.size:
+        if rate.hidden.size:
             rate.hidden[...] = hidden_dot
 
     def settle(self, state: State) -> bool:
@@ -171,18 +176,18 @@ class ClosedLoop:
         """Make the state before the plant's event at time t the one after it.
 
         Raises:
-            InputError: the plant gives something of another shape.
+            InputError: the plant gives something of another shape, or not as many.
             NonFiniteError: it makes a finite state infinite.
         """
         parts = {"positions": state.q, "velocities": state.v, "state of its own": state.hidden}
-        sound = np.isfinite(state.flat).all()
-        found = [np.array(part, float) for part in self.plant.meet(t, state.q, state.v, state.hidden)]
-        for (name, part), after in zip(parts.items(), found, strict=True):
-            what = f"its {name} after the event at {t:g} s"
-            self._check_shape(what, part.shape, after)
+        sound, when = np.isfinite(state.flat).all(), f" after the event at {t:g} s"
+        found = self.plant.meet(t, state.q, state.v, state.hidden)
+        self._check_given({name: part.shape for name, part in parts.items()}, found, when)
+        arrays = [np.array(part, float) for part in found]  # copies: they may be views of the state
+        for (name, part), after in zip(parts.items(), arrays, strict=True):
             if sound and not np.isfinite(after).all():
                 kind = type(self.plant).__qualname__
-                text = f"{kind} gives {after.tolist()} as {what}; expected finite numbers"
+                text = f"{kind} gives {after.tolist()} as its {name}{when}; expected finite numbers"
                 raise NonFiniteError(text, time=t, cause="part")
             part[...] = after
 

@@ -18,7 +18,7 @@ class DampingLog:
         robots: number of robots.
 
     Attributes:
-        arrays: lambda, and the part of xref' = c^-1 u that J v_ref leaves out, (instants, robots) each.
+        arrays: lambda, and the part of xref' that J v_ref leaves out, (instants, robots) each.
     """
 
     def __init__(self, instants: int, robots: int):
@@ -29,9 +29,8 @@ class DampingLog:
         task = signals.task
         if task.J is None or task.inversion is None or task.inversion.damping is None:
             return
-        xref_dot = np.matvec(signals.reference.c_inv, signals.u)
-        self.arrays["damping"][k] = task.inversion.damping[:, 0]
-        self.arrays["velocity_lost"][k] = velocity_lost(task.J, signals.v_ref, xref_dot)[:, 0]
+        lost = velocity_lost(task.J, signals.v_ref, signals.asked.xref_dot)
+        self.arrays["damping"][k], self.arrays["velocity_lost"][k] = task.inversion.damping[:, 0], lost[:, 0]
 
     def report(self, t: np.ndarray) -> list[dict[str, Any]]:
         """Intervals in which the damping of a robot was above zero, in order of their start.

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array
+from ..control.gains import spread
 from ..coupling.cell import Cell
 from ..errors import InputError
 from ..robots.limits import joint_limits
@@ -58,7 +59,7 @@ class HeldJointsPlant(Plant):
         options: of `Plant`.
 
     Raises:
-        InputError: robots that do not fit those of the cell.
+        InputError: robots that do not fit those of the cell, or numbers that do not fit the held joints.
     """
 
     def __init__(self, cell: Cell, *, robots: Sequence[Robot], pid: Pid, at: ArrayLike = 0.0, **options: Any):
@@ -75,7 +76,9 @@ class HeldJointsPlant(Plant):
         self._count = len(self._held[0])
         if any(len(held) != self._count for held in self._held):
             raise InputError("expected the same number of held joints for all of them", subject="robots")
-        self.at_rest = np.broadcast_to(finite_array("at", at), (self._count,))
+        for name in "PID":
+            spread(f"pid, {name}", getattr(pid, name), (self._count,))
+        self.at_rest = spread("at", finite_array("at", at), (self._count,))
         limits = [joint_limits(robot).torque[held] for robot, held in zip(robots, self._held, strict=True)]
         self._held_limits = np.array(limits)
         self.hidden0 = self._start()

@@ -12,8 +12,8 @@ lambda_n, the largest eigenvalue of S^T S:
                velocity with B; and a spring likewise
     Gamma      root of the largest eigenvalue of M^-1 Y Gamma Y^T
 
-The first four damp, and add up; K_eps and Gamma are springs, that swing. Held torque damps a spring late:
-what counts then is the largest eigenvalue of (D + F)^-1 Y Gamma Y^T, against the period.
+The first four damp, as a law may, and add up; K_eps and Gamma are springs, that swing. Held torque damps a
+spring late: what counts then is the largest eigenvalue of (D + F)^-1 Y Gamma Y^T, against the period.
 """
 
 from __future__ import annotations
@@ -94,8 +94,8 @@ def rest_friction(loop: ClosedLoop) -> np.ndarray:
 def damping_rate(loop: ClosedLoop, t: float, motion: np.ndarray, sampled: bool = False) -> float:
     """The largest sum of what damps a robot within a step, 1/s.
 
-    It is the largest eigenvalue of M^-1 (D + F), plus Lambda and beta lambda_n. Where torque is held, a step
-    knows nothing but the friction.
+    It is the sum of Lambda, beta lambda_n and the largest eigenvalues of M^-1 D, of M^-1 F, and of what
+    another law than the paper's damps with. Where torque is held, a step knows nothing but the friction.
     """
     reference = loop.cell.references(np.array([t]))[0]
     J = _jacobians(loop, loop.cell.task.measure(motion, reference.desired))
@@ -224,10 +224,18 @@ def _learned(loop: ClosedLoop, i: int, Y: np.ndarray) -> np.ndarray:
 def _rate(
     gain: str, i: int, M: np.ndarray, A: np.ndarray, spring: bool = False, sampled: bool = False
 ) -> Rate:
-    """The largest eigenvalue of M^-1 A, or its root for a spring, with the joint that its mode moves most."""
-    if np.isnan(A).any():  # at a singular configuration
-        return Rate(gain, i, None, 0.0, spring)
-    L_inv = np.linalg.inv(np.linalg.cholesky(M))
+    """The largest eigenvalue of M^-1 A, or its root for a spring, with the joint that its mode moves most.
+
+    It is 0 at a singular configuration, and against an M that drives a robot rather than resists it, as a law
+    may: nothing is known of either.
+    """
+    unknown = Rate(gain, i, None, 0.0, spring)
+    if np.isnan(A).any():
+        return unknown
+    try:
+        L_inv = np.linalg.inv(np.linalg.cholesky(M))
+    except np.linalg.LinAlgError:
+        return unknown
     values, vectors = np.linalg.eigh(L_inv @ np.clip(A, -HUGE, HUGE) @ L_inv.T)
     value = max(float(values[-1]), 0.0)
     joint = int(np.abs(L_inv.T @ vectors[:, -1]).argmax())

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import SaturationWarning, warn
-from .limits import torque_limits
 from .plant import Output, Plant
 
 if TYPE_CHECKING:
@@ -34,7 +33,7 @@ def saturation_report(plant: Plant, arrays: Mapping[str, np.ndarray]) -> list[di
     """
     if not plant.saturate:
         return []
-    size, limits = np.abs(arrays["tau"]), torque_limits(plant.cell)
+    size, limits = np.abs(arrays["tau"]), plant.torque_limits
     share = (size > limits).mean(axis=0) if len(size) else np.zeros(limits.shape)
     return [
         {

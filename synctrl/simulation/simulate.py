@@ -63,6 +63,9 @@ class Experiment:
         adaptation: how the controller learns; by default `Gradient(gains.Gamma)`, eq. (14).
         law: from errors to reference motion and force; by default `SunMills`.
         network: what the robots know of each other; by default `Ideal`.
+
+    Raises:
+        InputError: a part that is none, does not fit the others, or gives arrays that do not fit the cell.
     """
 
     cell: Cell
@@ -242,12 +245,12 @@ def _carry_out(
     if progress is not None and not callable(progress):
         raise InputError(f"expected a function of the time reached, found {progress!r}", subject="progress")
     rtol, atol = (positive_number(*each) for each in zip(("rtol", "atol"), tolerances, strict=True))
-    if integrator != "rk4":
+    adaptive = integrator != "rk4"
+    if adaptive:
         _needs_rk4(integrator, engine, run.info["control_period"])
     elif (reason := by.refuses(run)) is not None:
         raise InputError(reason)
     run.check()
-    adaptive = integrator != "rk4"
     result = run_adaptive(run, integrator, rtol, atol, progress) if adaptive else by.run(run, progress)
     warn_of_step(result.info["step_error"], result.names, run.info["dt"])
     warn_of_saturation(result)

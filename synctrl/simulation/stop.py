@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -146,9 +145,11 @@ class Stop:
 
     def _excesses_at(self, k: int, h: float, driven: bool) -> Iterable[Excess]:
         """Of every robot: what damps counts together, every spring for itself."""
-        rates = loop_rates(self.loop, *self._moment(k), self.period is not None, driven)
-        for _, own in groupby(rates, lambda rate: (rate.robot, rate.spring and rate.gain, self._held(rate))):
-            together = list(own)
+        groups: dict[Hashable, list[Rate]] = {}
+        for rate in loop_rates(self.loop, *self._moment(k), self.period is not None, driven):
+            key = rate.robot, rate.spring and rate.gain, self._held(rate)
+            groups.setdefault(key, []).append(rate)
+        for together in groups.values():
             limit, total = self._limit(together[0]), sum(rate.rate for rate in together)
             if total > 0:
                 used = self.period if self._held(together[0]) else h
