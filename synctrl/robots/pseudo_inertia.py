@@ -46,6 +46,12 @@ def dual(gradient: np.ndarray) -> np.ndarray:
     return (gradient @ _D_ROWS).reshape(*gradient.shape[:-1], 4, 4)
 
 
+def inverse_hessian(P: np.ndarray) -> np.ndarray:
+    """tr(D_k P D_l P), (..., 10, 10): inverse of the Hessian of -log det P in inertial parameters."""
+    moved = np.einsum("kij,...jm->...kim", D, P)
+    return np.einsum("...kim,...lmi->...kl", moved, moved)
+
+
 def principal_moments(theta: np.ndarray) -> np.ndarray:
     """Moments of inertia of one body about its centre of mass, (3,), ascending, of its parameters, (10,)."""
     m, h = theta[0], theta[1:4]

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 #: signs of the cofactors of a matrix with two rows
 _CHECKERED = np.array([[1.0, -1.0], [-1.0, 1.0]])
@@ -23,6 +24,16 @@ class Algebra(NamedTuple):
     inverse: Callable[[np.ndarray], np.ndarray]
     determinant: Callable[[np.ndarray], np.ndarray]
     smallest: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+def limited(x: np.ndarray, lower: ArrayLike, upper: ArrayLike) -> np.ndarray:
+    """Every entry between two bounds, of which one may be infinite; of numbers or symbols."""
+    if x.dtype != object:
+        return np.clip(x, lower, upper)
+    import casadi as ca
+
+    between = np.frompyfunc(lambda entry, low, high: ca.fmin(ca.fmax(entry, low), high), 3, 1)
+    return between(x, lower, upper)
 
 
 def _inverse(A: np.ndarray) -> np.ndarray:

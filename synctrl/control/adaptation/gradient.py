@@ -2,49 +2,69 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...checks import positive_number
 from ...coupling.cell import Cell
 from ...errors import InputError
-from ..gains import read_gain, spread_rows
+from ...robots.pseudo_inertia import inverse_hessian, pseudo_inertia
+from ...robots.robot import Robot
 from ..ragged_gain import RaggedGain
+from .metric import DiagonalMetric, Metric, listed, make_metric, read_metric
 from .protocol import Adaptation, Seen
 
 
 class Gradient:
-    """theta_hat' = Gamma Y^T s_q, eq. (14), with a diagonal Gamma.
+    """theta_hat' = Gamma Y^T s_q, eq. (14), with a diagonal or a full Gamma.
 
-    Its storage is 1/2 tilde^T Gamma^-1 tilde over the entries that are adapted. The error of those that are
-    not (Gamma = 0) is the power "model error", s_q^T Y tilde.
+    Its storage is 1/2 tilde^T Gamma^+ tilde. The part of an error that cannot be learned, because Gamma is
+    zero or singular there, is the power "model error", s_q^T Y (1 - Gamma Gamma^+) tilde.
 
     Args:
         Gamma: rate, a number, (P,), (n, P) or a list of n rows of different lengths, not below 0; 0 switches
-            the adaptation off.
+            the adaptation off. Or a symmetric positive semidefinite matrix for each robot, (n, P, P) or a
+            list of n matrices; one alone, (1, P, P), serves all robots.
 
     Raises:
-        InputError: not numbers, not finite, or below 0.
+        InputError: not numbers, not finite, below 0, or matrices that are not symmetric.
     """
 
     def __init__(self, Gamma: ArrayLike | RaggedGain):
-        self.Gamma = read_gain("Gamma", Gamma)
-        if self.Gamma.size and self.Gamma.min() < 0:
-            raise InputError(f"expected entries of at least 0, found {self.Gamma.min():g}", subject="Gamma")
+        self.Gamma = read_metric(Gamma)
 
-    def bind(self, cell: Cell) -> BoundGradient:
+    @classmethod
+    def pullback(cls, robots: Robot | Sequence[Robot], gamma: float) -> Self:
+        """(14) in the metric of bodies: Gamma_kl = gamma tr(D_k P D_l P) per body.
+
+        This is the inverse Hessian of -log det P, with P that of the robot as it is given. With it one
+        gamma serves masses, first moments and moments of inertia, robots of every size and all units.
+
+        Args:
+            robots: a robot for all of the cell, or one for each, with the parameters that are expected.
+            gamma: rate, 1/(N·m), above 0.
+
+        Raises:
+            InputError: a rate that is not above 0, or a body whose pseudo-inertia is not positive definite.
+        """
+        rate = positive_number("gamma", gamma)
+        many = [robots] if isinstance(robots, Robot) else robots
+        return cls([rate * _pullback(robot) for robot in many])
+
+    def bind(self, cell: Cell) -> MetricGradient:
         """This adaptation for a cell.
 
         Raises:
             InputError: Gamma of another size.
         """
-        sizes = [parameters.theta.size for parameters in cell.parameters]
-        return BoundGradient(cell, spread_rows("Gamma", self.Gamma, sizes))
+        metric = metric_of(self.Gamma, cell)
+        return (BoundGradient if isinstance(metric, DiagonalMetric) else MetricGradient)(cell, metric)
 
     def as_dict(self) -> dict[str, Any]:
-        return {"name": "Gradient", "Gamma": self.Gamma.tolist()}
+        return {"name": "Gradient", "Gamma": listed(self.Gamma)}
 
 
 def chosen(Gamma: np.ndarray | RaggedGain | None, adaptation: Adaptation | None) -> Adaptation:
@@ -63,31 +83,65 @@ def chosen(Gamma: np.ndarray | RaggedGain | None, adaptation: Adaptation | None)
     return adaptation
 
 
-class BoundGradient:
-    """`Gradient` for the robots of a cell: z is theta_hat itself."""
+class MetricGradient:
+    """(14) for the robots of a cell, with any Gamma: z is theta_hat itself."""
 
-    def __init__(self, cell: Cell, Gamma: np.ndarray):
-        self.Gamma, self._theta_hat0 = Gamma, cell.theta_hat0
-        self._per_gamma = np.divide(1.0, Gamma, out=np.zeros_like(Gamma), where=Gamma > 0)
+    def __init__(self, cell: Cell, metric: Metric):
+        self.metric, self.theta_hat0 = metric, cell.theta_hat0
+
+    @property
+    def Gamma(self) -> np.ndarray:  # noqa: N802
+        """Gamma of the robots, (n, P), or (n, P, P) if it is not diagonal."""
+        return self.metric.Gamma
 
     def start(self) -> np.ndarray:
-        return self._theta_hat0.copy()
+        return self.theta_hat0.copy()
 
     def estimate(self, z: np.ndarray) -> np.ndarray:
         return z
 
     def rate(self, z: np.ndarray, seen: Seen) -> np.ndarray:
-        return self.Gamma * seen.gradient
+        return self.metric.raised(seen.gradient)
 
     def settle(self, z: np.ndarray) -> np.ndarray:
         return z
 
     def storage(self, z: np.ndarray, theta: np.ndarray) -> float:
-        return float(0.5 * np.sum(self._per_gamma * (theta - z) ** 2))
+        return float(0.5 * np.sum((theta - z) * self.metric.lowered(theta - z)))
 
     def storage_rate(self, z: np.ndarray, z_dot: np.ndarray, theta: np.ndarray) -> float:
-        return float(-np.sum(self._per_gamma * (theta - z) * z_dot))
+        return float(-np.sum(self.metric.lowered(theta - z) * z_dot))
 
     def powers(self, z: np.ndarray, theta: np.ndarray, seen: Seen) -> Mapping[str, float]:
-        frozen = np.where(self.Gamma > 0, 0.0, theta - z)
+        frozen = self.metric.frozen(theta - z)
         return {"model error": float(np.sum(seen.s_q * np.matvec(seen.regressor, frozen)))}
+
+
+class BoundGradient(MetricGradient):
+    """(14) with a diagonal Gamma, as the paper has it; generated code has a place for it."""
+
+
+def metric_of(Gamma: Any, cell: Cell) -> Metric:
+    """The metric of a cell's robots.
+
+    Raises:
+        InputError: Gamma of another size.
+    """
+    return make_metric(Gamma, [parameters.theta.size for parameters in cell.parameters])
+
+
+def _pullback(robot: Robot) -> np.ndarray:
+    """tr(D_k P D_l P) of all bodies of a robot, one block per body, (10 bodies, 10 bodies)."""
+    P = pseudo_inertia(robot.inertial_parameters.reshape(-1, 10))
+    lowest = np.linalg.eigvalsh(P)[:, 0]
+    if not lowest.min() > 0:
+        k = int(lowest.argmin())
+        raise InputError(
+            f"the pseudo-inertia of body {k + 1} has the eigenvalue {lowest[k]:.3g}, expected above 0",
+            subject=f"robot '{robot.name}'",
+            found=float(lowest[k]),
+        )
+    Gamma = np.zeros((10 * len(P), 10 * len(P)))
+    for k, block in enumerate(inverse_hessian(P)):
+        Gamma[10 * k : 10 * k + 10, 10 * k : 10 * k + 10] = block
+    return Gamma
