@@ -225,13 +225,24 @@ static void runge_kutta(const Cell *c, Quantities *a, Work *k, const Steps *s, R
         y[j] += h / 6 * (slope[0][j] + 2 * (slope[1][j] + slope[2][j]) + slope[3][j]);
 }
 
+/* Let adaptations make of their state what they do after a step, before anything is asked about it. */
+static void settle(const Cell *c, Quantities *a, Work *k, double *y) {
+    place(c, a, y, k->k[0]);
+    for (int i = 0; i < c->n; i++)
+        if (kinds[c->kind[i]].settle) {
+            call_settle(c, a, i, k);
+            memcpy(a->z + (size_t)i * Z, a->settled + (size_t)i * Z, sizeof(double) * Z);
+        }
+}
+
 /* All that happens at the start of a step, before time goes on; whether the run ends here. With continuous control
  * every step begins with a sample. */
-static int begin(const Cell *c, Quantities *a, Work *k, const Steps *s, int step, const double *y, const Log *log,
+static int begin(const Cell *c, Quantities *a, Work *k, const Steps *s, int step, double *y, const Log *log,
                  Report *report) {
     int marks = s->marks[step];
     report->step = step;
     take(a, s, step);
+    if (marks & SAMPLED) settle(c, a, k, y);
     if (marks & (CHECKED | SAMPLED)) evaluate(c, a, k, s, 0, step, y, k->k[0]);
     if (!s->holds)
         look_back(c, s->t[step], marks & JOINED ? k->step_error.h : 0, y, k->k[3], k->k[0], &k->step_error);

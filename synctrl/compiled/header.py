@@ -27,9 +27,15 @@ def largest(kinds: list[Kind]) -> dict[str, int]:
 def functions_of(kind: Kind) -> list[str]:
     """Names of the functions that a kind has.
 
-    A space that watches nothing has no `guard`, an adaptation whose state is theta_hat no `estimate`.
+    A space that watches nothing has no `guard`, an adaptation whose state is theta_hat no `estimate`,
+    and one that leaves its state as a step leaves it no `settle`.
     """
-    lacks = {"guard": not kind.watches, "estimate": kind.learning is None}
+    learning = kind.learning
+    lacks = {
+        "guard": not kind.watches,
+        "estimate": learning is None,
+        "settle": learning is None or learning.settle is None,
+    }
     return [name for name in FUNCTIONS if not lacks.get(name, False)]
 
 

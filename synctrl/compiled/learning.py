@@ -1,4 +1,4 @@
-"""Adaptations as generated code: their `estimate` and `rate`, run on symbols instead of numbers.
+"""Adaptations as generated code: their `estimate`, `rate` and `settle`, run on symbols instead of numbers.
 
 So any adaptation made of plain array arithmetic runs in the compiled engine, a user's own too. What cannot be
 traced, or lets a robot learn from what others see, is refused by name.
@@ -29,15 +29,18 @@ class Learning:
         size: number of entries of its state, Z.
         estimate: CasADi function, z -> theta_hat.
         rate: CasADi function, z, q, v, v_ref, a_ref, s_q, Y^T s_q -> z'.
+        settle: CasADi function, z -> z after a step; None if it stays what it is.
     """
 
     size: int
     estimate: Any
     rate: Any
+    settle: Any
 
     def key(self) -> str:
         """The same text for robots that learn alike."""
-        return f"{self.estimate.serialize()} {self.rate.serialize()}"
+        functions = (self.estimate, self.rate, self.settle)
+        return " ".join(function.serialize() for function in functions if function is not None)
 
 
 def trace_learning(controller: Controller) -> list[Learning | None]:
@@ -68,9 +71,7 @@ def _traced(controller: Controller) -> list[Learning | None]:
     size = adaptation.start().shape[1]
     z, gradient = _symbols("z", [size] * cell.n, size), _symbols("gradient", counts, cell.theta.shape[1])
     motion = [_symbols(name, joints, cell.nv) for name in MOTION]
-    if adaptation.settle(z) is not z:
-        raise TypeError("a settle that does more than return z is not compiled")
-    estimates = adaptation.estimate(z)
+    estimates, settled = adaptation.estimate(z), adaptation.settle(z)
     rates = adaptation.rate(
         z, Seen(**dict(zip(MOTION, motion, strict=True)), gradient=gradient, regressor=None)
     )
@@ -80,7 +81,8 @@ def _traced(controller: Controller) -> list[Learning | None]:
         seen = [*(column_of(part[i, :nv]) for part in motion), column_of(gradient[i, :count])]
         estimate = ca.Function("estimate", inputs, [column_of(estimates[i, :count])])
         rate = ca.Function("rate", [*inputs, *seen], [column_of(rates[i])])
-        found.append(Learning(size, estimate, rate))
+        settle = None if settled is z else ca.Function("settle", inputs, [column_of(settled[i])])
+        found.append(Learning(size, estimate, rate, settle))
     return found
 
 

@@ -112,6 +112,7 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "e_star": Quantity("work", "n", "m", "coupled error"),
         "s_q": Quantity("work", "n", "nv", "error in velocity of the joints"),
         "theta_hat": Quantity("work", "n", "P", "estimates"),
+        "settled": Quantity("work", "n", "Z", "state of the adaptation after a step, for example projected"),
     }
 )
 
@@ -148,6 +149,7 @@ FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
         "plant": Signature(("q", "v", "sine", "cosine", "moving", "pi", "base"), ("v_dot",)),
         "guard": Signature(("e", "J", "J_inv"), ("watched", "side")),
         "estimate": Signature(("z",), ("theta_hat",)),
+        "settle": Signature(("z",), ("settled",)),
     }
 )  # fmt: skip
 

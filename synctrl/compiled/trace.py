@@ -75,7 +75,7 @@ class Trace:
         if self.kind.watches:
             yield self.guard()
         if self.kind.learning is not None:
-            yield self.estimate(self.kind.learning)
+            yield from self.beside(self.kind.learning)
 
     # -- where the robot is -------------------------------------------------------------------------------
 
@@ -147,9 +147,12 @@ class Trace:
         parts = kind.law.command(*rows, self.given["weights"])
         return Asked(*(array_of(part, -1) for part in parts))
 
-    def estimate(self, learning: Learning) -> Any:
-        """z -> theta_hat, of an adaptation whose state is something else."""
-        return self._function("estimate", theta_hat=array_of(learning.estimate(self.given["z"])))
+    def beside(self, learning: Learning) -> Iterator[Any]:
+        """What an adaptation has beside its rate: z -> theta_hat, and z -> z after a step."""
+        z = self.given["z"]
+        yield self._function("estimate", theta_hat=array_of(learning.estimate(z)))
+        if learning.settle is not None:
+            yield self._function("settle", settled=array_of(learning.settle(z)))
 
     def _adaptive(self, v_ref: np.ndarray, a_ref: np.ndarray, s_q: np.ndarray) -> tuple:
         """Y theta_hat, and z' of the adaptation; with (14) its state z is theta_hat."""
