@@ -1,7 +1,22 @@
 """Ways to learn: from velocity errors to estimates of the robots' parameters."""
 
 from .gradient import Gradient, chosen
+from .leakage import EModification, Leakage, Sigma, Switching
 from .natural import Natural
+from .projection import Ball, Box
 from .protocol import Adaptation, BoundAdaptation, Seen
 
-__all__ = ["Adaptation", "BoundAdaptation", "Gradient", "Natural", "Seen", "chosen"]
+__all__ = [
+    "Adaptation",
+    "Ball",
+    "BoundAdaptation",
+    "Box",
+    "EModification",
+    "Gradient",
+    "Leakage",
+    "Natural",
+    "Seen",
+    "Sigma",
+    "Switching",
+    "chosen",
+]
