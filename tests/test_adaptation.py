@@ -124,6 +124,39 @@ def test_natural_estimates_stay_in_the_cone_whatever_the_step(seed, step):
     assert (eigenvalues[..., 0] >= -1e-13 * eigenvalues[..., -1]).all()
 
 
+@given(seed=SEEDS, h=st.floats(1e-4, 0.05))
+def test_a_sample_of_natural_adaptation_goes_along_a_geodesic(seed, h):
+    """P+ = P^1/2 exp(h gamma P^1/2 B P^1/2) P^1/2, which no choice of a factor enters."""
+    from scipy.linalg import expm, sqrtm
+
+    now = seen(np.random.default_rng(seed))
+    bound = Natural(0.1).bind(CELL)
+    z = bound.start()
+    after = pi.pseudo_inertia(bound.estimate(bound.leap(z, bound.rate(z, now), h)).reshape(2, 3, 10))
+    before, B = (
+        pi.pseudo_inertia(bound.estimate(z).reshape(2, 3, 10)),
+        pi.dual(now.gradient.reshape(2, 3, 10)),
+    )
+    for P, P_next, B_k in zip(
+        before.reshape(-1, 4, 4), after.reshape(-1, 4, 4), B.reshape(-1, 4, 4), strict=True
+    ):
+        root = np.real(sqrtm(P))
+        expected = root @ expm(0.1 * h * root @ B_k @ root) @ root
+        np.testing.assert_allclose(P_next, expected, rtol=1e-9, atol=1e-10 * np.abs(expected).max())
+
+
+@given(seed=SEEDS, h=st.floats(1e-3, 10))
+def test_no_sample_of_natural_adaptation_leaves_the_cone(seed, h):
+    bound = Natural(0.1).bind(CELL)
+    z = bound.start()
+    gradient = seen(np.random.default_rng(seed))
+    rate = bound.rate(z, gradient)
+    after = bound.leap(z, rate, min(h, 20 / np.abs(rate).max()))
+    assert np.isfinite(after).all()
+    eigenvalues = np.linalg.eigvalsh(pi.pseudo_inertia(bound.estimate(after).reshape(2, 3, 10)))
+    assert (eigenvalues[..., 0] >= -1e-13 * eigenvalues[..., -1]).all()
+
+
 @given(SEEDS)
 def test_natural_adaptation_does_not_depend_on_the_unit_of_length(seed):
     """P in other units is A P A with A = diag(k, k, k, 1); then P_hat' is that of the first units as well."""

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from ..checks import boolean, choice, finite_array, finite_number, instance, positive_number
 from ..coupling.cell import Reference
 from ..errors import InputError, ResultError
+from .adaptation import after_sample
 from .adaptation_check import check_adaptation
 from .controller import Controller, Signals
 from .measured import check_limits, check_signals, gravity_torque, measurement, not_finite
@@ -284,7 +285,7 @@ class DiscreteController:
         """Keep what is commanded, and what will be known at the next sample; or nothing, if a part fails."""
         tau = np.clip(signals.tau, -self._limits, self._limits)
         tau = tau if self.include_gravity else tau - gravity_torque(self.cell, q)
-        z = self.controller.adaptation.settle(self.z + self.period * signals.z_dot)
+        z = after_sample(self.controller.adaptation, self.z, signals.z_dot, self.period)
         self._tau, self.z, self.signals = tau, z, signals
         self.memory = memory + self.period * signals.memory_dot
         self._samples, self.held = self._samples + missed + 1, self.held + missed

@@ -4,7 +4,7 @@ from .gradient import Gradient, chosen
 from .leakage import EModification, Leakage, Sigma, Switching
 from .natural import Natural
 from .projection import Ball, Box
-from .protocol import Adaptation, BoundAdaptation, Seen
+from .protocol import Adaptation, BoundAdaptation, Seen, after_sample
 
 __all__ = [
     "Adaptation",
@@ -18,5 +18,6 @@ __all__ = [
     "Seen",
     "Sigma",
     "Switching",
+    "after_sample",
     "chosen",
 ]

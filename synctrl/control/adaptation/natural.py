@@ -18,6 +18,8 @@ from .protocol import Seen
 #: entries of a lower triangular 4 x 4 matrix below its diagonal
 _ROWS, _COLUMNS = np.tril_indices(4, -1)
 _DIAGONAL = np.arange(4)
+#: of the exponential: exact to rounding for matrices of a norm below 64
+SQUARINGS, DEGREE = 8, 10
 
 
 class Natural:
@@ -79,8 +81,7 @@ class BoundNatural:
                 subject=f"theta_hat0 of {self._cell.names[i]}",
             )
         L = np.linalg.cholesky(P)
-        logs = np.log(L[..., _DIAGONAL, _DIAGONAL])
-        return self._join(np.concatenate((logs, L[..., _ROWS, _COLUMNS]), axis=-1), friction)
+        return self._join(_entries(L), friction)
 
     def estimate(self, z: np.ndarray) -> np.ndarray:
         rigid, friction = self._split(z)
@@ -100,6 +101,14 @@ class BoundNatural:
 
     def settle(self, z: np.ndarray) -> np.ndarray:
         return z
+
+    def leap(self, z: np.ndarray, z_dot: np.ndarray, h: float) -> np.ndarray:
+        """Along a geodesic of the cone: P_hat = L exp(h gamma X) L^T, with the X of the sample."""
+        (rigid, friction), (rigid_dot, friction_dot) = self._split(z), self._split(z_dot)
+        L = _lower(rigid)
+        half = _solve_lower(L, _lower_rate(L, rigid_dot))
+        root = _exponential(0.5 * h * (half + np.swapaxes(half, -1, -2)))
+        return self._join(_entries(_triangular(L @ root)), friction + h * friction_dot)
 
     def storage(self, z: np.ndarray, theta: np.ndarray) -> float:
         (rigid, friction), (true, true_friction) = self._split(z), self._split(theta)
@@ -168,6 +177,12 @@ def _lower(entries: np.ndarray) -> np.ndarray:
     return L
 
 
+def _entries(L: np.ndarray) -> np.ndarray:
+    """The inverse of `_lower`, (..., 10)."""
+    logs = np.log(L[..., _DIAGONAL, _DIAGONAL])
+    return np.concatenate((logs, L[..., _ROWS, _COLUMNS]), axis=-1)
+
+
 def _lower_rate(L: np.ndarray, entries_dot: np.ndarray) -> np.ndarray:
     """L', (..., 4, 4), of the rates of its entries, (..., 10)."""
     L_dot = np.zeros_like(L)
@@ -182,3 +197,35 @@ def _half(X: np.ndarray) -> np.ndarray:
     half[..., _ROWS, _COLUMNS] = X[..., _ROWS, _COLUMNS]
     half[..., _DIAGONAL, _DIAGONAL] = 0.5 * X[..., _DIAGONAL, _DIAGONAL]
     return half
+
+
+def _solve_lower(L: np.ndarray, B: np.ndarray) -> np.ndarray:
+    """L^-1 B of lower triangular matrices, (..., 4, 4), row by row."""
+    X = np.zeros_like(B)
+    for k in range(4):
+        known = sum((L[..., k, j, None] * X[..., j, :] for j in range(k)), np.zeros_like(B[..., k, :]))
+        X[..., k, :] = (B[..., k, :] - known) / L[..., k, k, None]
+    return X
+
+
+def _exponential(S: np.ndarray) -> np.ndarray:
+    """exp S of symmetric matrices, (..., 4, 4), by squaring a Taylor polynomial; of numbers or symbols."""
+    small, one = S / 2**SQUARINGS, np.eye(4)
+    result = one + small / DEGREE
+    for k in range(DEGREE - 1, 0, -1):
+        result = one + small @ result / k
+    for _ in range(SQUARINGS):
+        result = result @ result
+    return result
+
+
+def _triangular(A: np.ndarray) -> np.ndarray:
+    """The lower triangular L, (..., 4, 4), of positive diagonal with L L^T = A A^T, by Gram and Schmidt."""
+    L, rows = np.zeros_like(A), [A[..., k, :] for k in range(4)]
+    for k, row in enumerate(rows):
+        L[..., k, k] = np.sqrt((row * row).sum(axis=-1))
+        unit = row / L[..., k, k, None]
+        for j in range(k + 1, 4):
+            L[..., j, k] = (rows[j] * unit).sum(axis=-1)
+            rows[j] = rows[j] - L[..., j, k, None] * unit
+    return L

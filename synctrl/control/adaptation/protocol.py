@@ -72,6 +72,16 @@ class BoundAdaptation(Protocol):
         """What V_th' has beside -s_q^T Y tilde, by name, N·m/s; always the same names."""
 
 
+def after_sample(adaptation: Any, z: np.ndarray, z_dot: np.ndarray, h: float) -> np.ndarray:
+    """z after a sample of h s, through which a digital controller holds z'.
+
+    By default it is z + h z', settled. An adaptation whose z lives on a curved space may have a `leap`,
+    with the same arguments, that goes along it instead.
+    """
+    leap = getattr(adaptation, "leap", None)
+    return adaptation.settle(z + h * z_dot) if leap is None else leap(z, z_dot, h)
+
+
 class Adaptation(Protocol):
     """A way to learn, before it knows the cell."""
 
