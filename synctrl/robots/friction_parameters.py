@@ -143,3 +143,24 @@ def _unknown() -> InputError:
         "that has it, whose `theta` are then the true values",
         subject="friction",
     )
+
+
+def count_bodies(subject: str, parameters: Parameters) -> int:
+    """How many bodies parameters describe, all ten numbers of each.
+
+    Args:
+        subject: what messages call them.
+        parameters: what is adapted.
+
+    Raises:
+        InputError: they are not those of bodies.
+    """
+    base = parameters.base if type(parameters) is FrictionParameters else parameters
+    if type(base) is not FullParameters:
+        raise InputError(
+            "expected all inertial parameters of the bodies (parameters='full'), found "
+            f"{type(base).__name__} with {', '.join(base.names[:3])}",
+            subject=subject,
+            found=type(base).__name__,
+        )
+    return base.robot.body_count

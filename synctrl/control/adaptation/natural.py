@@ -10,8 +10,7 @@ import numpy as np
 from ...checks import non_negative_number, positive_number
 from ...coupling.cell import Cell
 from ...errors import InputError
-from ...robots.friction_parameters import FrictionParameters
-from ...robots.parameters import FullParameters
+from ...robots.friction_parameters import count_bodies
 from ...robots.pseudo_inertia import dual, inertial_parameters, pseudo_inertia
 from .protocol import Seen
 
@@ -49,7 +48,10 @@ class Natural:
         Raises:
             InputError: parameters that are not those of bodies, or a first estimate that no body can have.
         """
-        bodies = [_bodies(name, p) for name, p in zip(cell.names, cell.parameters, strict=True)]
+        bodies = [
+            count_bodies(f"{name}, adaptation", p)
+            for name, p in zip(cell.names, cell.parameters, strict=True)
+        ]
         if len(set(bodies)) != 1 or len({len(p.theta) for p in cell.parameters}) != 1:
             raise InputError(
                 "Natural expects robots with the same numbers of bodies and parameters, found "
@@ -155,18 +157,6 @@ class BoundNatural:
 
     def _friction_storage(self, tilde: np.ndarray) -> float:
         return float(0.5 * np.sum(tilde**2) / self.gamma_friction) if self.gamma_friction else 0.0
-
-
-def _bodies(name: str, parameters: Any) -> int:
-    """How many bodies these parameters describe, all ten numbers of each."""
-    base = parameters.base if type(parameters) is FrictionParameters else parameters
-    if type(base) is not FullParameters:
-        raise InputError(
-            "Natural needs all inertial parameters of the bodies (parameters='full'), "
-            f"found {type(base).__name__} with {', '.join(base.names[:3])}",
-            subject=f"{name}, adaptation",
-        )
-    return base.robot.body_count
 
 
 def _lower(entries: np.ndarray) -> np.ndarray:
