@@ -1,6 +1,8 @@
 """Laws: from errors, and what the neighbours said, to reference motion and force."""
 
 from .chung_slotine import ChungSlotine
+from .classic import ComputedTorque, PDGravity, SlotineLi
+from .master_slave import MasterSlave
 from .options import Options, chosen
 from .protocol import Along, Asked, BoundLaw, Errors, Law, Proof, completed, no_errors
 from .sun_mills import SunMills
@@ -10,10 +12,14 @@ __all__ = [
     "Asked",
     "BoundLaw",
     "ChungSlotine",
+    "ComputedTorque",
     "Errors",
     "Law",
+    "MasterSlave",
     "Options",
+    "PDGravity",
     "Proof",
+    "SlotineLi",
     "SunMills",
     "chosen",
     "completed",

@@ -12,6 +12,7 @@ from ...coupling.cell import Cell
 from ...coupling.coupling import Coupling
 from ...errors import InputError
 from ..gains import Gains, spread
+from .classic import alone
 from .protocol import Along, Asked, Errors, Proof
 from .sun_mills import BoundSunMills
 
@@ -42,16 +43,8 @@ class ChungSlotine:
         Raises:
             InputError: gains of another size, or beta or K_eps that are not zero.
         """
-        for name in ("beta", "K_eps"):
-            if getattr(gains, name).any():
-                raise InputError(
-                    f"expected {name} = 0 with the law ChungSlotine, which has no place for it, found "
-                    f"{getattr(gains, name).tolist()}; gains.independent() sets beta and K_eps to zero",
-                    subject="gains",
-                )
-        m = cell.m
         return BoundChungSlotine(
-            spread("Lambda", gains.Lambda, (m,)), spread("K_2", self.K_2, (m,)), cell.coupling
+            alone(self, gains, cell.m), spread("K_2", self.K_2, (cell.m,)), cell.coupling
         )
 
     def as_dict(self) -> dict[str, Any]:
