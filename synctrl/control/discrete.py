@@ -16,10 +16,9 @@ from numpy.typing import ArrayLike
 from ..checks import boolean, choice, finite_array, finite_number, instance, positive_number
 from ..coupling.cell import Reference
 from ..errors import InputError, ResultError
-from .adaptation_check import check_adaptation
 from .controller import Controller, Signals
-from .measured import check_limits, check_signals, gravity_torque, measurement, not_finite
-from .messages import Messages
+from .measured import check_adaptation, check_limits, check_signals, gravity_torque, measurement, not_finite
+from .network import Messages
 from .state_file import read_state, write_state
 
 #: how far from its place on the grid of samples a call may come, as a share of the period
