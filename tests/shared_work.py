@@ -37,8 +37,8 @@ from synctrl.experiments import (
     planar_four,
     ur5_payload,
 )
-from synctrl.experiments.circles import circle_cell
 from synctrl.experiments.mixed_four import STATIONS
+from synctrl.experiments.panda_four import circle_cell
 from synctrl.show.plots import joint_trajectories, save, sync_errors, tracking_errors
 from synctrl.simulation.payloads import Payload
 from synctrl.simulation.result import LAYOUT

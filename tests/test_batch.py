@@ -11,7 +11,7 @@ from refusals import refused
 from synctrl.errors import ResultError, SimulationError
 from synctrl.experiments import a460_pair, planar_four
 from synctrl.experiments.planar_four import GAINS
-from synctrl.paper.batch import PlannedRun, run_all
+from synctrl.paper.reproduction import PlannedRun, run_all
 from synctrl.simulation.result import LAYOUT, Result
 
 

@@ -25,7 +25,7 @@ from synctrl import (
     SmoothTrajectory,
     load_robot,
 )
-from synctrl.coupling.motion_checks import check_motions
+from synctrl.coupling.reachability import check_motions
 from synctrl.errors import CouplingError, NonFiniteError, TrajectoryError
 from synctrl.experiments import a460_pair, planar_four
 from synctrl.tasks.rotations import exp

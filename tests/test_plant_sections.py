@@ -11,8 +11,7 @@ import pytest
 from synctrl.analysis.identification import identify
 from synctrl.errors import InputError
 from synctrl.experiments import a460_full_pair, a460_pair
-from synctrl.paper.judge import AGREEMENT, compare_runs, joint_pair
-from synctrl.paper.judge_section import differences, judge_section
+from synctrl.paper.judge import AGREEMENT, compare_runs, differences, joint_pair, judge_section
 from synctrl.paper.plant_sections import friction_section, full_a460_section, identification_section
 from synctrl.paper.report import SideBySide, write_page
 from synctrl.paper.reproduction import PLANNED, judge_runs, judged

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, finite_number
 from ..errors import InputError
-from ..tasks.padding import padded
+from ..tasks.algebra import padded
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,13 +15,19 @@ from ..errors import InputError
 from ..robots.friction import Friction
 from ..robots.parameters import Parameters
 from ..robots.robot import Robot
-from ..tasks.padding import padded
+from ..tasks.algebra import padded
 from ..tasks.spaces import JointSpace, Space
 from ..tasks.trajectories import Motion, Trajectory
 from .coupling import Coupling
 from .desired import desired_motion, desired_weights
-from .member_checks import check_friction, check_labels, check_names, check_space, check_trajectory
-from .member_parameters import member_parameters
+from .member_checks import (
+    check_friction,
+    check_labels,
+    check_names,
+    check_space,
+    check_trajectory,
+    member_parameters,
+)
 from .weights import Weights
 
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, finite_number, instance
 from ..errors import CouplingError, InputError
 from . import graphs
-from .weight_checks import check_weights
+from .desired import check_weights
 from .weights import ConstantWeights, WeightFunction, Weights, WeightSource, as_source
 
 #: entries of S up to which a product with S written out is the quickest way

@@ -1,4 +1,7 @@
-"""What is desired at some instants, asked of functions that users wrote: whatever fails in them is named."""
+"""What is desired at some instants, asked of functions that users wrote: whatever fails in them is named.
+
+Before a run, its weights are followed: do they keep their inverse, and do their derivatives belong to them?
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..errors import NonFiniteError, SynctrlError, failed
+from ..errors import CouplingError, NonFiniteError, SynctrlError, failed
+from ..tasks.derivatives import find_misfit_in_motion, spread_windows
 from ..tasks.trajectories import MOTION_PARTS, Motion, Trajectory
-from .weights import DERIVATIVES, Weights
+from .weights import DERIVATIVES, ConstantWeights, FunctionWeights, Weights, WeightSource
 
 Found = TypeVar("Found")
 
@@ -91,4 +95,66 @@ def _check_finite(what: str, part: str, value: np.ndarray, times: np.ndarray, ro
             time=float(times[k]),
             robot=robot,
             cause=cause,
+        )
+
+
+def check_weights(source: WeightSource, times: np.ndarray, m: int) -> None:
+    """Follow the weights through a run before it starts.
+
+    Between two neighbouring instants c changes by c c^-1 c' Delta t to first order: where an eigenvalue of
+    c^-1 c' Delta t reaches 1 in size, c has lost its inverse on the way, even if both instants have one.
+
+    Args:
+        source: the weights.
+        times: instants of the run, (T,), s; a few hundred of them are looked at.
+        m: dimension of the task.
+
+    Raises:
+        CouplingError: a weight without an inverse, at an instant or between two, or derivatives that do not
+            belong to the weights.
+        SimulationError: the weights fail; with the time.
+    """
+    times = np.unique(times[np.linspace(0, len(times) - 1, _instants(source.robots)).astype(int)])
+
+    def look(at: np.ndarray) -> Weights:
+        return desired_weights(lambda instants: source.at(instants, m), at)
+
+    c, c_dot, _, c_inv = look(times)
+    if isinstance(source, ConstantWeights) or len(times) < 2:
+        return
+    if isinstance(source, FunctionWeights):
+        _check_derivatives(look, source.robots, float(times[0]), float(times[-1]), m)
+    gaps = np.gradient(times)[:, None]
+    change = np.abs(np.linalg.eigvals(c_inv @ c_dot).real).max(axis=-1) * gaps
+    if change.max() >= 1:
+        k, i = np.unravel_index(np.argmax(change), change.shape)
+        raise CouplingError(
+            f"the weight c of the robot at index {i} loses its inverse near t = {times[k]:g} s, where it is "
+            f"{c[k, i].tolist()} and changes at {c_dot[k, i].tolist()} per second"
+        )
+
+
+def _instants(robots: int) -> int:
+    """How many instants to look at: fewer for many robots."""
+    return int(np.clip(200_000 // robots, 200, 2000))
+
+
+def _check_derivatives(
+    look: Callable[[np.ndarray], Weights], n: int, start: float, stop: float, m: int
+) -> None:
+    """Compare c' and c'' with differences of c and c'."""
+    entries = m * m
+    groups = [slice(i * entries, (i + 1) * entries) for i in range(n)]
+    windows = spread_windows(start, stop, (), int(np.clip(1000 // n, 4, 24)))
+    found = find_misfit_in_motion(
+        lambda t: [part.reshape(len(t), -1) for part in look(t)[:3]], windows, groups
+    )
+    if found is not None:
+        order, misfit = found
+        i, entry = divmod(misfit.coordinate, entries)
+        name, derivative = DERIVATIVES[order - 1 : order + 1]
+        raise CouplingError(
+            f"{derivative} of the robot at index {i} is not the derivative of {name}: near "
+            f"t = {misfit.time:.6g} s entry {divmod(entry, m)} of {name} changes by "
+            f"{misfit.expected:.6g} per second, but {derivative} says {misfit.found:.6g}"
         )

@@ -246,4 +246,4 @@ def _singular(c: np.ndarray, times: np.ndarray) -> CouplingError:
     )
 
 
-__getattr__ = names_elsewhere(__name__, ".weight_checks", "check_weights")
+__getattr__ = names_elsewhere(__name__, ".desired", "check_weights")

@@ -6,8 +6,7 @@ from typing import Unpack
 
 from ..control.gains import Gains
 from ..simulation.simulate import Experiment
-from .circles import Station, circle_cell
-from .panda_four import DISTANCE, K_R, POSTURE
+from .panda_four import DISTANCE, K_R, POSTURE, Station, circle_cell
 from .parts import ControllerParts
 
 UR_POSTURE = (0.0, -1.3, 1.9, -2.17, -1.57, 0.0)

@@ -15,8 +15,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..simulation.simulate import Experiment
-from .matching import Match, match_peak_torque
-from .trials import Bench, Trial
+from .trials import Bench, Match, Trial, match_peak_torque
 
 PARTS = ("beta", "K_eps", "Gamma")
 

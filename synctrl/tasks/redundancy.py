@@ -21,8 +21,7 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, non_negative_number, positive_number
 from ..errors import InputError
 from ..robots.robot import Robot
-from .algebra import LAPACK, Algebra
-from .padding import padded
+from .algebra import LAPACK, Algebra, padded
 
 Posture = tuple[np.ndarray, np.ndarray, np.ndarray]
 

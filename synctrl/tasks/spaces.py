@@ -18,9 +18,9 @@ from ..checks import choice, instance, positive_number
 from ..errors import InputError
 from ..robots.robot import Robot
 from .algebra import LAPACK, Algebra
+from .measurement import Kinematics, Tips
 from .measurement import Measurement as Measurement
 from .redundancy import Damping, InverseMap, Posture, Redundancy, inverse_map
-from .tips import Kinematics, Tips
 
 AXES = "xyz"
 Joints = tuple[np.ndarray, np.ndarray]
