@@ -208,7 +208,7 @@ def test_malformed_pose_trajectories_are_refused():
     with pytest.raises(InputError, match="PoseTrajectory"):
         Attached(Hold([0, 0, 0]))
     zero = np.zeros(3)
-    with pytest.raises(TrajectoryError, match=r"t = 0 s: velocity: expected shape \(3,\)"):
+    with refused(TrajectoryError, "velocity", found=(2,)):
         FunctionOrientation(lambda t: np.eye(3), lambda t: zero[:2], lambda t: zero)
 
 

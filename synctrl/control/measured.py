@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, instance, numbers
+from ..checks import finite_array, instance, numbers, shaped
 from ..coupling.cell import Cell
 from ..errors import InputError, NonFiniteError, OrientationError, SimulationError, SingularJacobianError
 from ..tasks.measurement import Beyond, first_beyond
@@ -129,12 +129,12 @@ def check_adaptation(controller: Controller) -> None:
     z: Any = adaptation.start()
     instance(f"{where}, start", z, np.ndarray, "an array")
     finite_array(f"{where}, start", z, (cell.n, None))
-    _check_shape(f"{where}, estimate", adaptation.estimate(z), cell.theta.shape)
-    _check_shape(f"{where}, settle", adaptation.settle(z), z.shape)
+    shaped(f"{where}, estimate", adaptation.estimate(z), cell.theta.shape)
+    shaped(f"{where}, settle", adaptation.settle(z), z.shape)
     rate = z
     with suppress(Exception):
         rate = _first_rate(controller, z)
-    _check_shape(f"{where}, rate", rate, z.shape)
+    shaped(f"{where}, rate", rate, z.shape)
 
 
 def _first_rate(controller: Controller, z: np.ndarray) -> Any:
@@ -143,8 +143,3 @@ def _first_rate(controller: Controller, z: np.ndarray) -> Any:
     reference, motion = cell.references(np.zeros(1))[0], np.stack((cell.q0, cell.v0))
     with np.errstate(all="ignore"):
         return controller.unchecked(reference, motion, z, controller.network.start()).z_dot
-
-
-def _check_shape(where: str, found: Any, expected: tuple[int, ...]) -> None:
-    if np.shape(found) != expected:
-        raise InputError(f"expected an array of shape {expected}, found {np.shape(found)}", subject=where)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..checks import finite_array
+from ..checks import finite_array, offers, shaped
 from ..coupling.cell import Cell, Reference
 from ..coupling.coupling import Coupling
 from ..errors import InputError, NonFiniteError
@@ -120,10 +120,8 @@ def connected(network: Network | None) -> Network:
     Raises:
         InputError: something that is no network.
     """
-    if network is None:
-        return Ideal()
-    if not hasattr(network, "bind") or isinstance(network, type):
-        raise InputError(f"expected, for example, Ideal(), found {network!r}", subject="network")
+    network = Ideal() if network is None else network
+    offers("network", network, ("bind",), "a network, for example Ideal()")
     return network
 
 
@@ -191,8 +189,7 @@ class Messages:
         network: Any = self._network
         found = np.asarray(network.meet(t, w, memory), dtype=float)
         where = f"network {type(network).__qualname__}, meet"
-        if found.shape != memory.shape:
-            raise InputError(f"expected memory of shape {memory.shape}, found {found.shape}", subject=where)
+        shaped(where, found, memory.shape)
         sound = np.isfinite(memory).all() and np.isfinite(w).all()
         if sound and not np.isfinite(found).all():
             raise NonFiniteError(

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import instance
+from ..checks import instance, shaped
 from ..errors import InputError, SynctrlError
 from .laws import Asked, BoundLaw, no_errors
 from .network import BoundNetwork, Received
@@ -60,8 +60,4 @@ def _named(role: str, part: Any) -> Iterator[None]:
 
 def _check_shapes(role: str, part: Any, parts: Mapping[str, tuple[Any, tuple[int, ...]]]) -> None:
     for name, (value, shape) in parts.items():
-        if np.shape(value) != shape:
-            raise InputError(
-                f"expected an array of shape {shape}, found {np.shape(value)}",
-                subject=f"{role} {type(part).__qualname__}, {name}",
-            )
+        shaped(f"{role} {type(part).__qualname__}, {name}", value, shape)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, instance
+from ..checks import finite_array, instance, offers
 from ..errors import InputError
 from ..robots.friction import Friction
 from ..robots.parameters import Parameters
@@ -24,7 +24,6 @@ from .member_checks import (
     check_friction,
     check_labels,
     check_names,
-    check_space,
     check_trajectory,
     member_parameters,
 )
@@ -136,7 +135,7 @@ class Cell:
         self.robots = tuple(member.robot for member in self.members)
         self.names = tuple(m.name or f"robot {i}" for i, m in enumerate(self.members, start=1))
         check_names(name, self.names)
-        check_space(self.space)
+        offers("space", self.space, ("labels", "unit", "bind"), "a space, for example CartesianSpace('xy')")
         self.labels = self.space.labels(self.robots)
         self.task = self.space.bind(self.robots)
         self._check_members()

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array, instance, label, per_joint
+from ..checks import finite_array, instance, label, offers, per_joint
 from ..errors import InputError, warn
 from ..robots.base_parameters import parameters_of
 from ..robots.friction import Friction
@@ -69,18 +69,6 @@ def check_labels(cell: Any) -> None:
             label(f"{name}: name of a joint or parameter", word)
 
 
-def check_space(space: Any) -> None:
-    """Refuse what is no space.
-
-    Raises:
-        InputError: no object with `labels`, `unit` and `bind`.
-    """
-    if isinstance(space, type) or not all(hasattr(space, part) for part in ("labels", "unit", "bind")):
-        raise InputError(
-            f"expected a space, for example CartesianSpace('xy'), found {space!r}", subject="space"
-        )
-
-
 def check_trajectory(name: str, trajectory: Any, labels: tuple[str, ...]) -> None:
     """Refuse what is no desired motion of the task's dimension.
 
@@ -92,23 +80,16 @@ def check_trajectory(name: str, trajectory: Any, labels: tuple[str, ...]) -> Non
     Raises:
         InputError: no trajectory, another dimension, or a motion at t = 0 that is not finite.
     """
-    if not callable(trajectory) or not hasattr(trajectory, "dimension") or not hasattr(trajectory, "breaks"):
-        raise InputError(
-            f"expected a trajectory such as Hold, found {trajectory!r}", subject=f"{name}, trajectory"
-        )
-    m = len(labels)
+    where, m = f"{name}, trajectory", len(labels)
+    offers(where, trajectory, ("__call__", "dimension", "breaks"), "a trajectory such as Hold")
     if trajectory.dimension != m:
-        raise InputError(
-            f"expected {m} coordinates ({', '.join(labels)}), found {trajectory.dimension}",
-            subject=f"{name}, trajectory",
-        )
+        coordinates = f"expected {m} coordinates ({', '.join(labels)})"
+        raise InputError(f"{coordinates}, found {trajectory.dimension}", subject=where)
     motion = trajectory(np.zeros(1))
     if not isinstance(motion, tuple) or len(motion) != 3:
-        raise InputError(
-            f"expected position, velocity and acceleration, found {motion!r}", subject=f"{name}, trajectory"
-        )
+        raise InputError(f"expected position, velocity and acceleration, found {motion!r}", subject=where)
     for part, value in zip(MOTION_PARTS, motion, strict=True):
-        finite_array(f"{name}, trajectory, {part} at t = 0 s", value, (1, m))
+        finite_array(f"{where}, {part} at t = 0 s", value, (1, m))
 
 
 def check_friction(name: str, friction: Any, robot: Robot) -> None:
@@ -143,14 +124,11 @@ def member_parameters(name: str, robot: Robot, friction: Friction, given: Any) -
             unknown.subject = f"{name}, {error.subject}"
             raise unknown from None
     parameters = _with_friction(name, friction, given)
-    parts = ("names", "theta", "regressor")
-    if isinstance(parameters, type) or not all(hasattr(parameters, part) for part in parts):
-        raise InputError(
-            f"expected, for example, FullParameters, found {given!r}", subject=f"{name}, parameters"
-        )
-    _check_sizes(name, parameters, robot)
-    _check_truth(name, parameters, robot, friction)
-    _check_map(name, parameters, robot)
+    where = f"{name}, parameters"
+    offers(where, parameters, ("names", "theta", "regressor"), "parameters, for example FullParameters")
+    _check_sizes(where, parameters, robot)
+    _check_truth(where, parameters, robot, friction)
+    _check_map(where, parameters, robot)
     return parameters
 
 
@@ -182,41 +160,37 @@ def _check_agreement(name: str, friction: Friction, stated: Friction) -> None:
     )
 
 
-def _check_sizes(name: str, parameters: Any, robot: Robot) -> None:
-    theta = finite_array(f"{name}, parameters, theta", parameters.theta, (None,))
+def _check_sizes(where: str, parameters: Any, robot: Robot) -> None:
+    theta = finite_array(f"{where}, theta", parameters.theta, (None,))
     expected, still = (robot.nv, len(theta)), np.zeros(robot.nv)
     if len(parameters.names) != len(theta):
-        raise InputError(
-            f"expected a name for each of {len(theta)} values, found {len(parameters.names)}",
-            subject=f"{name}, parameters",
-        )
+        names = f"expected a name for each of {len(theta)} values"
+        raise InputError(f"{names}, found {len(parameters.names)}", subject=where)
     try:
         found = np.shape(parameters.regressor(still, still, still, still))
     except ValueError as error:
-        raise InputError(f"they belong to another robot: {error}", subject=f"{name}, parameters") from error
+        raise InputError(f"they belong to another robot: {error}", subject=where) from error
     if found != expected:
-        raise InputError(
-            f"expected a regressor of shape {expected} for '{robot.name}', found {found}",
-            subject=f"{name}, parameters",
-        )
+        regressor = f"expected a regressor of shape {expected} for '{robot.name}'"
+        raise InputError(f"{regressor}, found {found}", subject=where)
 
 
-def _check_truth(name: str, parameters: Any, robot: Robot, friction: Friction) -> None:
+def _check_truth(where: str, parameters: Any, robot: Robot, friction: Friction) -> None:
     """Y theta is the torque of this robot; a kind of its own may leave friction and rotors out."""
     states = _states(robot)
     found = np.array([parameters.regressor(q, v, v, a) @ parameters.theta for q, v, a in states])
     if not np.isfinite(found).all():
-        raise InputError("expected a finite regressor, found one that is not", subject=f"{name}, parameters")
+        raise InputError("expected a finite regressor, found one that is not", subject=where)
     off = min((_difference(found, torque) for torque in _torques(robot, friction, states)), key=max)
     if off[0] > 1:
         raise InputError(
             f"Y theta differs from the torque of robot '{robot.name}', as it is placed, "
             f"by {off[1]:.3g} N·m; expected parameters made for this robot, with its true values",
-            subject=f"{name}, parameters",
+            subject=where,
         )
 
 
-def _check_map(name: str, parameters: Any, robot: Robot) -> None:
+def _check_map(where: str, parameters: Any, robot: Robot) -> None:
     """Ready maps have to be made for this robot also where another one has the same torque."""
     rigid = parameters.base if isinstance(parameters, FrictionParameters) else parameters
     if not isinstance(rigid, (FullParameters, LinearParameters)) or rigid.robot is robot:
@@ -227,7 +201,7 @@ def _check_map(name: str, parameters: Any, robot: Robot) -> None:
             raise InputError(
                 f"made for robot '{rigid.robot.name}', whose regressor is another one; "
                 f"expected parameters made for robot '{robot.name}', as it is placed",
-                subject=f"{name}, parameters",
+                subject=where,
             )
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import suppress
 from itertools import pairwise
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array, instance
+from ..checks import finite_array, instance, offers
 from ..errors import InputError, SimulationError, TrajectoryError, UnreachableError
 from ..robots.robot import Robot
 from ..tasks.derivatives import Misfit, difference, find_misfit_in_motion, spread_windows
@@ -20,16 +19,6 @@ from .cell import Cell
 SAMPLES = 60
 RESTARTS = 20
 TOLERANCE = 1e-6
-
-
-class Missing(Protocol):
-    """A space that says how far a robot misses a target."""
-
-    def labels(self, robots: Sequence[Robot]) -> tuple[str, ...]:
-        """Names of the m coordinates."""
-
-    def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Error e, (m,), of one robot against a target, (m,), and the J, (m, nv), with e' = -J v."""
 
 
 def check_reachable(cell: Cell, times: np.ndarray) -> None:
@@ -55,14 +44,14 @@ def _follow(cell: Cell, i: int, times: np.ndarray) -> None:
     name, robot = cell.names[i], cell.robots[i]
     q = cell.q0[i, : robot.nv]
     for t, target in zip(times, cell.motion(i, times).x, strict=True):
-        found = inverse_kinematics(robot, target, q, cell.space)  # type: ignore[arg-type]
+        found = inverse_kinematics(robot, target, q, cell.space)
         if found is None:
             raise _unreachable(name, robot, t, target, cell)
         q = found
 
 
 def inverse_kinematics(
-    robot: Robot, target: np.ndarray, q: np.ndarray, space: Missing | None = None
+    robot: Robot, target: np.ndarray, q: np.ndarray, space: Any = None
 ) -> np.ndarray | None:
     """Joint positions, (nv,), that bring the tip to a target, or None if none were found.
 
@@ -80,11 +69,9 @@ def inverse_kinematics(
     """
     space = CartesianSpace() if space is None else space
     instance("robot", robot, Robot, "a Robot, for example from load_robot")
-    if isinstance(space, type) or not hasattr(space, "miss"):
-        raise InputError(
-            f"expected a CartesianSpace, a PoseSpace or another with `miss`, found {space!r}", subject="space"
-        )
-    target, q = finite_array("target", target, (_dimension(space, robot),)), finite_array("q", q, (robot.nv,))
+    offers("space", space, ("miss",), "a CartesianSpace, a PoseSpace or another with `miss`")
+    target = finite_array("target", target, (len(space.labels((robot,))),))
+    q = finite_array("q", q, (robot.nv,))
     rng = np.random.default_rng(0)
     for _ in range(1 + RESTARTS):
         found = _descend(space, robot, target, q)
@@ -94,7 +81,7 @@ def inverse_kinematics(
     return None
 
 
-def reach(robot: Robot, target: np.ndarray, q: np.ndarray, space: Missing | None = None) -> np.ndarray:
+def reach(robot: Robot, target: np.ndarray, q: np.ndarray, space: Any = None) -> np.ndarray:
     """`inverse_kinematics` that does not return empty-handed.
 
     Raises:
@@ -107,12 +94,7 @@ def reach(robot: Robot, target: np.ndarray, q: np.ndarray, space: Missing | None
     return found
 
 
-def _dimension(space: Missing, robot: Robot) -> int:
-    """Number of coordinates of a space."""
-    return len(space.labels((robot,)))
-
-
-def _descend(space: Missing, robot: Robot, target: np.ndarray, q: np.ndarray) -> np.ndarray | None:
+def _descend(space: Any, robot: Robot, target: np.ndarray, q: np.ndarray) -> np.ndarray | None:
     """Levenberg-Marquardt: the damping shrinks with every step that helps, and grows otherwise."""
     damping = 1e-6
     error, J = space.miss(robot, target, q)

@@ -52,9 +52,7 @@ class PoseSpace(TipSpace):
     Condition numbers and damping thresholds mix metres and radians here.
 
     Args:
-        max_condition: a Jacobian with a larger condition number counts as singular.
-        singularity: "stop" ends a run at a singular Jacobian with an error. "damped", or a `Damping`, goes
-            on with damped least squares; the result's `info["damping"]` then says when and how much.
+        max_condition, singularity: see `CartesianSpace`.
         redundancy: what arms with more than six joints do with the rest.
 
     Raises:

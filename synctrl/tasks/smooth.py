@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance, positive_number
-from ..errors import InputError, TrajectoryError
+from ..errors import TrajectoryError
 from . import rotations
 from .chebyshev import Function, NotSmoothError, SmoothFunction, certify
 from .poses import Turning
-from .trajectories import MOTION_PARTS, Motion, finite_value
+from .trajectories import MOTION_PARTS, Motion, value_at
 
 
 class SmoothTrajectory:
@@ -37,7 +37,7 @@ class SmoothTrajectory:
         self.dimension = int(np.size(position(0.0)))
 
         def rows(t: float) -> np.ndarray:
-            return finite_value("position", position, t, (self.dimension,))[None, :, None]
+            return value_at("position", position, t, finite_array, (self.dimension,))[None, :, None]
 
         self._function, self.breaks = _certified(rows, duration, breaks)
         self.duration = self._function.duration
@@ -72,11 +72,7 @@ class SmoothOrientation:
         instance("rotation", rotation, Callable, "a function of time")  # type: ignore[arg-type]
 
         def matrices(t: float) -> np.ndarray:
-            value = finite_value("rotation", rotation, t, (3, 3))
-            try:
-                return rotations.rotation_matrix("rotation", value)[None]
-            except InputError as error:
-                raise TrajectoryError(f"{error}", subject=f"orientation at t = {t:g} s") from error
+            return value_at("rotation", rotation, t, rotations.rotation_matrix)[None]
 
         self._function, self.breaks = _certified(matrices, duration, breaks)
         self.duration = self._function.duration

@@ -20,10 +20,9 @@ from ..robots.robot import Robot
 from .algebra import LAPACK, Algebra
 from .measurement import Kinematics, Tips
 from .measurement import Measurement as Measurement
-from .redundancy import Damping, InverseMap, Posture, Redundancy, inverse_map
+from .redundancy import Damping, Inverse, Joints, Posture, Redundancy, inverse_map
 
 AXES = "xyz"
-Joints = tuple[np.ndarray, np.ndarray]
 
 
 class BoundSpace(Protocol):
@@ -139,7 +138,7 @@ class BoundTipSpace(ABC):
         square: which robots have as many joints as there are task coordinates, (..., 1).
     """
 
-    def __init__(self, space: Any, tips: Kinematics, inverse: InverseMap, square: np.ndarray):
+    def __init__(self, space: Any, tips: Kinematics, inverse: Inverse, square: np.ndarray):
         self._space, self._tips, self._inverse, self._square = space, tips, inverse, square
         self.limits, self.to_joints = space.limits, inverse.to_joints
 
@@ -177,10 +176,7 @@ class TipSpace(ABC):
 
     Args:
         m: number of task coordinates.
-        max_condition: a Jacobian with a larger condition number counts as singular.
-        singularity: "stop" ends a run at a singular Jacobian with an error. "damped", or a `Damping`, goes
-            on with damped least squares; the result's `info["damping"]` then says when and how much.
-        redundancy: what arms do with joints that the task leaves free.
+        max_condition, singularity, redundancy: see `CartesianSpace`.
 
     Raises:
         InputError: another word, or a limit that is not positive.
