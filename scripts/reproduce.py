@@ -9,6 +9,7 @@ import argparse
 import sys
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -99,7 +100,7 @@ def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun]) -> Pat
     write_metrics(
         out / "metrics.json",
         {n: as_data(run, metrics(run, settling_bands(*peers(every, n)))) for n, run in every.items()},
-        [claim.as_data() for claim in claims],
+        [asdict(claim) for claim in claims],
         certificates={name: certificate.as_dict() for name, certificate in certificates.items()},
         comparisons=[comparison.as_dict() for comparison in comparisons],
         identification={title: [robot.as_dict() for robot in robots] for title, robots in learned.items()},

@@ -93,7 +93,7 @@ def loaded() -> Experiment:
 def in_turn() -> Experiment:
     """Different arms in the order ABAB."""
     a, b, c, d = STATIONS
-    return circle_cell((a, c, b, d), "mixed cell, in turn", None, synchronized=True)
+    return circle_cell((a, c, b, d), "mixed cell, in turn", None, synchronized=True, parts={})
 
 
 #: every kind of space, weight, parameter and plant, in the engines that have it

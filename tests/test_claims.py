@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -79,7 +79,7 @@ def test_missing_runs_are_named():
 
 
 def test_a_claim_is_plain_data(planar):
-    data = claims.errors_converge(planar["synchronized"], "theorem 2").as_data()
+    data = asdict(claims.errors_converge(planar["synchronized"], "theorem 2"))
     assert data["holds"] is True
     assert data["source"] == "theorem 2"
     assert {"name", "value", "unit"} == set(data["figures"][0])

@@ -187,7 +187,7 @@ class Cell:
         """Weights of the coupling at the times, (T,); see `desired_weights`."""
         if self.coupling.is_constant:
             return self.coupling.weights(times, self.m)
-        return desired_weights(lambda at: self.coupling.weights(at, self.m), times)
+        return desired_weights(self.coupling.weights, times, self.m)
 
     def references(self, times: np.ndarray) -> list[Reference]:
         """What is desired at each of the times, (T,)."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from copy import copy
 from functools import partial
+from itertools import combinations
 from typing import Any, Self
 
 import numpy as np
@@ -104,7 +105,7 @@ class Coupling:
     @classmethod
     def chain(cls, n: int, c: WeightsLike | None = None, unit: str = "") -> Self:
         """Differences of neighbours, c_k e_k - c_{k+1} e_{k+1} for k = 1 to n - 1; by default c = 1."""
-        return cls._differences(n, graphs.path(_count(n)), c, "chain", unit)
+        return cls._differences(n, [(k, k + 1) for k in range(_count(n) - 1)], c, "chain", unit)
 
     @classmethod
     def star(cls, n: int, leader: int = 0, c: WeightsLike | None = None, unit: str = "") -> Self:
@@ -112,12 +113,12 @@ class Coupling:
         instance("leader", leader, (int, np.integer), "the number of a robot")
         if not 0 <= leader < _count(n):
             raise CouplingError(f"expected a robot from 0 to {n - 1}, found {leader}", subject="leader")
-        return cls._differences(n, graphs.star(n, leader), c, "star", unit)
+        return cls._differences(n, [(leader, k) for k in range(n) if k != leader], c, "star", unit)
 
     @classmethod
     def complete(cls, n: int, c: WeightsLike | None = None, unit: str = "") -> Self:
         """Differences of all robots, n (n - 1) / 2 of them; by default c = 1."""
-        return cls._differences(n, graphs.complete(_count(n)), c, "all to all", unit)
+        return cls._differences(n, [*combinations(range(_count(n)), 2)], c, "all to all", unit)
 
     @classmethod
     def from_graph(

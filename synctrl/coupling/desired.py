@@ -16,6 +16,8 @@ from ..tasks.trajectories import MOTION_PARTS, Motion, Trajectory
 from .weights import DERIVATIVES, ConstantWeights, FunctionWeights, Weights, WeightSource
 
 Found = TypeVar("Found")
+#: times, (T,), and m -> weights
+WeightsAt = Callable[[np.ndarray, int], Weights]
 
 
 def desired_motion(name: str, robot: int, trajectory: Trajectory, times: np.ndarray) -> Motion:
@@ -44,19 +46,13 @@ def desired_motion(name: str, robot: int, trajectory: Trajectory, times: np.ndar
     return motion
 
 
-def desired_weights(weights: Callable[[np.ndarray], Weights], times: np.ndarray) -> Weights:
-    """Weights of a coupling at some times, (T,).
-
-    Args:
-        weights: times -> weights.
-        times: (T,), s.
+def desired_weights(weights: WeightsAt, times: np.ndarray, m: int) -> Weights:
+    """Weights of a coupling at some times, (T,), s, for a task of dimension m.
 
     Raises:
-        SynctrlError: what the weights raise of this kind.
-        SimulationError: they raise anything else; with the time.
-        NonFiniteError: they are infinite or not numbers; with robot and time.
+        SynctrlError, SimulationError, NonFiniteError: see `desired_motion`.
     """
-    found = _asked(weights, times, "the weights of the coupling", None)
+    found = _asked(lambda at: weights(at, m), times, "the weights of the coupling", None)
     for name, value in zip(DERIVATIVES, found, strict=False):
         wrong = ~np.isfinite(value).all(axis=(0, 2, 3))
         for i in np.flatnonzero(wrong)[:1].tolist():
@@ -114,16 +110,13 @@ def check_weights(source: WeightSource, times: np.ndarray, m: int) -> None:
             belong to the weights.
         SimulationError: the weights fail; with the time.
     """
-    times = np.unique(times[np.linspace(0, len(times) - 1, _instants(source.robots)).astype(int)])
-
-    def look(at: np.ndarray) -> Weights:
-        return desired_weights(lambda instants: source.at(instants, m), at)
-
-    c, c_dot, _, c_inv = look(times)
+    instants = int(np.clip(200_000 // source.robots, 200, 2000))  # fewer for many robots
+    times = np.unique(times[np.linspace(0, len(times) - 1, instants).astype(int)])
+    c, c_dot, _, c_inv = desired_weights(source.at, times, m)
     if isinstance(source, ConstantWeights) or len(times) < 2:
         return
     if isinstance(source, FunctionWeights):
-        _check_derivatives(look, source.robots, float(times[0]), float(times[-1]), m)
+        _check_derivatives(source, float(times[0]), float(times[-1]), m)
     gaps = np.gradient(times)[:, None]
     change = np.abs(np.linalg.eigvals(c_inv @ c_dot).real).max(axis=-1) * gaps
     if change.max() >= 1:
@@ -134,20 +127,13 @@ def check_weights(source: WeightSource, times: np.ndarray, m: int) -> None:
         )
 
 
-def _instants(robots: int) -> int:
-    """How many instants to look at: fewer for many robots."""
-    return int(np.clip(200_000 // robots, 200, 2000))
-
-
-def _check_derivatives(
-    look: Callable[[np.ndarray], Weights], n: int, start: float, stop: float, m: int
-) -> None:
+def _check_derivatives(source: WeightSource, start: float, stop: float, m: int) -> None:
     """Compare c' and c'' with differences of c and c'."""
-    entries = m * m
+    n, entries = source.robots, m * m
     groups = [slice(i * entries, (i + 1) * entries) for i in range(n)]
     windows = spread_windows(start, stop, (), int(np.clip(1000 // n, 4, 24)))
     found = find_misfit_in_motion(
-        lambda t: [part.reshape(len(t), -1) for part in look(t)[:3]], windows, groups
+        lambda t: [part.reshape(len(t), -1) for part in desired_weights(source.at, t, m)[:3]], windows, groups
     )
     if found is not None:
         order, misfit = found

@@ -20,21 +20,6 @@ def cycle(n: int) -> list[Edge]:
     return [(k, (k + 1) % n) for k in range(n)]
 
 
-def path(n: int) -> list[Edge]:
-    """Every robot but the last with the next one."""
-    return [(k, k + 1) for k in range(n - 1)]
-
-
-def star(n: int, leader: int = 0) -> list[Edge]:
-    """The leader with every other robot."""
-    return [(leader, k) for k in range(n) if k != leader]
-
-
-def complete(n: int) -> list[Edge]:
-    """Every robot with every other."""
-    return [(i, j) for i in range(n) for j in range(i + 1, n)]
-
-
 def read_graph(graph: Any) -> tuple[int, np.ndarray, np.ndarray]:
     """Number of robots, edges (p, 2) and edge weights (p,) of a graph.
 
@@ -177,9 +162,7 @@ def _networkx_rows(graph: Any) -> tuple[list[tuple[Any, Any, Any]], int]:
 
 
 def _row(edge: Any) -> tuple[Any, Any, Any]:
-    if not isinstance(edge, Iterable) or isinstance(edge, str):
-        raise InputError(f"expected pairs (i, j) or triples (i, j, weight), found {edge!r}", subject="graph")
-    parts = tuple(edge)
+    parts = tuple(edge) if isinstance(edge, Iterable) and not isinstance(edge, str) else ()
     if len(parts) not in (2, 3):
         raise InputError(f"expected pairs (i, j) or triples (i, j, weight), found {edge!r}", subject="graph")
     return (*parts, 1.0)[:3]

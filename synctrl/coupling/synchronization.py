@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, finite_number, instance, positive_number
+from ..checks import count, finite_array, finite_number, instance, positive_number
 from ..errors import CouplingError, InputError, SynchronizationError
 from ..tasks.chebyshev import NotSmoothError, certify
 from ..tasks.trajectories import Trajectory
@@ -44,16 +44,9 @@ class SynchronizationFunction:
     """
 
     def __init__(self, function: Callable[..., ArrayLike], robots: int, dimension: int, unit: str = ""):
-        if not callable(function):
-            raise InputError(
-                f"expected f(x_1, ..., x_n, t), found {type(function).__name__}", subject="function"
-            )
-        for name, value, lowest in (("robots", robots, 2), ("dimension", dimension, 1)):
-            instance(name, value, (int, np.integer), "a whole number")
-            if value < lowest:
-                raise InputError(f"expected at least {lowest}, found {value}", subject=name, found=value)
+        instance("function", function, Callable, "f(x_1, ..., x_n, t)")  # type: ignore[arg-type]
         self.function, self.unit = function, unit
-        self.robots, self.dimension = int(robots), int(dimension)
+        self.robots, self.dimension = count("robots", robots, 2), count("dimension", dimension)
         self._matrices: MatrixFunction | None = None
         self._given: WeightSource | None = None
 
@@ -191,8 +184,7 @@ class SynchronizationFunction:
 
     def _couple(self, source: WeightSource, graph: GraphLike | None) -> Coupling:
         if graph is not None:
-            if not callable(graph):
-                raise InputError(f"expected, for example, Coupling.ring, found {graph!r}", subject="graph")
+            instance("graph", graph, Callable, "a function such as Coupling.ring")  # type: ignore[arg-type]
             coupling = graph(self.robots, c=source, unit=self.unit)
         elif self.robots == 2:
             coupling = Coupling.pair(source, self.unit)

@@ -70,9 +70,7 @@ def a460_pair(
         members = [_knowing_friction(member) for member in members]
     cell = Cell(members, Coupling.pair(c=(1.0, -1.0)), JointSpace(), name="A460 pair")
     remarks = [*["without friction"] * (not friction), *["friction adapted"] * adapt_friction]
-    options: ControllerParts = {
-        **parts, "reference_acceleration": reference_acceleration, "k_r_space": k_r_space,
-    }  # fmt: skip
+    options = ControllerParts(reference_acceleration=reference_acceleration, k_r_space=k_r_space, **parts)
     return ready_experiment(cell, DURATION, _gains(adapt_friction), gains, synchronized, options, *remarks)
 
 

@@ -67,14 +67,14 @@ def circle_cell(
     name: str,
     gains: Gains | None,
     synchronized: bool,
-    parts: ControllerParts | None = None,
+    parts: ControllerParts,
 ) -> Experiment:
     """Robots at equal angles around the middle, each on its circle, coupled in a ring."""
     postures = [np.array(station.posture) for station in stations]
     members = [_member(s, 2 * np.pi * i / len(stations), OFFSETS[i]) for i, s in enumerate(stations)]
     space = CartesianSpace("xyz", redundancy=Redundancy(postures, POSTURE_GAIN))
     cell = Cell(members, Coupling.ring(len(stations)), space, name=name)
-    return ready_experiment(cell, DURATION, _gains(stations), gains, synchronized, parts or ControllerParts())
+    return ready_experiment(cell, DURATION, _gains(stations), gains, synchronized, parts)
 
 
 def panda_four(
@@ -85,9 +85,7 @@ def panda_four(
     Without friction, and with 0.7 of the true inertial parameters as the first estimate.
 
     Args:
-        synchronized: False sets beta = K_eps = 0, independent adaptive control.
-        gains: by default ones that converge within the run.
-        parts: parts and options of the controller, see `ControllerParts`.
+        synchronized, gains, parts: see `ready_experiment`; the gains of the cell converge within the run.
     """
     stations = [Station("panda", POSTURE, DISTANCE, f"Panda {i}", K_R) for i in range(1, 5)]
     return circle_cell(stations, "four Pandas", gains, synchronized, parts)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -81,21 +81,16 @@ def friction_section(runs: Mapping[str, Result], folder: Path) -> Section:
 
 def identification_section(found: Mapping[str, Sequence[Identification]]) -> Section:
     """What runs could learn of their robots' parameters, and what they did learn, by title of the run."""
-    rows = []
-    for title, robots in found.items():
-        for robot in robots:
-            data = robot.as_dict()
-            sizes = (data["adapted"], data["identifiable"], data["learned"])
-            rows.append(
-                (
-                    f"{title}: {robot.robot}",
-                    *map(str, sizes),
-                    number(data["condition"]),
-                    f"{data['excitation']:.1e}",
-                    *(number(data[f"torque_error_{when}"]) for when in ("peak", "end")),
-                    *(number(data[f"base_error_{when}"]) for when in ("start", "end")),
-                )
-            )
+    sizes = ("adapted", "identifiable", "learned")
+    errors = ("torque_error_peak", "torque_error_end", "base_error_start", "base_error_end")
+    data = [(f"{title}: {each.robot}", each.as_dict()) for title, robots in found.items() for each in robots]
+    rows = [
+        (
+            *(name, *(str(row[size]) for size in sizes), number(row["condition"])),
+            *(f"{row['excitation']:.1e}", *(number(row[error]) for error in errors)),
+        )
+        for name, row in data
+    ]
     head = (
         "run and robot", "adapted", "identifiable", "learned", "condition", "excitation",
         "torque error, N·m, peak", "at the end", "base parameter error, start", "at the end",
@@ -121,11 +116,11 @@ def _caption(k: int, kind: str, joints: str) -> str:
 
 
 def _wrist_table(runs: Mapping[str, Result]) -> Table:
-    rows = []
-    for kind, full in FULL.items():
-        run = runs[full]
-        for name, held in zip(run.names, run.info["held_joints"], strict=True):
-            rows.append((f"{kind}, {name}", *(number(np.rad2deg(angle)) for angle in held["largest"])))
+    rows = [
+        (f"{kind}, {name}", *map(number, np.rad2deg(held["largest"])))
+        for kind, full in FULL.items()
+        for name, held in zip(runs[full].names, runs[full].info["held_joints"], strict=True)
+    ]
     joints = runs["full"].info["held_joints"][0]["joints"]
     return Table(("largest deflection, deg", *joints), tuple(rows))
 
@@ -164,26 +159,19 @@ def step_section(runs: Mapping[str, Result]) -> Section:
     )
     advice = ", and would do with the step in the last column." if over else "."
     verdict = Text(f"{len(over)} of {len(known)} runs are above the limit{advice}")
-    return Section("What the step costs", (estimated, verdict, *([_table(over)] if over else [])))
+    return Section("What the step costs", (estimated, verdict, *([_step_table(over)] if over else [])))
 
 
-def _table(runs: Mapping[str, Result]) -> Table:
+def _step_table(runs: Mapping[str, Result]) -> Table:
     titles = [str(run.info["title"]) for run in runs.values()]
     names = [
         name.replace("_", " ") if titles.count(t) > 1 else t for name, t in zip(runs, titles, strict=True)
     ]
     head = ("run", "step, ms", "estimate, %", "limit, %", "at", "t, s", "advised step, ms")
-    rows = zip(names, runs.values(), strict=True)
-    return Table(head, tuple(_row(name, run, run.info["step_error"]) for name, run in rows))
-
-
-def _row(name: str, run: Result, found: Mapping[str, Any]) -> tuple[str, ...]:
-    return (
-        name,
-        f"{1e3 * run.info['dt']:g}" if "dt" in run.info else "",
-        f"{100 * found['estimate']:.2g}",
-        f"{100 * found['limit']:.2g}",
-        f"{run.names[found['robot']]}, joint {found['joint'] + 1}",
-        f"{found['time']:g}",
-        f"{1e3 * found['advised_step']:.2g}",
-    )
+    rows = []
+    for name, run in zip(names, runs.values(), strict=True):
+        found, step = run.info["step_error"], f"{1e3 * run.info['dt']:g}" if "dt" in run.info else ""
+        shares = [f"{100 * found[share]:.2g}" for share in ("estimate", "limit")]
+        where = f"{run.names[found['robot']]}, joint {found['joint'] + 1}"
+        rows.append((name, step, *shares, where, f"{found['time']:g}", f"{1e3 * found['advised_step']:.2g}"))
+    return Table(head, tuple(rows))

@@ -87,7 +87,11 @@ def certificate_section(certificates: Mapping[str, Certificate], folder: Path) -
         certificates: by name of the run; the name is also that of its figure's file.
         folder: where `draw_certificate` has drawn each.
     """
-    pictures = tuple(_picture(name, c, folder) for name, c in certificates.items())
+    unknown = "Dashed: powers the theorem does not know."
+    pictures = tuple(
+        Picture(_stem(name, folder).with_suffix(".svg"), f"{_words(name)}: {c.verdict}. {unknown}")
+        for name, c in certificates.items()
+    )
     texts = [Text(f"{_words(name)}\n{c}", "formula") for name, c in certificates.items()]
     proof = (Text(_INTRODUCTION), Text(PROOF, "formula"), _verdicts(certificates), SideBySide(pictures))
     return Section("The proof, watched", (*proof, *texts))
@@ -131,11 +135,6 @@ _FAIRNESS = (
 )
 
 
-def _picture(name: str, certificate: Certificate, folder: Path) -> Picture:
-    svg = _stem(name, folder).with_suffix(".svg")
-    return Picture(svg, f"{_words(name)}: {certificate.verdict}. Dashed: powers the theorem does not know.")
-
-
 def _stem(name: str, folder: Path) -> Path:
     return folder / f"lyapunov_{name}"
 
@@ -147,13 +146,12 @@ def _words(name: str) -> str:
 
 def _verdicts(certificates: Mapping[str, Certificate]) -> Table:
     head = ("run", "verdict", "largest V'", "rounding of V'", "balance off by", "explained by the step")
-    return Table(head, tuple(_verdict(name, c) for name, c in certificates.items()))
-
-
-def _verdict(name: str, c: Certificate) -> tuple[str, ...]:
-    record = c.lyapunov
-    values = record.V_dot.max(), record.rounding.max(), record.largest_drift, record.drift_bound
-    return (_words(name), c.verdict, *(number(float(v), 2) for v in values))
+    rows = []
+    for name, c in certificates.items():
+        found = c.lyapunov
+        values = found.V_dot.max(), found.rounding.max(), found.largest_drift, found.drift_bound
+        rows.append((_words(name), c.verdict, *(number(float(v), 2) for v in values)))
+    return Table(head, tuple(rows))
 
 
 def _trials(c: Comparison, trials: Sequence[Trial], caption: str) -> Table:
