@@ -16,10 +16,9 @@ from numpy.typing import ArrayLike
 from ..checks import boolean, choice, finite_array, finite_number, instance, positive_number
 from ..coupling.cell import Reference
 from ..errors import InputError, ResultError
+from . import measured
 from .controller import Controller, Signals
-from .measured import check_adaptation, check_limits, check_signals, gravity_torque, measurement, not_finite
 from .network import Messages
-from .state_file import read_state, write_state
 
 #: how far from its place on the grid of samples a call may come, as a share of the period
 LATE = 0.1
@@ -73,14 +72,14 @@ class DiscreteController:
         faults: str = "error",
     ):
         instance("controller", controller, Controller, "a Controller")
-        check_adaptation(controller)
+        measured.check_adaptation(controller)
         self.controller, self.cell = controller, controller.cell
         self.period = positive_number("period", period)
         self.include_gravity = boolean("include_gravity", include_gravity)
         self.faults = choice("faults", faults, FAULTS)
         self._shape = self.cell.n, self.cell.nv
         self._messages = Messages(self.cell, controller.network)
-        self._limits = check_limits(torque_limits, self._shape)
+        self._limits = measured.check_limits(torque_limits, self._shape)
         self.held: int
         self.signals: Signals | None
         self._samples: int
@@ -117,17 +116,17 @@ class DiscreteController:
             NonFiniteError: the law has no finite torque here.
             SimulationError: a space of the user's ends the run, or a motion or weight of theirs fails.
         """
-        time, motion = self._time(t), measurement(q, v, self._shape)
+        time, motion = self._time(t), measured.measurement(q, v, self._shape)
         wanted = None if desired is None else finite_array("desired", desired, (3, self.cell.n, self.cell.m))
         missed = self._missed(time)
-        fault = self._off_the_grid(time, missed) or not_finite(self.cell, time, motion)
+        fault = self._off_the_grid(time, missed) or measured.not_finite(self.cell, time, motion)
         if fault is not None:
             return self._hold(time, missed, fault)
         with np.errstate(all="ignore"):  # what is not finite is named
             reference = self._reference(time, wanted)
             memory = self._heard(reference, motion, self._samples + missed)
             signals = self.controller.unchecked(reference, motion, self.z, memory)
-        check_signals(self.cell, time, signals)
+        measured.check_signals(self.cell, time, signals)
         self._advance(motion[0], memory, signals, missed)
         return self._tau.copy()
 
@@ -195,7 +194,7 @@ class DiscreteController:
             InputError: something else than a path.
             ResultError: the file cannot be written.
         """
-        return write_state(path, self.state)
+        return measured.write_state(path, self.state)
 
     def load(self, path: str | Path) -> None:
         """Read what `save` wrote, of a controller for the same cell and period.
@@ -204,7 +203,7 @@ class DiscreteController:
             InputError: something else than a path.
             ResultError: the file is missing, damaged, of another controller, or anything else.
         """
-        found = read_state(path, self.state)
+        found = measured.read_state(path, self.state)
         try:
             self.state = found
         except InputError as error:
@@ -282,7 +281,7 @@ class DiscreteController:
     def _advance(self, q: np.ndarray, memory: np.ndarray, signals: Signals, missed: int = 0) -> None:
         """Keep what is commanded, and what will be known at the next sample; or nothing, if a part fails."""
         tau = np.clip(signals.tau, -self._limits, self._limits)
-        tau = tau if self.include_gravity else tau - gravity_torque(self.cell, q)
+        tau = tau if self.include_gravity else tau - measured.gravity_torque(self.cell, q)
         z = self.controller.adaptation.settle(self.z + self.period * signals.z_dot)
         self._tau, self.z, self.signals = tau, z, signals
         self.memory = memory + self.period * signals.memory_dot

@@ -95,14 +95,16 @@ def read_gain(name: str, gain: Any) -> np.ndarray | RaggedGain:
     return finite_array(name, gain)
 
 
-def spread(name: str, gain: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+def spread(name: str, gain: np.ndarray, shape: tuple[int, ...], otherwise: str = "") -> np.ndarray:
     """A gain as an array of the given shape.
 
     Raises:
-        InputError: the gain has other dimensions.
+        InputError: the gain has other dimensions; `otherwise` says what else it could have been.
     """
-    if not _fits(gain, shape):
-        raise InputError(f"expected a shape of {_shapes(shape)}, found {gain.shape}", subject=name)
+    fits = zip(gain.shape[::-1], shape[::-1], strict=False)
+    if gain.ndim > len(shape) or any(found != expected for found, expected in fits):
+        shapes = " or ".join(str(shape[k:]) for k in range(len(shape), -1, -1))
+        raise InputError(f"expected a shape of {shapes}{otherwise}, found {gain.shape}", subject=name)
     return np.broadcast_to(gain, shape).copy()
 
 
@@ -126,20 +128,8 @@ def spread_rows(name: str, gain: np.ndarray | RaggedGain, lengths: Sequence[int]
                 subject=name,
             )
         return gain.padded()
-    if not _fits(gain, shape):
-        rows = "" if len(set(own)) == 1 else f", or a row for each robot, of {_listed(own)} entries"
-        raise InputError(f"expected a shape of {_shapes(shape)}{rows}, found {gain.shape}", subject=name)
-    return np.broadcast_to(gain, shape).copy()
-
-
-def _fits(gain: np.ndarray, shape: tuple[int, ...]) -> bool:
-    return gain.ndim <= len(shape) and all(
-        g == s for g, s in zip(gain.shape[::-1], shape[::-1], strict=False)
-    )
-
-
-def _shapes(shape: tuple[int, ...]) -> str:
-    return " or ".join(str(tuple(shape[k:])) for k in range(len(shape), -1, -1))
+    rows = "" if len(set(own)) == 1 else f", or a row for each robot, of {_listed(own)} entries"
+    return spread(name, gain, shape, rows)
 
 
 def _listed(lengths: Sequence[int]) -> str:
