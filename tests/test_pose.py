@@ -97,11 +97,6 @@ def test_the_series_have_the_digits_of_the_closed_form_where_that_has_them_all(a
     np.testing.assert_allclose(np.ravel(found), (b, slope), rtol=2e-13)
 
 
-@given(rpy=st.tuples(*[st.floats(-3, 3)] * 3))
-def test_rpy_is_pinocchios(rpy):
-    np.testing.assert_allclose(rotations.rotation_from_rpy(rpy), pin.rpy.rpyToMatrix(*rpy), atol=1e-14)
-
-
 # -- desired motion --------------------------------------------------------------------------------------
 
 

@@ -224,13 +224,8 @@ def settings_of(part: Adaptation | Law | Network) -> dict[str, Any]:
     Raises:
         InputError: its `as_dict` gives no mapping.
     """
-    settings = part.as_dict()
-    instance(
-        f"{type(part).__qualname__}, as_dict",
-        settings,
-        Mapping,
-        "names and settings, for example {'gain': 1.0}",
-    )
+    settings, where = part.as_dict(), f"{type(part).__qualname__}, as_dict"
+    instance(where, settings, Mapping, "names and settings, for example {'gain': 1.0}")
     return {"name": type(part).__name__, **settings}
 
 

@@ -138,9 +138,7 @@ class Cell:
         offers("space", self.space, ("labels", "unit", "bind"), "a space, for example CartesianSpace('xy')")
         self.labels = self.space.labels(self.robots)
         self.task = self.space.bind(self.robots)
-        self._check_members()
-        self._set_parameters()
-        self._set_initial_state()
+        self._read_members()
         check_labels(self)
 
     # -- sizes --------------------------------------------------------------------------------------------
@@ -204,22 +202,19 @@ class Cell:
 
     # -- internals ----------------------------------------------------------------------------------------
 
-    def _set_parameters(self) -> None:
-        self.parameters = tuple(
-            member_parameters(name, member.robot, member.friction, member.parameters)
-            for name, member in zip(self.names, self.members, strict=True)
-        )
-        self.theta = padded([p.theta for p in self.parameters])
-
-    def _set_initial_state(self) -> None:
-        q0, v0, theta_hat0 = [], [], []
-        for name, member, parameters in zip(self.names, self.members, self.parameters, strict=True):
+    def _read_members(self) -> None:
+        parameters, q0, v0, theta_hat0 = [], [], [], []
+        for name, member in zip(self.names, self.members, strict=True):
             nv = member.robot.nv
+            check_trajectory(name, member.trajectory, self.labels)
+            check_friction(name, member.friction, member.robot)
+            parameters.append(member_parameters(name, member.robot, member.friction, member.parameters))
             q0.append(finite_array(f"{name}, q0", self._start(name, member), (nv,)))
             v0.append(finite_array(f"{name}, v0", np.zeros(nv) if member.v0 is None else member.v0, (nv,)))
-            size = len(parameters.theta)
+            size = len(parameters[-1].theta)
             guess = np.zeros(size) if member.theta_hat0 is None else member.theta_hat0
             theta_hat0.append(finite_array(f"{name}, theta_hat0", guess, (size,)))
+        self.parameters, self.theta = tuple(parameters), padded([p.theta for p in parameters])
         self.q0, self.v0, self.theta_hat0 = padded(q0), padded(v0), padded(theta_hat0)
 
     def _start(self, name: str, member: Member) -> ArrayLike:
@@ -228,11 +223,6 @@ class Cell:
         if hasattr(self.space, "start"):
             return self.space.start(member.robot, member.trajectory(0.0).x)
         raise InputError("expected joint positions to start from, found none", subject=f"{name}, q0")
-
-    def _check_members(self) -> None:
-        for name, member in zip(self.names, self.members, strict=True):
-            check_trajectory(name, member.trajectory, self.labels)
-            check_friction(name, member.friction, member.robot)
 
     def __reduce__(self) -> tuple:
         """Copies and other processes bind the space anew: arrays that share memory would come apart."""

@@ -73,9 +73,8 @@ def check_rows(name: str, n: int, edges: np.ndarray, signs: np.ndarray) -> None:
     _find("signs other than 0, one for each robot", (signs == 0).any(axis=1), edges, n)
     if edges.shape[1] == 2:
         w = carried_motion(n, edges, signs)
-        _check_connected(w)
+        _check_motion(name, w, fits_all(edges, signs, w))
         _warn_of_repetition(name, n, ordered)
-        _warn_of_rest(name, fits_all(edges, signs, w))
 
 
 def _find(expected: str, wrong: np.ndarray, edges: np.ndarray, n: int) -> None:
@@ -86,11 +85,19 @@ def _find(expected: str, wrong: np.ndarray, edges: np.ndarray, n: int) -> None:
         raise CouplingError(f"expected {expected}", subject=f"edge {k}, of robots {edges[k].tolist()}")
 
 
-def _check_connected(w: np.ndarray) -> None:
+def _check_motion(name: str, w: np.ndarray, left_free: bool) -> None:
+    """Refuse a graph in several pieces, and warn of one that leaves no synchronized motion free."""
     if np.isnan(w).any():
         raise CouplingError(
             "the graph is not connected: no chain of edges leads from robot 0 to robot "
             f"{np.argmax(np.isnan(w))}; add an edge, or simulate the groups as separate cells"
+        )
+    if not left_free:
+        warn(
+            f"{name}: all synchronization errors vanish only where all tracking errors do, so there is no "
+            "synchronized motion and every robot is held in place, as on the paper's ring of an odd number "
+            "of robots; take differences instead, for example Coupling.signed_ring",
+            CouplingWarning,
         )
 
 
@@ -102,16 +109,6 @@ def _warn_of_repetition(name: str, n: int, ordered: np.ndarray) -> None:
         warn(
             f"{name}: robots {i} and {j} are compared {counts.max()} times, which multiplies the effect of "
             f"beta and K_eps on them by {counts.max()}; {way_out}, or use edge weights",
-            CouplingWarning,
-        )
-
-
-def _warn_of_rest(name: str, motion_left: bool) -> None:
-    if not motion_left:
-        warn(
-            f"{name}: all synchronization errors vanish only where all tracking errors do, so there is no "
-            "synchronized motion and every robot is held in place, as on the paper's ring of an odd number "
-            "of robots; take differences instead, for example Coupling.signed_ring",
             CouplingWarning,
         )
 

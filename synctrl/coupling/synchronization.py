@@ -241,14 +241,13 @@ class SynchronizationFunction:
             f"it is not linear (assumption 1) in the coordinates of {robots}: at t = {t:g} s f is off by "
             f"{bend:.3g} where x_{i + 1} = {x[i].tolist()}"
         )
-        return text if x.size > 12 else f"{text}; {self._second_order(xd, t)}"
-
-    def _second_order(self, xd: np.ndarray, t: float) -> str:
+        if x.size > 12:
+            return text
         try:
             terms = self.expand(xd, t).second_order_terms()
         except SynchronizationError as error:
-            return str(error)
-        return f"the second-order terms of (5) are there {', '.join(terms) if terms else 'zero'}"
+            return f"{text}; {error}"
+        return f"{text}; the second-order terms of (5) are there {', '.join(terms) or 'zero'}"
 
     def _check_satisfied(self, xd: np.ndarray, times: np.ndarray, source: WeightSource) -> None:
         """Equation (3): f = 0 on the desired motion."""

@@ -58,7 +58,9 @@ def run_all(folder: Path, workers: int, planned: Mapping[str, PlannedRun]) -> di
             stopped what was computed.
         ResultError: a file cannot be written.
     """
-    _check_writable(folder)
+    with reported("write into the folder", folder):  # before anything runs
+        folder.mkdir(parents=True, exist_ok=True)
+        TemporaryFile(dir=folder).close()
     context = get_context("spawn")
     events = context.SimpleQueue()
     with ProcessPoolExecutor(workers, context, initializer=_start, initargs=(events.put,)) as pool:
@@ -147,13 +149,6 @@ def _reporter(name: str, duration: float) -> Callable[[float], None]:
             _report((name, t, duration))
 
     return progress
-
-
-def _check_writable(folder: Path) -> None:
-    """Fail before anything runs where nothing could be saved."""
-    with reported("write into the folder", folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        TemporaryFile(dir=folder).close()
 
 
 #: Lambda + beta of the paper's four arms: what an independent controller could be given instead, 1/s

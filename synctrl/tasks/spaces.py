@@ -191,7 +191,9 @@ class TipSpace(ABC):
         self.m = m
         self.redundancy = Redundancy() if redundancy is None else redundancy
         instance("redundancy", self.redundancy, Redundancy, "a Redundancy")
-        self.damping = _damping(singularity)
+        self.damping = singularity if isinstance(singularity, Damping) else None
+        if self.damping is None and choice("singularity", singularity, ("stop", "damped")) == "damped":
+            self.damping = Damping()
         limit = positive_number("max_condition", max_condition)
         self.max_condition = limit if self.damping is None else np.inf
 
@@ -278,9 +280,3 @@ class CartesianSpace(TipSpace):
 
     def __repr__(self) -> str:
         return f"CartesianSpace('{self.axes}')"
-
-
-def _damping(singularity: str | Damping) -> Damping | None:
-    if isinstance(singularity, Damping):
-        return singularity
-    return Damping() if choice("singularity", singularity, ("stop", "damped")) == "damped" else None
