@@ -27,7 +27,7 @@ from ..errors import (
     SingularJacobianError,
 )
 from ..files import reported, whole_file
-from ..tasks.measurement import Beyond, first_beyond
+from ..tasks.measurement import first_beyond
 from .controller import Controller, Signals
 
 #: bytes of an archive beside its arrays, per array: names, sizes and numpy's header
@@ -94,7 +94,14 @@ def check_signals(cell: Cell, t: float, signals: Signals) -> None:
     """
     beyond = first_beyond(cell.task, signals.task)
     if beyond is not None:
-        raise _meaningless(cell, t, beyond)
+        name, i, value, limit = beyond
+        kind, what = _ENDS.get(name, (SimulationError, name))
+        raise kind(
+            f"the {what} of {cell.names[i]} is {value:.3g} at t = {t:g} s, where {cell.space!r} expects it "
+            f"below {limit:g}; stop the robots and reset the controller",
+            time=t,
+            robot=i,
+        )
     for what, rows in (("torque", signals.tau), ("rate of the estimates", signals.z_dot)):
         bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
         if bad.size:
@@ -110,18 +117,6 @@ def gravity_torque(cell: Cell, q: np.ndarray) -> np.ndarray:
     for row, robot, q_i in zip(g, cell.robots, q, strict=True):
         row[: robot.nv] = robot.gravity(q_i[: robot.nv])
     return g
-
-
-def _meaningless(cell: Cell, t: float, beyond: Beyond) -> SimulationError:
-    """The error with which a simulation stops there too."""
-    name, i, value, limit = beyond
-    kind, what = _ENDS.get(name, (SimulationError, name))
-    return kind(
-        f"the {what} of {cell.names[i]} is {value:.3g} at t = {t:g} s, where {cell.space!r} expects it below "
-        f"{limit:g}; stop the robots and reset the controller",
-        time=t,
-        robot=i,
-    )
 
 
 def _undefined(cell: Cell, t: float, what: str, robot: int) -> NonFiniteError:
@@ -150,17 +145,10 @@ def check_adaptation(controller: Controller) -> None:
     shaped(f"{where}, estimate", adaptation.estimate(z), cell.theta.shape)
     shaped(f"{where}, settle", adaptation.settle(z), z.shape)
     rate = z
-    with suppress(Exception):
-        rate = _first_rate(controller, z)
-    shaped(f"{where}, rate", rate, z.shape)
-
-
-def _first_rate(controller: Controller, z: np.ndarray) -> Any:
-    """z' where the cell starts."""
-    cell = controller.cell
     reference, motion = cell.references(np.zeros(1))[0], np.stack((cell.q0, cell.v0))
-    with np.errstate(all="ignore"):
-        return controller.unchecked(reference, motion, z, controller.network.start()).z_dot
+    with suppress(Exception), np.errstate(all="ignore"):
+        rate = controller.unchecked(reference, motion, z, controller.network.start()).z_dot
+    shaped(f"{where}, rate", rate, z.shape)
 
 
 def write_state(path: str | Path, state: Mapping[str, np.ndarray]) -> Path:

@@ -65,13 +65,14 @@ def a460_pair(
     boolean("friction", friction)
     boolean("adapt_friction", adapt_friction)
     robot = load_robot("a460")
-    members = [_member(robot, i, FRICTION if friction else Friction()) for i in range(2)]
+    members, ours = [_member(robot, i, FRICTION if friction else Friction()) for i in range(2)], GAINS
     if adapt_friction:
         members = [_knowing_friction(member) for member in members]
+        ours = replace(GAINS, Gamma=np.repeat([float(GAINS.Gamma), GAMMA_FRICTION], [30, 6]))
     cell = Cell(members, Coupling.pair(c=(1.0, -1.0)), JointSpace(), name="A460 pair")
     remarks = [*["without friction"] * (not friction), *["friction adapted"] * adapt_friction]
     options = ControllerParts(reference_acceleration=reference_acceleration, k_r_space=k_r_space, **parts)
-    return ready_experiment(cell, DURATION, _gains(adapt_friction), gains, synchronized, options, *remarks)
+    return ready_experiment(cell, DURATION, ours, gains, synchronized, options, *remarks)
 
 
 def a460_full_pair(wrist: Pid = WRIST, **options: Any) -> Experiment:
@@ -102,9 +103,3 @@ def _knowing_friction(member: Member) -> Member:
     """The member with friction among what it adapts."""
     knowing = replace(member, parameters=FrictionParameters(member.robot))
     return replace(knowing, theta_hat0=KNOWN * knowing.theta)
-
-
-def _gains(adapt_friction: bool) -> Gains:
-    if not adapt_friction:
-        return GAINS
-    return replace(GAINS, Gamma=np.repeat([float(GAINS.Gamma), GAMMA_FRICTION], [30, 6]))

@@ -40,10 +40,6 @@ def _inverse(A: np.ndarray) -> np.ndarray:
         return result
 
 
-def _determinant(A: np.ndarray) -> np.ndarray:
-    return np.linalg.det(A)[..., None]
-
-
 def _smallest(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """NaN only for the matrices that are not finite, so that the run's guard can name the robot."""
     finite = np.isfinite(A).all(axis=(-2, -1), keepdims=True)
@@ -53,7 +49,7 @@ def _smallest(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 #: of numbers
-LAPACK = Algebra(_inverse, _determinant, _smallest)
+LAPACK = Algebra(_inverse, lambda A: np.linalg.det(A)[..., None], _smallest)
 
 
 def padded(rows: Sequence[np.ndarray]) -> np.ndarray:
