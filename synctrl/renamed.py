@@ -14,18 +14,15 @@ from .errors import warn
 
 T = TypeVar("T")
 
-#: rooms that modules have left, the room they are in now, and their names
-_MOVES = (
-    (
-        "tasks",
-        "coupling",
-        "cell coupling desired expansion graphs member_checks reachability synchronization weights",
-    ),
-    ("analysis", "paper", "baselines claims judge trials"),
-    ("experiments", "paper", "reproduction theory"),
-    ("show", "paper", "paper_sections plant_sections report"),
-    ("simulation", "sweep", "prepared"),
-)
+#: the room that modules have left, the one they are in now, and their names
+_MOVES = {
+    "tasks coupling": "cell coupling desired expansion graphs member_checks reachability "
+    "synchronization weights",
+    "analysis paper": "baselines claims judge trials",
+    "experiments paper": "reproduction theory",
+    "show paper": "paper_sections plant_sections report",
+    "simulation sweep": "prepared",
+}
 _URDF = "checks", "document", "meshes", "reader", "writer", "xml"
 #: modules of today, and those that are a part of them now
 _PARTS = {
@@ -47,7 +44,8 @@ _PARTS = {
 
 def _pairs() -> Iterator[tuple[str, str]]:
     """Old and new names, within the package."""
-    for old, new, names in _MOVES:
+    for rooms, names in _MOVES.items():
+        old, new = rooms.split()
         yield from ((f"{old}.{name}", f"{new}.{name}") for name in names.split())
     yield from ((f"robots.urdf_{name}", f"robots.urdf.{name}") for name in _URDF)
     yield from ((old, new) for new, names in _PARTS.items() for old in names.split())

@@ -120,9 +120,7 @@ def member_parameters(name: str, robot: Robot, friction: Friction, given: Any) -
         try:
             return parameters_of("full" if given is None else given, robot)
         except InputError as error:
-            unknown = InputError(f"{name}, {error}")
-            unknown.subject = f"{name}, {error.subject}"
-            raise unknown from None
+            raise InputError(f"{name}, {error}").about(f"{name}, {error.subject}") from None
     parameters = _with_friction(name, friction, given)
     where = f"{name}, parameters"
     offers(where, parameters, ("names", "theta", "regressor"), "parameters, for example FullParameters")
@@ -141,23 +139,16 @@ def _with_friction(name: str, friction: Friction, given: Any) -> Any:
             return given.with_friction(friction)
         except InputError as error:
             raise InputError(f"{error}", subject=f"{name}, parameters") from None
-    if given.friction is not friction:
-        _check_agreement(name, friction, given.friction)
-    return given
-
-
-def _check_agreement(name: str, friction: Friction, stated: Friction) -> None:
-    if not friction.equals(stated):
+    if not friction.equals(given.friction):
         raise InputError(
-            f"FrictionParameters say {stated}, but the member's friction is {friction}; "
+            f"FrictionParameters say {given.friction}, but the member's friction is {friction}; "
             "expected the true friction stated once, as Member(friction=...)",
             subject=f"{name}, parameters",
         )
-    warn(
-        f"{name}: its friction is stated twice; give it to the member alone, FrictionParameters(robot) takes "
-        "it from there",
-        DeprecationWarning,
-    )
+    if given.friction is not friction:
+        once = "give it to the member alone, FrictionParameters(robot) takes it from there"
+        warn(f"{name}: its friction is stated twice; {once}", DeprecationWarning)
+    return given
 
 
 def _check_sizes(where: str, parameters: Any, robot: Robot) -> None:

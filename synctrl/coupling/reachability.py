@@ -166,8 +166,7 @@ def _motion(cell: Cell, robot: int, times: np.ndarray) -> Motion:
     except InputError as error:
         where, end = f"{cell.names[robot]}, trajectory", times.max()
         failure = TrajectoryError(f"{where}, {error}, between t = 0 s and {end:g} s")
-        failure.subject, failure.found = where, error.found
-        raise failure from None
+        raise failure.about(where, found=error.found) from None
 
 
 def _error(cell: Cell, name: str, order: int, misfit: Misfit) -> TrajectoryError:

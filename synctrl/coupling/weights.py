@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -185,13 +185,9 @@ def as_source(robots: int, c: ArrayLike | WeightFunction | WeightSource) -> Weig
     Raises:
         InputError: weights for another number of robots.
     """
-    source: WeightSource
-    if hasattr(c, "at") and hasattr(c, "scaled"):
-        source = c  # type: ignore[assignment]
-    elif callable(c):
-        source = FunctionWeights(robots, c)
-    else:
-        source = ConstantWeights(c)
+    source: Any = c
+    if not (hasattr(c, "at") and hasattr(c, "scaled")):
+        source = FunctionWeights(robots, c) if callable(c) else ConstantWeights(c)  # type: ignore[arg-type]
     if source.robots != robots:
         raise InputError(
             f"expected one weight for each of {robots} robots, found {source.robots}", subject="c"

@@ -60,8 +60,7 @@ class SmoothOrientation:
 
     Args:
         rotation: function of t returning a rotation matrix, (3, 3); smooth between the breaks.
-        duration: it can be used from 0 to this time, s.
-        breaks: instants at which a derivative jumps, s.
+        duration, breaks: see `SmoothTrajectory`.
 
     Raises:
         InputError: no function, a duration that is not positive, or breaks that are no numbers.

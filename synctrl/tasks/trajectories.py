@@ -214,9 +214,7 @@ def value_at(name: str, function: Callable, t: float, check: Callable, *expected
     try:
         return check(name, function(t), *expected)
     except InputError as error:
-        failure = TrajectoryError(f"{error} at t = {t:g} s")
-        failure.subject, failure.found = name, error.found
-        raise failure from error
+        raise TrajectoryError(f"{error} at t = {t:g} s").about(name, found=error.found, time=t) from error
 
 
 def _times(factor: np.ndarray, vector: np.ndarray) -> np.ndarray:
