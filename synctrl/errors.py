@@ -63,7 +63,7 @@ class SynctrlError(Portable, Exception):
         vars(self).update({name: value for name, value in data.items() if value is not None})
         super().__init__(self._whole(message))
 
-    def about(self, subject: str | None, **data: Any) -> Self:
+    def about(self, subject: str | None = None, **data: Any) -> Self:
         """This error with more data, for one whose message says in words of its own what it is about."""
         vars(self).update(subject=subject, **data)
         return self

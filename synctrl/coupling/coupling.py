@@ -179,7 +179,8 @@ class Coupling:
         """
         size = self._source.size(finite_number("t", t))
         if not 0 < size < np.inf:
-            raise CouplingError(f"a weight has no inverse at t = {t:g} s, so there is no scale to divide by")
+            singular = f"a weight has no inverse at t = {t:g} s, so there is no scale to divide by"
+            raise CouplingError(singular).about("c", time=t)
         return self._again(self.signs, self._source.scaled(1 / size), "")
 
     def _again(self, signs: np.ndarray, source: WeightSource, unit: str) -> Self:
@@ -222,7 +223,8 @@ class Coupling:
             CouplingError: the coupling is not made of pairs.
         """
         if not self._in_pairs:
-            raise CouplingError(f"{self!r} compares all robots at once and leaves more than one motion free")
+            many = "compares all robots at once and leaves more than one motion free"
+            raise CouplingError(f"{self!r} {many}").about("edges")
         w = graphs.carried_motion(self.robots, self.edges, self.signs)
         return w if graphs.fits_all(self.edges, self.signs, w) else None
 

@@ -124,7 +124,7 @@ def check_weights(source: WeightSource, times: np.ndarray, m: int) -> None:
         raise CouplingError(
             f"the weight c of the robot at index {i} loses its inverse near t = {times[k]:g} s, where it is "
             f"{c[k, i].tolist()} and changes at {c_dot[k, i].tolist()} per second"
-        )
+        ).about("c", robot=int(i), time=float(times[k]))
 
 
 def _check_derivatives(source: WeightSource, start: float, stop: float, m: int) -> None:
@@ -143,4 +143,4 @@ def _check_derivatives(source: WeightSource, start: float, stop: float, m: int) 
             f"{derivative} of the robot at index {i} is not the derivative of {name}: near "
             f"t = {misfit.time:.6g} s entry {divmod(entry, m)} of {name} changes by "
             f"{misfit.expected:.6g} per second, but {derivative} says {misfit.found:.6g}"
-        )
+        ).about(derivative, robot=i, time=misfit.time)

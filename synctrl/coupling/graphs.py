@@ -91,7 +91,7 @@ def _check_motion(name: str, w: np.ndarray, left_free: bool) -> None:
         raise CouplingError(
             "the graph is not connected: no chain of edges leads from robot 0 to robot "
             f"{np.argmax(np.isnan(w))}; add an edge, or simulate the groups as separate cells"
-        )
+        ).about("edges", robot=int(np.argmax(np.isnan(w))))
     if not left_free:
         warn(
             f"{name}: all synchronization errors vanish only where all tracking errors do, so there is no "

@@ -90,7 +90,8 @@ def reach(robot: Robot, target: np.ndarray, q: np.ndarray, space: Any = None) ->
     found = inverse_kinematics(robot, target, q, space)
     if found is None:
         place = ", ".join(f"{value:.4g}" for value in target)
-        raise UnreachableError(f"'{robot.name}' cannot reach ({place}); expected a place in reach of its tip")
+        failure = UnreachableError(f"'{robot.name}' cannot reach ({place}); expected a place in reach")
+        raise failure.about("target", found=tuple(map(float, target)))
     return found
 
 
@@ -118,7 +119,7 @@ def _unreachable(name: str, robot: Robot, t: float, target: np.ndarray, cell: Ce
     return UnreachableError(
         f"{name} ('{robot.name}') cannot reach its desired position at t = {t:g} s: {wanted}; "
         "expected a path inside the workspace of its tip"
-    )
+    ).about(f"{name}, trajectory", found=target.tolist(), time=float(t))
 
 
 def check_motions(cell: Cell, times: np.ndarray) -> None:
@@ -180,4 +181,5 @@ def _error(cell: Cell, name: str, order: int, misfit: Misfit) -> TrajectoryError
         f"{misfit.expected:.6g} {unit}{per}; expected its derivative, which SmoothTrajectory finds by "
         "itself, or `breaks` where it jumps",
         subject=f"{name}, trajectory",
+        found=misfit.found,
     )

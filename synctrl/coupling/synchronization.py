@@ -142,7 +142,7 @@ class SynchronizationFunction:
             raise SynchronizationError(
                 f"the weights cannot be differentiated: {DERIVATIVES[error.order]} of robot {error.row + 1}: "
                 f"{error}, or its derivatives, see SynchronizationFunction.from_matrices"
-            ) from None
+            ).about("c", robot=error.row, time=error.time) from None
         constant = smooth.constant()
         return SmoothWeights(smooth) if constant is None else ConstantWeights(constant)
 
@@ -178,7 +178,7 @@ class SynchronizationFunction:
         except SynchronizationError:
             raise
         except CouplingError as error:
-            raise SynchronizationError(str(error)) from error
+            raise SynchronizationError(str(error)).about(**vars(error)) from error
         self._check_satisfied(xd, times, source)
         return coupling
 
@@ -219,7 +219,7 @@ class SynchronizationFunction:
         if bend is not None:
             defects.append(bend)
         if defects:
-            raise SynchronizationError(f"f cannot be controlled: {'; and '.join(defects)}")
+            raise SynchronizationError(f"f cannot be controlled: {'; and '.join(defects)}").about("function")
 
     def _bend(self, xd: np.ndarray, times: np.ndarray) -> str | None:
         """What is not linear in f, if anything is, at random positions about the desired ones."""
@@ -262,7 +262,7 @@ class SynchronizationFunction:
                 f"the desired motion does not satisfy f = 0, eq. (3): at t = {times[k]:g} s f is "
                 f"{f[k].tolist()}; for f = 0 robot {i + 1} alone would have to be moved by "
                 f"{shifts[i].tolist()} from {xd[k, i].tolist()}"
-            )
+            ).about("trajectories", robot=i, time=float(times[k]), found=f[k].tolist())
 
 
 def _as_function(value: ArrayLike | MatrixFunction) -> MatrixFunction:
@@ -286,4 +286,4 @@ def _check_implied(coupling: Coupling) -> None:
         raise SynchronizationError(
             f"the graph '{coupling.name}' does not imply f = 0: its errors vanish with {motion}, whose sum "
             "is not 0 as (6) demands; use Coupling.sum, or Coupling.ring for an even number of robots"
-        )
+        ).about("graph", found=coupling.name)

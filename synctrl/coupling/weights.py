@@ -116,7 +116,7 @@ class FunctionWeights:
                     f"expected one weight for each of {self.robots} robots, found shapes {found}"
                 )
         except InputError as error:
-            raise CouplingError(f"{error}", subject=f"weights at t = {t:g} s") from error
+            raise CouplingError(f"weights at t = {t:g} s: {error}").about("c", time=float(t)) from error
         return parts
 
 
@@ -151,10 +151,9 @@ class SmoothWeights:
                 positive_number("duration", duration),
             )
         except NotSmoothError as error:
-            raise CouplingError(
-                f"the weight of the robot at index {error.row} cannot be differentiated {error.order} times: "
-                f"{error}"
-            ) from None
+            where = f"the weight of the robot at index {error.row}"
+            failure = CouplingError(f"{where} cannot be differentiated {error.order} times: {error}")
+            raise failure.about("c", robot=error.row, time=error.time) from None
         return cls(smooth)
 
     def at(self, times: np.ndarray, m: int) -> Weights:
@@ -168,7 +167,7 @@ class SmoothWeights:
             raise CouplingError(
                 f"the weights were prepared for times from 0 to {self._c.duration:g} s, asked for t = "
                 f"{outside:g} s; make the coupling for a longer duration"
-            )
+            ).about("c", time=outside)
         c, c_dot, c_ddot = self._factor * self._c.at(times)
         return Weights(c, c_dot, c_ddot, inverse(c, times))
 
@@ -187,7 +186,7 @@ def as_source(robots: int, c: ArrayLike | WeightFunction | WeightSource) -> Weig
     """
     source: Any = c
     if not (hasattr(c, "at") and hasattr(c, "scaled")):
-        source = FunctionWeights(robots, c) if callable(c) else ConstantWeights(c)  # type: ignore[arg-type]
+        source = FunctionWeights(robots, c) if callable(c) else ConstantWeights(c)
     if source.robots != robots:
         raise InputError(
             f"expected one weight for each of {robots} robots, found {source.robots}", subject="c"
@@ -239,7 +238,7 @@ def _singular(c: np.ndarray, times: np.ndarray) -> CouplingError:
     return CouplingError(
         f"the weight c of the robot at index {i} has no inverse at t = {times[k]:g} s "
         f"(condition number {condition[k, i]:.2g}): {c[k, i].tolist()}"
-    )
+    ).about("c", robot=int(i), time=float(times[k]))
 
 
 __getattr__ = names_elsewhere(__name__, ".desired", "check_weights")

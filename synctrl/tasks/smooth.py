@@ -100,7 +100,7 @@ def _certified(
         raise TrajectoryError(
             f"the {MOTION_PARTS[error.order]} cannot be found: {error}, with `breaks` where a derivative "
             "jumps"
-        ) from None
+        ).about(MOTION_PARTS[error.order], time=error.time) from None
 
 
 def _at(function: SmoothFunction, times: np.ndarray) -> np.ndarray:
@@ -110,7 +110,7 @@ def _at(function: SmoothFunction, times: np.ndarray) -> np.ndarray:
         raise TrajectoryError(
             f"expected a time from 0 to {function.duration:g} s, for which the motion was made, found "
             f"t = {outside:g} s; make it for a longer duration"
-        )
+        ).about("t", found=outside)
     return function.at(times)[:, :, 0]
 
 
