@@ -190,17 +190,17 @@ def test_what_is_no_part_of_a_pose_trajectory_is_refused_by_name(subject, make):
 
 
 def test_malformed_pose_trajectories_are_refused():
-    with pytest.raises(InputError, match="a trajectory of 3 numbers, found one of 2"):
+    with refused(InputError, "position", found=2):
         PoseTrajectory(Hold([0, 0]))
-    with pytest.raises(InputError, match=r"differs from 1 by"):
+    with refused(InputError, "start"):
         AxisRotation.fixed(2 * np.eye(3))
-    with pytest.raises(InputError, match="a reflection"):
+    with refused(InputError, "start"):
         AxisRotation.fixed(-np.eye(3))
-    with pytest.raises(InputError, match="axis"):
+    with refused(InputError, "length of axis"):
         AxisRotation.steady(np.eye(3), (0, 0, 0), 1.0)
-    with pytest.raises(InputError, match="1 number, found one of 2"):
+    with refused(InputError, "angle", found=2):
         AxisRotation(np.eye(3), (0, 0, 1), Hold([0, 0]))
-    with pytest.raises(InputError, match="PoseTrajectory"):
+    with refused(InputError, "body"):
         Attached(Hold([0, 0, 0]))
     zero = np.zeros(3)
     with refused(TrajectoryError, "velocity", found=(2,)):

@@ -48,7 +48,7 @@ class Gains:
             low = gain.min() if gain.size else 0.0
             if low < 0 or (positive and low == 0):
                 bound = "above 0" if positive else "of at least 0"
-                raise InputError(f"expected entries {bound}, found {low:g}", subject=name)
+                raise InputError(f"expected entries {bound}, found {low:g}", subject=name, found=float(low))
             object.__setattr__(self, name, gain)
 
     def independent(self) -> Self:
@@ -104,7 +104,8 @@ def spread(name: str, gain: np.ndarray, shape: tuple[int, ...], otherwise: str =
     fits = zip(gain.shape[::-1], shape[::-1], strict=False)
     if gain.ndim > len(shape) or any(found != expected for found, expected in fits):
         shapes = " or ".join(str(shape[k:]) for k in range(len(shape), -1, -1))
-        raise InputError(f"expected a shape of {shapes}{otherwise}, found {gain.shape}", subject=name)
+        expected = f"expected a shape of {shapes}{otherwise}"
+        raise InputError(f"{expected}, found {gain.shape}", subject=name, found=gain.shape)
     return np.broadcast_to(gain, shape).copy()
 
 
@@ -122,11 +123,8 @@ def spread_rows(name: str, gain: np.ndarray | RaggedGain, lengths: Sequence[int]
     shape, own = (len(lengths), max(lengths)), tuple(lengths)
     if isinstance(gain, RaggedGain):
         if gain.lengths != own:
-            raise InputError(
-                f"expected a row for each robot, of {_listed(own)} entries, "
-                f"found rows of {_listed(gain.lengths)}",
-                subject=name,
-            )
+            expected, found = f"expected a row for each robot, of {_listed(own)} entries", gain.lengths
+            raise InputError(f"{expected}, found rows of {_listed(found)}", subject=name, found=found)
         return gain.padded()
     rows = "" if len(set(own)) == 1 else f", or a row for each robot, of {_listed(own)} entries"
     return spread(name, gain, shape, rows)

@@ -175,7 +175,7 @@ def _error(cell: Cell, name: str, order: int, misfit: Misfit) -> TrajectoryError
     unit = units_of(cell.space, cell.m)[misfit.coordinate]
     per = ("/s", "/s^2")[order - 1]
     function, derivative = MOTION_PARTS[order - 1 : order + 1]
-    return TrajectoryError(
+    failure = TrajectoryError(
         f"its {derivative} along {label} does not fit its {function}: near "
         f"t = {misfit.time:.6g} s found {misfit.found:.6g} {unit}{per}, but the {function} changes by "
         f"{misfit.expected:.6g} {unit}{per}; expected its derivative, which SmoothTrajectory finds by "
@@ -183,3 +183,4 @@ def _error(cell: Cell, name: str, order: int, misfit: Misfit) -> TrajectoryError
         subject=f"{name}, trajectory",
         found=misfit.found,
     )
+    return failure.about(failure.subject, time=misfit.time, derivative=derivative, coordinate=label)

@@ -205,7 +205,7 @@ def _check_dimension(name: str, trajectory: Any, m: int) -> None:
     if dimension != m:
         numbers = f"{m} number{'s' * (m != 1)}"
         found = repr(trajectory) if dimension is None else f"one of {dimension}"
-        raise InputError(f"expected a trajectory of {numbers}, found {found}", subject=name)
+        raise InputError(f"expected a trajectory of {numbers}, found {found}", subject=name, found=dimension)
 
 
 def _unit(name: str, vector: ArrayLike) -> np.ndarray:
