@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import count, finite_array, finite_number, instance, positive_number
 from ..errors import CouplingError, InputError, SynchronizationError
-from ..tasks.chebyshev import NotSmoothError, certify
+from ..tasks.chebyshev import NotSmoothError, fit_smooth
 from ..tasks.trajectories import Trajectory
 from .coupling import Coupling
 from .expansion import Expansion, expand, least_linear
@@ -137,7 +137,7 @@ class SynchronizationFunction:
         if self._given is not None:
             return self._given
         try:
-            smooth = certify(self.c, positive_number("duration", duration))
+            smooth = fit_smooth(self.c, positive_number("duration", duration))
         except NotSmoothError as error:
             raise SynchronizationError(
                 f"the weights cannot be differentiated: {DERIVATIVES[error.order]} of robot {error.row + 1}: "

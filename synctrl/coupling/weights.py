@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, positive_number
 from ..errors import CouplingError, InputError
 from ..renamed import names_elsewhere
-from ..tasks.chebyshev import NotSmoothError, SmoothFunction, certify
+from ..tasks.chebyshev import NotSmoothError, SmoothFunction, fit_smooth
 
 #: A condition number above this counts as "no inverse".
 SINGULAR = 1e12
@@ -146,7 +146,7 @@ class SmoothWeights:
             CouplingError: it is not smooth enough for a relative error of 1e-8.
         """
         try:
-            smooth = certify(
+            smooth = fit_smooth(
                 lambda t: as_matrices(finite_array(f"c at t = {t:g} s", c(t)), m),
                 positive_number("duration", duration),
             )

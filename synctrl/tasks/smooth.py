@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, instance, positive_number
 from ..errors import TrajectoryError
 from . import rotations
-from .chebyshev import Function, NotSmoothError, SmoothFunction, certify
+from .chebyshev import Function, NotSmoothError, SmoothFunction, fit_smooth
 from .poses import Turning
 from .trajectories import MOTION_PARTS, Motion, value_at
 
@@ -95,7 +95,7 @@ def _certified(
     """A function of shape (1, a, b) from 0 to `duration`, and its breaks."""
     instants = tuple(finite_array("breaks", breaks, (None,)).tolist())
     try:
-        return certify(function, positive_number("duration", duration), instants), instants
+        return fit_smooth(function, positive_number("duration", duration), instants), instants
     except NotSmoothError as error:
         raise TrajectoryError(
             f"the {MOTION_PARTS[error.order]} cannot be found: {error}, with `breaks` where a derivative "
