@@ -153,7 +153,8 @@ def shaped(name: str, value: Any, shape: tuple[int, ...]) -> None:
         InputError: `value` has another shape.
     """
     if np.shape(value) != shape:
-        raise InputError(f"expected an array of shape {shape}, found {np.shape(value)}", subject=name)
+        found = np.shape(value)
+        raise InputError(f"expected an array of shape {shape}, found {found}", subject=name, found=found)
 
 
 def choice(name: str, value: object, known: tuple[str, ...]) -> str:

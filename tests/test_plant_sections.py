@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from synctrl.analysis.identification import identify
 from synctrl.errors import InputError
@@ -77,7 +78,7 @@ def test_runs_that_differ_are_told_from_those_that_agree(runs) -> None:
     other = compare_runs(run, shifted)
     assert not other.agrees
     np.testing.assert_allclose(other.sync, 2 * AGREEMENT)
-    with pytest.raises(InputError, match="same instants"):
+    with refused(InputError, "runs"):
         compare_runs(run, a460_pair().simulate(0.04))
 
 

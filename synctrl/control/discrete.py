@@ -244,19 +244,20 @@ class DiscreteController:
     def _may_hold(self) -> bool:
         return self.faults == "hold" and self._samples > 0
 
-    def _off_the_grid(self, t: float, missed: int) -> str | None:
+    def _off_the_grid(self, t: float, missed: int) -> InputError | None:
         """What is wrong with the time of a call, if anything is."""
         due = self._t0 + (self._samples + missed) * self.period
         late = (t - due) / self.period
         if abs(late) <= LATE:
             return None
         how = f"{late:.3g} periods late" if late > 0 else "time runs backwards, or the call is early"
-        return f"t: expected the sample at {due:g} s of a period of {self.period:g} s, found {t:g} s: {how}"
+        sample = f"expected the sample at {due:g} s of a period of {self.period:g} s"
+        return InputError(f"{sample}, found {t:g} s: {how}", subject="t", found=t)
 
-    def _hold(self, t: float, missed: int, fault: str) -> np.ndarray:
+    def _hold(self, t: float, missed: int, fault: InputError) -> np.ndarray:
         """The torque that is held; a sample that is due now, or overdue, is missed as well."""
         if not self._may_hold:
-            raise InputError(fault)
+            raise fault
         sample = self._samples + missed
         due = t >= self._t0 + (sample - LATE) * self.period
         self._samples, self.held = sample + int(due), self.held + missed + 1

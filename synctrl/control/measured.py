@@ -67,15 +67,15 @@ def check_limits(limits: ArrayLike | None, shape: tuple[int, int]) -> np.ndarray
     return array
 
 
-def not_finite(cell: Cell, t: float, motion: np.ndarray) -> str | None:
+def not_finite(cell: Cell, t: float, motion: np.ndarray) -> InputError | None:
     """What is wrong with a measurement, (2, n, nv), if a number of it is not finite."""
     if np.isfinite(motion).all():
         return None
     part, robot, joint = np.argwhere(~np.isfinite(motion))[0]
-    return (
-        f"{'qv'[part]}: expected finite numbers, found {motion[part, robot, joint]} for joint "
-        f"{joint + 1} of {cell.names[robot]} at t = {t:g} s"
-    )
+    found, where = float(motion[part, robot, joint]), f"joint {joint + 1} of {cell.names[robot]}"
+    message = f"expected finite numbers, found {found} for {where} at t = {t:g} s"
+    failure = InputError(message, subject="qv"[part], found=found)
+    return failure.about(failure.subject, robot=int(robot), time=t)
 
 
 def check_signals(cell: Cell, t: float, signals: Signals) -> None:
