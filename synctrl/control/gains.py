@@ -125,7 +125,7 @@ def spread_rows(name: str, gain: np.ndarray | RaggedGain, lengths: Sequence[int]
         if gain.lengths != own:
             expected, found = f"expected a row for each robot, of {_listed(own)} entries", gain.lengths
             raise InputError(f"{expected}, found rows of {_listed(found)}", subject=name, found=found)
-        return gain.padded()
+        return padded(gain.rows)
     rows = "" if len(set(own)) == 1 else f", or a row for each robot, of {_listed(own)} entries"
     return spread(name, gain, shape, rows)
 
@@ -174,10 +174,6 @@ class RaggedGain:
     def tolist(self) -> list[list[float]]:
         """Plain lists, a list per row."""
         return [row.tolist() for row in self.rows]
-
-    def padded(self) -> np.ndarray:
-        """One array, (n, longest), with zeros where a row ends before."""
-        return padded(self.rows)
 
     def __len__(self) -> int:
         return len(self.rows)

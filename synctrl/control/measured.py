@@ -79,18 +79,9 @@ def not_finite(cell: Cell, t: float, motion: np.ndarray) -> InputError | None:
 
 
 def check_signals(cell: Cell, t: float, signals: Signals) -> None:
-    """Refuse what no robot may be given.
+    """Refuse what no robot may be given of what the law computed at t, s; see `DiscreteController.step`.
 
-    Args:
-        cell: the cell.
-        t: when, s.
-        signals: what the law computed.
-
-    Raises:
-        SingularJacobianError: a Jacobian with a larger condition number than the cell's space allows.
-        OrientationError: an orientation error so large that its direction is about to be undefined.
-        SimulationError: something else by which the space says that its coordinates mean nothing.
-        NonFiniteError: a torque, or a rate of an estimate or integral, that is not finite.
+    NonFiniteError stands for a torque, or a rate of an estimate or integral, that is not finite.
     """
     beyond = first_beyond(cell.task, signals.task)
     if beyond is not None:

@@ -242,7 +242,8 @@ class Coupling:
 
         Raises:
             CouplingError: a weight loses its inverse on the way, or c' or c'' is not the derivative it should
-                be; the message names the robot and the time.
+                be; with robot and time.
+            SimulationError: the weights fail; with the time.
         """
         check_weights(self._source, np.asarray(times, dtype=float), m)
 

@@ -95,20 +95,11 @@ def _check_finite(what: str, part: str, value: np.ndarray, times: np.ndarray, ro
 
 
 def check_weights(source: WeightSource, times: np.ndarray, m: int) -> None:
-    """Follow the weights through a run before it starts.
+    """Follow the weights through a run before it starts, see `Coupling.check_weights`.
 
     Between two neighbouring instants c changes by c c^-1 c' Delta t to first order: where an eigenvalue of
-    c^-1 c' Delta t reaches 1 in size, c has lost its inverse on the way, even if both instants have one.
-
-    Args:
-        source: the weights.
-        times: instants of the run, (T,), s; a few hundred of them are looked at.
-        m: dimension of the task.
-
-    Raises:
-        CouplingError: a weight without an inverse, at an instant or between two, or derivatives that do not
-            belong to the weights.
-        SimulationError: the weights fail; with the time.
+    c^-1 c' Delta t reaches 1 in size, c has lost its inverse on the way, even if both instants have one. A
+    few hundred instants are looked at.
     """
     instants = int(np.clip(200_000 // source.robots, 200, 2000))  # fewer for many robots
     times = np.unique(times[np.linspace(0, len(times) - 1, instants).astype(int)])

@@ -104,6 +104,5 @@ def _disturbances(disturbance: str | Disturbance | Sequence[Disturbance] | None)
         return (disturbance,)
     if isinstance(disturbance, Sequence) and not isinstance(disturbance, str):
         return tuple(disturbance)
-    raise InputError(
-        f"expected None, 'torque' or Disturbance objects, found {disturbance!r}", subject="disturbance"
-    )
+    expected = "expected None, 'torque' or Disturbance objects"
+    raise InputError(f"{expected}, found {disturbance!r}", subject="disturbance")
