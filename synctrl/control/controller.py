@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, instance, shaped
+from ..checks import finite_array, instance, offers, shaped
 from ..coupling.cell import Cell, Reference
 from ..errors import InputError, SynctrlError
 from ..renamed import argument, names_elsewhere, tell
@@ -25,7 +25,7 @@ from . import law, laws
 from .adaptation import Adaptation, Seen, chosen
 from .gains import Gains, spread, spread_rows
 from .laws import Asked, BoundLaw, Errors, Law, completed, no_errors
-from .network import BoundNetwork, Network, Received, connected
+from .network import BoundNetwork, Ideal, Network, Received
 
 
 @dataclass(slots=True)
@@ -135,7 +135,8 @@ class Controller:
         learning = chosen(gains.Gamma, adaptation)
         self.adaptation, self.adaptation_settings = learning.bind(cell), settings_of(learning)
         self.law, self.law_settings = options.law.bind(cell, gains), settings_of(options.law)
-        connection = connected(network)
+        connection = Ideal() if network is None else network
+        offers("network", connection, ("bind",), "a network, for example Ideal()")
         self.network, self.network_settings = connection.bind(cell), settings_of(connection)
         check_parts(self.law, self.network, cell.n, cell.coupling.pairs, m)
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..checks import finite_array, offers, shaped
+from ..checks import finite_array, shaped
 from ..coupling.cell import Cell, Reference
 from ..coupling.coupling import Coupling
 from ..errors import InputError, NonFiniteError
@@ -112,17 +112,6 @@ class BoundIdeal:
 
     def outside(self) -> str | None:
         return None
-
-
-def connected(network: Network | None) -> Network:
-    """The network of a controller: the one given, or `Ideal`.
-
-    Raises:
-        InputError: something that is no network.
-    """
-    network = Ideal() if network is None else network
-    offers("network", network, ("bind",), "a network, for example Ideal()")
-    return network
 
 
 class Messages:

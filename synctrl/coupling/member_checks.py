@@ -56,14 +56,9 @@ def check_labels(cell: Any) -> None:
     label("coupling: unit", cell.coupling.unit)
     for axis in cell.labels:
         label("space: name of a coordinate", axis)
-        if not axis.strip():
-            raise InputError(
-                f"expected a word as the name of every coordinate, found {axis!r}", subject="space"
-            )
-    if len({*cell.labels}) < len(cell.labels):
-        raise InputError(
-            f"expected coordinates of different names, found {', '.join(cell.labels)}", subject="space"
-        )
+    if not all(map(str.strip, cell.labels)) or len({*cell.labels}) < len(cell.labels):
+        expected = "expected a word of its own as the name of every coordinate"
+        raise InputError(f"{expected}, found {', '.join(map(repr, cell.labels))}", subject="space")
     for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True):
         for word in (robot.name, *robot.joint_names, *parameters.names):
             label(f"{name}: name of a joint or parameter", word)
