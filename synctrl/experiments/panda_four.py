@@ -24,6 +24,7 @@ from ..tasks.spaces import CartesianSpace
 from ..tasks.trajectories import Circle
 from .parts import ControllerParts, ready_experiment
 
+#: of a Panda, see `Station`
 POSTURE = (0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4)
 DISTANCE = 0.65  # m
 K_R = (10.0, 50.0, 10.0, 24.0, 1.5, 2.0, 0.3)  # N·m·s/rad

@@ -86,8 +86,11 @@ def identification_section(found: Mapping[str, Sequence[Identification]]) -> Sec
     data = [(f"{title}: {each.robot}", each.as_dict()) for title, robots in found.items() for each in robots]
     rows = [
         (
-            *(name, *(str(row[size]) for size in sizes), number(row["condition"])),
-            *(f"{row['excitation']:.1e}", *(number(row[error]) for error in errors)),
+            name,
+            *(str(row[size]) for size in sizes),
+            number(row["condition"]),
+            f"{row['excitation']:.1e}",
+            *(number(row[error]) for error in errors),
         )
         for name, row in data
     ]
