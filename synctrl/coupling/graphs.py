@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array
+from ..checks import finite_array, instance
 from ..errors import CouplingError, CouplingWarning, InputError, warn
 
 Edge = tuple[int, int]
@@ -33,12 +33,9 @@ def read_graph(graph: Any) -> tuple[int, np.ndarray, np.ndarray]:
     """
     if hasattr(graph, "nodes") and hasattr(graph, "is_directed"):
         rows, n = _networkx_rows(graph)
-    elif isinstance(graph, Iterable):
-        rows, n = [_row(edge) for edge in graph], None
     else:
-        raise InputError(
-            f"expected pairs of robots or a networkx graph, found {type(graph).__name__}", subject="graph"
-        )
+        instance("graph", graph, Iterable, "pairs of robots or a networkx graph")
+        rows, n = [_row(edge) for edge in graph], None
     if not rows:
         raise CouplingError("expected at least one pair of robots, found none", subject="graph")
     table = finite_array("graph", rows, (len(rows), 3))

@@ -211,11 +211,8 @@ class TipSpace(ABC):
         """
         for robot in robots:
             if robot.nv < self.m:
-                raise InputError(
-                    f"expected robots with at least {self.m} joints, "
-                    f"found robot '{robot.name}' with {robot.nv}",
-                    subject=repr(self),
-                )
+                expected = f"expected robots with at least {self.m} joints"
+                raise InputError(f"{expected}, found '{robot.name}' with {robot.nv}", subject=repr(self))
         return self.over(Tips(robots), [[robot.nv] for robot in robots], self.redundancy.spread(robots))
 
     def over(
