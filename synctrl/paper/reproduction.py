@@ -73,7 +73,8 @@ def run_all(folder: Path, workers: int, planned: Mapping[str, PlannedRun]) -> di
     for name, future in futures.items():
         error = future.exception()
         if isinstance(error, BrokenExecutor):
-            raise SimulationError(f"the process of run '{name}' ended without a result: was it killed?")
+            ended = SimulationError(f"the process of run '{name}' ended without a result: was it killed?")
+            raise ended.about(name)
         if error is not None:
             raise error
     return {name: Result.load(future.result()) for name, future in futures.items()}
