@@ -14,7 +14,7 @@ from synctrl.analysis.certify import certify
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.errors import InputError, NonFiniteError
 from synctrl.experiments import a460_full_pair, a460_pair
-from synctrl.experiments.a460_full import WRIST
+from synctrl.experiments.a460_pair import WRIST
 from synctrl.robots.documents import lock
 from synctrl.robots.limits import joint_limits
 from synctrl.robots.urdf import describe

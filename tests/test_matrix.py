@@ -38,7 +38,7 @@ from synctrl.paper.judge import compare_runs
 from synctrl.paper.paper_sections import metrics_tables
 from synctrl.paper.plant_sections import identification_section
 from synctrl.paper.report import Section, Text, Verdicts, write_page
-from synctrl.paper.theory_sections import baseline_section, certificate_section, draw_certificate
+from synctrl.paper.theory import baseline_section, certificate_section, draw_certificate
 from synctrl.show.animation import planar_scene
 from synctrl.show.layout import cell_layout
 from synctrl.show.lyapunov_plots import lyapunov_figure

@@ -18,7 +18,7 @@ from refusals import refused
 
 from synctrl import Cell, Disturbance, Experiment, Result
 from synctrl.errors import InputError, ResultError, SimulationError
-from synctrl.paper.step_section import step_section
+from synctrl.paper.plant_sections import step_section
 from synctrl.show.plots import common_limits, save, tracking_errors
 from synctrl.simulation.result import LAYOUT
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from refusals import refused
 from seams.catching_plant import Catching
 from seams.posted_network import BoundPosted, Posted
 
@@ -204,23 +205,19 @@ class Silent(BoundPosted):
 
 
 @pytest.mark.parametrize(
-    ("kind", "says"),
+    ("kind", "method"),
     [
-        (Shifted, r"Shifted, messages: expected instants in order with 0 <= t < .* s, found"),
-        (Backwards, "Backwards, messages: expected instants in order"),
-        (Timeless, "Timeless, messages: expected finite numbers, found nan"),
-        (Wordy, "Wordy, messages: expected numbers, found .*soon"),
-        (Silent, "Silent, messages: expected numbers, found None"),
-        (Narrow, r"Narrow, meet: expected memory of shape \(5, 3\), found \(4, 3\)"),
+        *((kind, "messages") for kind in (Shifted, Backwards, Timeless, Wordy, Silent)),
+        (Narrow, "meet"),
     ],
 )
 @pytest.mark.parametrize("options", [{}, {"control_period": 2e-3}], ids=["continuous", "sampled"])
-def test_messages_that_are_none_are_refused_with_their_network(kind, says, options):
+def test_messages_that_are_none_are_refused_with_their_network(kind, method, options):
     class Wrong(Posted):
         def bind(self, cell):
             return kind(self.T, cell.coupling, cell.m)
 
-    with pytest.raises(InputError, match=says):
+    with refused(InputError, f"network {kind.__qualname__}, {method}"):
         replace(a460_pair(), network=Wrong(1e-3)).simulate(0.01, **options)
 
 

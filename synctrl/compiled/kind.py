@@ -12,9 +12,9 @@ from ..control.controller import Controller
 from ..robots.friction_parameters import FrictionParameters
 from ..robots.mechanism import Mechanism, mechanism
 from ..tasks.algebra import Algebra
+from ..tasks.measurement import Kinematics
 from ..tasks.redundancy import Posture
 from ..tasks.spaces import BoundJointSpace, BoundTipSpace, JointSpace, TipSpace
-from ..tasks.tips import Kinematics
 from .lawful import TracedLaw, trace_law
 from .learning import Learning, trace_learning
 

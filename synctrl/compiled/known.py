@@ -35,10 +35,10 @@ from ..simulation.closed_loop import ClosedLoop
 from ..simulation.payloads import PayloadSchedule
 from ..simulation.plant import Plant
 from ..tasks import algebra, rotations
+from ..tasks.measurement import Tips
 from ..tasks.pose import BoundPoseSpace, PoseSpace
 from ..tasks.redundancy import DampedInverse, Inverse, Pseudoinverse, Redundancy
 from ..tasks.spaces import BoundCartesianSpace, BoundJointSpace, CartesianSpace, JointSpace
-from ..tasks.tips import Tips
 
 WAY_OUT = "use engine='pinocchio'"
 

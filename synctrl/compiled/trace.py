@@ -20,9 +20,9 @@ from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.weights import Weights
 from ..robots.friction_parameters import friction_diagonals
 from ..robots.symbolic import Symbols
+from ..tasks.measurement import Poses, Positions
 from ..tasks.redundancy import Inversion, velocity_lost
 from ..tasks.spaces import Measurement
-from ..tasks.tips import Poses, Positions
 from .algebra import SYMBOLS, array_of, column_of
 from .kind import Kind
 from .learning import Learning

@@ -10,18 +10,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, instance
+from ..checks import finite_array, instance, offers
 from ..errors import InputError
 from ..robots.friction import Friction
 from ..robots.parameters import Parameters
 from ..robots.robot import Robot
-from ..tasks.padding import padded
+from ..tasks.algebra import padded
 from ..tasks.spaces import JointSpace, Space
 from ..tasks.trajectories import Motion, Trajectory
 from .coupling import Coupling
 from .desired import desired_motion, desired_weights
-from .member_checks import check_friction, check_labels, check_names, check_space, check_trajectory
-from .member_parameters import member_parameters
+from .member_checks import (
+    check_friction,
+    check_labels,
+    check_names,
+    check_trajectory,
+    member_parameters,
+)
 from .weights import Weights
 
 
@@ -130,12 +135,10 @@ class Cell:
         self.robots = tuple(member.robot for member in self.members)
         self.names = tuple(m.name or f"robot {i}" for i, m in enumerate(self.members, start=1))
         check_names(name, self.names)
-        check_space(self.space)
+        offers("space", self.space, ("labels", "unit", "bind"), "a space, for example CartesianSpace('xy')")
         self.labels = self.space.labels(self.robots)
         self.task = self.space.bind(self.robots)
-        self._check_members()
-        self._set_parameters()
-        self._set_initial_state()
+        self._read_members()
         check_labels(self)
 
     # -- sizes --------------------------------------------------------------------------------------------
@@ -182,7 +185,7 @@ class Cell:
         """Weights of the coupling at the times, (T,); see `desired_weights`."""
         if self.coupling.is_constant:
             return self.coupling.weights(times, self.m)
-        return desired_weights(lambda at: self.coupling.weights(at, self.m), times)
+        return desired_weights(self.coupling.weights, times, self.m)
 
     def references(self, times: np.ndarray) -> list[Reference]:
         """What is desired at each of the times, (T,)."""
@@ -199,22 +202,19 @@ class Cell:
 
     # -- internals ----------------------------------------------------------------------------------------
 
-    def _set_parameters(self) -> None:
-        self.parameters = tuple(
-            member_parameters(name, member.robot, member.friction, member.parameters)
-            for name, member in zip(self.names, self.members, strict=True)
-        )
-        self.theta = padded([p.theta for p in self.parameters])
-
-    def _set_initial_state(self) -> None:
-        q0, v0, theta_hat0 = [], [], []
-        for name, member, parameters in zip(self.names, self.members, self.parameters, strict=True):
+    def _read_members(self) -> None:
+        parameters, q0, v0, theta_hat0 = [], [], [], []
+        for name, member in zip(self.names, self.members, strict=True):
             nv = member.robot.nv
+            check_trajectory(name, member.trajectory, self.labels)
+            check_friction(name, member.friction, member.robot)
+            parameters.append(member_parameters(name, member.robot, member.friction, member.parameters))
             q0.append(finite_array(f"{name}, q0", self._start(name, member), (nv,)))
             v0.append(finite_array(f"{name}, v0", np.zeros(nv) if member.v0 is None else member.v0, (nv,)))
-            size = len(parameters.theta)
+            size = len(parameters[-1].theta)
             guess = np.zeros(size) if member.theta_hat0 is None else member.theta_hat0
             theta_hat0.append(finite_array(f"{name}, theta_hat0", guess, (size,)))
+        self.parameters, self.theta = tuple(parameters), padded([p.theta for p in parameters])
         self.q0, self.v0, self.theta_hat0 = padded(q0), padded(v0), padded(theta_hat0)
 
     def _start(self, name: str, member: Member) -> ArrayLike:
@@ -223,11 +223,6 @@ class Cell:
         if hasattr(self.space, "start"):
             return self.space.start(member.robot, member.trajectory(0.0).x)
         raise InputError("expected joint positions to start from, found none", subject=f"{name}, q0")
-
-    def _check_members(self) -> None:
-        for name, member in zip(self.names, self.members, strict=True):
-            check_trajectory(name, member.trajectory, self.labels)
-            check_friction(name, member.friction, member.robot)
 
     def __reduce__(self) -> tuple:
         """Copies and other processes bind the space anew: arrays that share memory would come apart."""

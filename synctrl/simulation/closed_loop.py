@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..checks import finite_array, instance
-from ..control.adaptation_check import check_adaptation
 from ..control.controller import Controller, Signals
-from ..control.messages import Messages
-from ..control.network import BoundNetwork
+from ..control.measured import check_adaptation
+from ..control.network import BoundNetwork, Messages
 from ..coupling.cell import Reference
 from ..errors import InputError, NonFiniteError
 from .clock import before

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..coupling.motion_checks import check_motions
-from ..coupling.reachability import SAMPLES, check_reachable
+from ..coupling.reachability import SAMPLES, check_motions, check_reachable
 from ..errors import RunInterrupted, SimulationError, SynctrlError
 from .account import NOTHING, Account
 from .advance import Sample, Solver, advance

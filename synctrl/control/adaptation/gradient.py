@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...coupling.cell import Cell
 from ...errors import InputError
-from ..gains import read_gain, spread_rows
-from ..ragged_gain import RaggedGain
+from ..gains import RaggedGain, read_gain, spread_rows
 from .protocol import Adaptation, Seen
 
 
