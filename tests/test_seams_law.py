@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 from seams.lagging_network import Lagging
 from seams.pulling_law import Pulling
 from theory_cells import coupling, experiment
@@ -251,8 +252,9 @@ class Gossip(Pulling):
 @pytest.mark.parametrize("law", [Clockwork(1.0), Gossip(1.0)])
 def test_a_law_that_cannot_be_traced_is_refused_by_name_and_runs_in_the_reference_engine(law):
     run = replace(planar_four(), law=law)
-    with pytest.raises(InputError, match=r"cannot trace the law .*(Ticking|Listening)"):
+    with refused(InputError, "law") as caught:
         run.simulate(0.01, engine="compiled")
+    assert caught.value.found.endswith((".Ticking", ".Listening"))
     assert run.simulate(0.01).status == "completed"
 
 

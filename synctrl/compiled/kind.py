@@ -15,8 +15,7 @@ from ..tasks.algebra import Algebra
 from ..tasks.redundancy import Posture
 from ..tasks.spaces import BoundJointSpace, BoundTipSpace, JointSpace, TipSpace
 from ..tasks.tips import Kinematics
-from .lawful import TracedLaw, trace_law
-from .learning import Learning, trace_learning
+from .plugged import Learning, trace_law, trace_learning
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +33,7 @@ class Kind:
         rotors: whether rotors are adapted too.
         made_of: names of the types that the user has plugged in.
         learning: how it learns, or None for (14).
-        law: what it does, or None for `SunMills`.
+        law: CasADi function of what it does, see `trace_law`, or None for `SunMills`.
     """
 
     fixed: Mechanism
@@ -48,7 +47,7 @@ class Kind:
     rotors: bool = False
     made_of: tuple[str, ...] = ()
     learning: Learning | None = None
-    law: TracedLaw | None = None
+    law: Any = None
 
     @property
     def nv(self) -> int:
@@ -79,7 +78,7 @@ class Kind:
     @property
     def learned(self) -> int:
         """Number of entries of the adaptation's state."""
-        return self.parameters if self.learning is None else self.learning.size
+        return self.parameters if self.learning is None else self.learning.estimate.numel_in()
 
     @property
     def damped(self) -> bool:
@@ -130,7 +129,7 @@ class Kind:
         matrix = None if self.matrix is None else self.matrix.tolist()
         options: list[Any] = [self.reference_acceleration, self.k_r_space, list(self.gravity)]
         options += [self.smoothing, self.rotors, list(self.made_of)]
-        options += [None if part is None else part.key() for part in (self.learning, self.law)]
+        options += [None if part is None else part.serialize() for part in (*(self.learning or ()), self.law)]
         damping = asdict(self.space.damping) if self.damped else None  # type: ignore[union-attr, arg-type]
         space = [list(getattr(self.space, "rows", ())), damping, list(self.watches)]
         return [self.fixed.key(), space, matrix, shared, options]
@@ -178,7 +177,7 @@ def _kind(
     fixed: Mechanism,
     rotation: np.ndarray | None,
     learning: Learning | None,
-    law: TracedLaw | None,
+    law: Any,
 ) -> Kind:
     cell, parameters = controller.cell, controller.cell.parameters[i]
     rigid: Any = parameters.base if isinstance(parameters, FrictionParameters) else parameters

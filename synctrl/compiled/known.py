@@ -4,7 +4,7 @@ The compiled engine does not call Python objects, it runs equations that were tr
 for objects of exactly the package's own types, with exactly their methods: what else a user has plugged in is
 refused by name, even a subclass that changes nothing of importance, for else it would silently run as its
 base. Laws and adaptations of a user's own are not refused here: their equations are traced when they are met,
-see `lawful.py` and `learning.py`. Desired motions, weights and disturbances may be anything: they are called,
+see `plugged.py`. Desired motions, weights and disturbances may be anything: they are called,
 and tabulated.
 """
 

@@ -31,9 +31,8 @@ from ..tasks.pose import PoseSpace
 from ..tasks.redundancy import Redundancy
 from ..tasks.spaces import CartesianSpace, JointSpace, Space
 from ..tasks.trajectories import Hold
-from .chosen import Chosen
 from .kind import Classified
-from .lawful import ChosenLaw
+from .plugged import ChosenAdaptation, ChosenLaw
 
 #: robots at least: with three in a ring, each is in two pairs, and each pair leaves one out
 ROBOTS = 3
@@ -98,15 +97,9 @@ class Specimen:
         gains = self._gains(cell, original.k_r_space)
         adaptation: Any = None
         if not isinstance(original.adaptation, BoundGradient):
-            theta = original.cell.theta
-            adaptation = Chosen(original.adaptation, robots, original.cell.nv, theta.shape[1])
+            adaptation = ChosenAdaptation(original, robots)
             gains = gains.replace(Gamma=None)
-        controller = Controller(
-            cell,
-            gains,
-            adaptation=adaptation,
-            law=_law(original, robots),
-        )
+        controller = Controller(cell, gains, adaptation=adaptation, law=_law(original, robots))
         return ClosedLoop(controller, Plant(cell))
 
     def _space(self, space: Space, robots: Sequence[Robot]) -> Space:
