@@ -14,7 +14,6 @@ from cells import SMALL_GAINS, small_cell
 from synctrl import CartesianSpace, Cell, Experiment
 from synctrl.compiled import structs
 from synctrl.compiled.compiler import compiler
-from synctrl.compiled.header import functions_of, header, largest
 from synctrl.compiled.kind import classify
 from synctrl.compiled.program import Program, _constants
 from synctrl.compiled.quantities import (
@@ -27,6 +26,7 @@ from synctrl.compiled.quantities import (
     owned_by,
     shape,
 )
+from synctrl.compiled.structs import functions_of, header, largest
 from synctrl.compiled.trace import Trace
 from synctrl.control.adaptation import Natural
 from synctrl.errors import CompilationError

@@ -22,11 +22,11 @@ from ..simulation.guard import limits_of
 from ..simulation.plant import Plant
 from . import structs
 from .build import cached_library, content_key, require_casadi
-from .header import header, largest
 from .kind import Classified, Kind, classify
 from .known import check_known, check_untouched
 from .quantities import DESIRED, checked, owned_by, shape
 from .specimen import Specimen
+from .structs import header, largest
 from .trace import Trace
 
 #: relative difference between generated code and the reference engine above which the code is refused
@@ -106,7 +106,7 @@ class CompiledLoop:
         for name, array in arrays.items():
             kept = checked(name, array, self.sizes)
             size = prod(shape(name, self.sizes))
-            setattr(steps, name, structs.Table(kept.ctypes.data, size if kept.size > size else 0))
+            setattr(steps, name, structs.Arrays(kept.ctypes.data, size if kept.size > size else 0))
             steps.kept[name] = kept
 
     def call(self, function: str, steps: structs.Steps, y: np.ndarray, *others: Any) -> None:

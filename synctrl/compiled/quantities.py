@@ -1,7 +1,7 @@
 """What generated functions read and write, by name: the one table that everything about them follows from.
 
-The symbols of `trace.py`, the text that stands before `driver.c` (see `header.py`), the structures of
-`structs.py` and the arrays of `program.py` and `engine.py` are all made from the tables below. Every quantity
+The symbols of `trace.py`, the structures of `structs.py` with the text that stands before `driver.c`, and the
+arrays of `program.py` and `engine.py` are all made from the tables below. Every quantity
 is one array with a row per robot or pair; rows are as long as the largest robot needs.
 """
 
