@@ -68,8 +68,7 @@ class Prepared:
 
 def _ready(run: Run) -> Engine:
     """The compiled engine, which has loaded what a run needs and will keep what it tabulates."""
-    from ..compiled.engine import Tables
-    from ..compiled.run import Compiled
+    from ..compiled.engine import Compiled, Tables
 
     engine = Compiled({}, Tables())
     engine.load(run)
