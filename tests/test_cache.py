@@ -19,7 +19,7 @@ import pytest
 import test_imports
 from refusals import refused
 
-from synctrl.compiled import build, cache, compiler, elf
+from synctrl.compiled import build, cache, compiler
 from synctrl.errors import CompilationError, InputError, MissingDependencyError
 
 SOURCE = "int answer(void) { return 42; }"
@@ -242,8 +242,8 @@ def test_a_library_cut_short_under_a_digest_that_fits_is_built_again(folder, mon
 def test_no_part_of_a_library_counts_as_a_whole_one(folder):
     fetch()
     whole = (folder / "key.so").read_bytes()
-    assert elf.is_whole(whole)
-    assert not any(elf.is_whole(whole[:k]) for k in range(len(whole)))
+    assert build.is_whole(whole)
+    assert not any(build.is_whole(whole[:k]) for k in range(len(whole)))
 
 
 def test_headers_of_any_content_are_judged_without_an_error():
@@ -251,7 +251,7 @@ def test_headers_of_any_content_are_judged_without_an_error():
         for order in (1, 2, 3):
             for filler in (b"\x00", b"\x01", b"\xff"):
                 content = b"\x7fELF" + bytes([wide, order]) + filler * 200
-                assert elf.is_whole(content) in (False, True)
+                assert build.is_whole(content) in (False, True)
 
 
 @pytest.mark.parametrize("content", [b"", b"nonsense", b"\xff" * 64, b"0" * 1000])

@@ -11,7 +11,7 @@ goes through these modules:
 3. `kind`: which robots are equal, and can share code;
 4. `trace`, with `plugged` for laws and adaptations of a user's own: the functions of a robot of a kind;
 5. `structs`, made from the table in `quantities`: what stands in C before `driver.c`;
-6. `build`, with `compiler`, `cache` and `elf`: from C to a library that is loaded;
+6. `build`, with `compiler` and `cache`: from C to a library that is loaded;
 7. `program`: library and arrays together. Once in every process, before it is used, the library is compared
    with the reference engine, on the small closed loop of `specimen`;
 8. `engine` again: takes the run through time, some steps with every call of `advance` in `driver.c`.
