@@ -40,7 +40,7 @@ class Kind:
     space: TipSpace | JointSpace
     matrix: np.ndarray | None
     base_rotation: np.ndarray | None
-    gravity: tuple[float, float, float]
+    gravity: tuple[float, ...]
     reference_acceleration: str
     k_r_space: str
     smoothing: float | None = None
@@ -65,20 +65,9 @@ class Kind:
         return isinstance(self.space, TipSpace)
 
     @property
-    def parameters(self) -> int:
-        """Number of adapted parameters."""
-        rub = 0 if self.smoothing is None else (2 + self.rotors) * self.nv
-        return self.rigid_parameters + rub
-
-    @property
     def rigid_parameters(self) -> int:
         """Number of adapted parameters of the rigid bodies; they come first."""
         return 10 * self.nv if self.matrix is None else self.matrix.shape[1]
-
-    @property
-    def learned(self) -> int:
-        """Number of entries of the adaptation's state."""
-        return self.parameters if self.learning is None else self.learning.estimate.numel_in()
 
     @property
     def damped(self) -> bool:
@@ -110,11 +99,13 @@ class Kind:
     @property
     def sizes(self) -> dict[str, int]:
         """What the lengths of its rows are made of, see `SIZES`."""
+        rub = 0 if self.smoothing is None else (2 + self.rotors) * self.nv
+        P = self.rigid_parameters + rub
         return {
             "m": self.m,
             "nv": self.nv,
-            "P": self.parameters,
-            "Z": self.learned,
+            "P": P,
+            "Z": P if self.learning is None else self.learning.estimate.numel_in(),
             "K": self.nv if self.k_r_space == "joint" else self.m,
             "bodies": 10 * self.nv,
             "tip": int(self.tip),
@@ -161,10 +152,10 @@ def classify(controller: Controller) -> Classified:
     for name, (_, base) in zip(names, found, strict=True):
         rotations.setdefault(name, set()).add((base.rotation + 0.0).tobytes())  # -0 counts as 0
     kinds: dict[str, Kind] = {}
-    index, learning, laws = [], trace_learning(controller), trace_law(controller)
+    index, plugged = [], [*zip(trace_learning(controller), trace_law(controller), strict=True)]
     for i, (name, (fixed, base)) in enumerate(zip(names, found, strict=True)):
         same = len(rotations[name]) == 1
-        kind = _kind(controller, i, fixed, base.rotation if same else None, learning[i], laws[i])
+        kind = _kind(controller, i, fixed, base.rotation if same else None, *plugged[i])
         key = repr(kind.key())
         kinds.setdefault(key, kind)
         index.append(list(kinds).index(key))
@@ -172,27 +163,20 @@ def classify(controller: Controller) -> Classified:
 
 
 def _kind(
-    controller: Controller,
-    i: int,
-    fixed: Mechanism,
-    rotation: np.ndarray | None,
-    learning: Learning | None,
-    law: Any,
+    controller: Controller, i: int, fixed: Mechanism, rotation: np.ndarray | None, *plugged: Any
 ) -> Kind:
     cell, parameters = controller.cell, controller.cell.parameters[i]
     rigid: Any = parameters.base if isinstance(parameters, FrictionParameters) else parameters
-    gravity = cell.robots[i].gravity_vector
     return Kind(
         fixed,
         cell.space,  # type: ignore[arg-type]
         getattr(rigid, "matrix", None),
         rotation,
-        (float(gravity[0]), float(gravity[1]), float(gravity[2])),
+        tuple(map(float, cell.robots[i].gravity_vector)),
         controller.reference_acceleration,
         controller.k_r_space,
         getattr(parameters, "smoothing", None),
         getattr(parameters, "armature", False),
         tuple(type(part).__qualname__ for part in (cell.space, parameters, rigid)),
-        learning,
-        law,
+        *plugged,
     )

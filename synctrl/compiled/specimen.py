@@ -9,7 +9,7 @@ kinds, not of robots.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -46,14 +46,6 @@ TRIES = 20
 SINGULAR = 1e6
 
 
-class Case(NamedTuple):
-    """Something at which two ways to compute y' can be compared."""
-
-    reference: Reference
-    y: np.ndarray
-    disturbance: np.ndarray
-
-
 class Specimen:
     """A small closed loop for the kinds of a larger one.
 
@@ -74,8 +66,8 @@ class Specimen:
         members = [_member(loop.controller.cell, chosen[k]) for k in self.index]
         self.loop = self._loop(loop.controller, members, [chosen[k] for k in self.index])
 
-    def cases(self) -> Iterator[Case]:
-        """What to compare at; nothing if a robot is singular everywhere, and cannot run."""
+    def cases(self) -> Iterator[tuple[Reference, np.ndarray, np.ndarray]]:
+        """References, states and disturbances to compare y' at; none if a robot is singular everywhere."""
         cell = self.loop.cell
         for distance in DISTANCES:
             q = np.zeros((cell.n, cell.nv))
@@ -85,7 +77,7 @@ class Specimen:
                     return
             y = self._state(q)
             reference = Reference(self._desired(q, distance), self._weights())
-            yield Case(reference, y, self._random(cell.n, cell.nv) * self._joints())
+            yield reference, y, self._random(cell.n, cell.nv) * self._joints()
 
     # -- the loop -----------------------------------------------------------------------------------------
 
