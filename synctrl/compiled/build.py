@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 from ..errors import CompilationError, MissingDependencyError
 from .cache import building_folder, executable_place, open_cache, read_file, remove_leftovers
-from .compiler import FLAGS, compile_library, compiler, compiler_version
+from .compiler import FLAGS, compile_library, compiler, compiler_version, fault
 
 #: rooms of the package that generated code is made from, or compared with
 ROOMS = ("robots", "tasks", "coupling", "control", "simulation", "compiled")
@@ -63,7 +63,8 @@ def require_casadi() -> str:
         from casadi import CasadiMeta
     except ImportError as error:
         raise MissingDependencyError(
-            "engine='compiled' needs CasADi: pip install 'synctrl[compiled]'; or use engine='pinocchio'"
+            "engine='compiled' needs it: pip install 'synctrl[compiled]'; or use engine='pinocchio'",
+            subject="CasADi",
         ) from error
     return str(CasadiMeta.version())
 
@@ -109,7 +110,9 @@ def cached_library(key: str, generate: Callable[[], Iterable[str]], check: Check
     try:
         return _stored(folder, key, check) or _built(folder, key, generate, check)
     except OSError as error:
-        raise CompilationError(f"cannot write to the cache '{folder}': {error}") from error
+        raise CompilationError(
+            f"cannot write to the cache '{folder}': {error}", file=folder, found=error.strerror
+        ) from error
 
 
 def load(content: bytes, folder: Path) -> ctypes.CDLL:
@@ -176,9 +179,7 @@ def _built(folder: Path, key: str, generate: Callable[[], Iterable[str]], check:
         try:
             library = _checked(folder, key, content, check)
         except OSError as error:
-            raise CompilationError(
-                f"the C compiler '{compiler()[0]}' wrote what cannot be loaded as a library: {error}"
-            ) from error
+            raise fault(compiler()[0], "wrote what cannot be loaded as a library", f": {error}") from error
         _publish(place, folder / key, key, content)
     return library
 

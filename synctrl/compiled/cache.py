@@ -144,6 +144,7 @@ def executable_place(cache: Path) -> Path:
             "or read-only?): name a folder where it may by SYNCTRL_CACHE or TMPDIR, or use "
             "engine='pinocchio'",
             file=cache,
+            found="noexec",
         )
     _check_way(other)
     return other

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from ..control.adaptation.gradient import BoundGradient
-from ..control.controller import Controller
 from ..coupling.cell import Reference
 from ..errors import CompilationError
 from ..robots.mechanism import mechanism
@@ -196,7 +195,7 @@ def _compare(library: ctypes.CDLL, loop: ClosedLoop, classified: Classified) -> 
         CompilationError: they differ.
     """
     if not (hasattr(library, "work_sizes") and hasattr(library, "state_dot")):
-        raise CompilationError("the library was made from other code")
+        raise CompilationError("the library was made from other code", subject="generated code")
     specimen = Specimen(loop, classified)
     small = specimen.loop
     bases = [mechanism(robot)[1] for robot in small.cell.robots]
@@ -211,17 +210,11 @@ def _agree(expected: list[np.ndarray], found: list[np.ndarray]) -> None:
         difference = np.abs(b - a).max(initial=0.0) / (1 + np.abs(a).max(initial=0.0))
         if not difference < AGREEMENT:
             raise CompilationError(
-                f"generated code differs from Pinocchio by {difference:.2g} relative in {name} at a random "
-                "state; use engine='pinocchio', and please report the cell"
+                f"it differs from Pinocchio by {difference:.2g} relative in {name} at a random state; use "
+                "engine='pinocchio', and please report the cell",
+                subject="generated code",
+                found=float(difference),
             )
-
-
-def gamma_of(controller: Controller) -> np.ndarray:
-    """Gamma of (14), (n, P); zeros, which nothing reads, for another adaptation."""
-    adaptation = controller.adaptation
-    if isinstance(adaptation, BoundGradient):
-        return adaptation.Gamma
-    return np.zeros(controller.cell.theta.shape)
 
 
 def one_after_another(weights: Sequence[np.ndarray]) -> np.ndarray:
@@ -231,22 +224,22 @@ def one_after_another(weights: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _constants(loop: ClosedLoop, bases: list[Any]) -> dict[str, np.ndarray]:
-    """Arrays of the quantities that do not change in a run, by name."""
-    controller, plant = loop.controller, loop.plant
+    """Arrays of the quantities that do not change in a run, by name; zeros for those that nothing reads."""
+    controller, plant, cell = loop.controller, loop.plant, loop.cell
     found = {name: np.atleast_2d(getattr(controller, name)) for name in ("Lambda", "beta", "K_eps", "K_r")}
-    W_inv, posture, gain = _posture(controller)
+    found |= {name: getattr(plant, name) for name in ("viscous", "coulomb", "smoothing")}
+    learns, zeros = controller.adaptation, np.zeros_like(cell.theta)
+    redundancy = getattr(cell.space, "redundancy", None)
+    W_inv, posture, gain = redundancy.spread(cell.robots) if redundancy else np.zeros((3, cell.n, cell.nv))
     return {
         **found,
-        "Gamma": gamma_of(controller),
+        "Gamma": learns.Gamma if isinstance(learns, BoundGradient) else zeros,
         "base": np.array([np.append(base.rotation.ravel(), base.translation) for base in bases]),
         "W_inv": W_inv,
         "posture": posture,
         "gain": gain,
-        "viscous": plant.viscous,
-        "coulomb": plant.coulomb,
-        "smoothing": plant.smoothing,
         "limits": plant.torque_limits,
-        "bounds": np.array([[*limits_of(loop.cell.task).values()]]),
+        "bounds": np.array([[*limits_of(cell.task).values()]]),
     }
 
 
@@ -258,15 +251,6 @@ def _carried(plant: Plant, bodies: int) -> np.ndarray:
         for row, robot in zip(rows, robots, strict=True):
             row[: 10 * robot.body_count] = robot.inertial_parameters
     return pi
-
-
-def _posture(controller: Controller) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    cell = controller.cell
-    redundancy = getattr(cell.space, "redundancy", None)
-    if redundancy is not None:
-        return redundancy.spread(cell.robots)
-    zero = np.zeros((cell.n, cell.nv))
-    return zero, zero, zero
 
 
 def _work_sizes(library: ctypes.CDLL) -> tuple[int, int, int, int]:

@@ -203,7 +203,9 @@ def checked(name: str, array: np.ndarray, sizes: Mapping[str, int]) -> np.ndarra
     expected = shape(name, sizes)
     if np.shape(array)[-2:] != expected:
         raise CompilationError(
-            f"compiled engine, {name} ({QUANTITIES[name].meaning}): expected rows and columns {expected}, "
-            f"found an array of shape {np.shape(array)}"
+            f"compiled engine, {QUANTITIES[name].meaning}: expected rows and columns {expected}, found an "
+            f"array of shape {np.shape(array)}",
+            subject=name,
+            found=np.shape(array),
         )
     return np.ascontiguousarray(array, dtype=float)
