@@ -29,11 +29,16 @@ _MOVES = (
         "paper",
         "formulas judge_section paper_sections plant_sections report step_section theory_sections",
     ),
-    ("simulation", "sweep", "prepared"),
 )
 _URDF = "checks", "document", "meshes", "reader", "writer", "xml"
 #: modules that are a part of another one now
-_PARTS = {"experiments.judged": "paper.judge", "show.judge_plots": "paper.judge_section"}
+_PARTS = {
+    "experiments.judged": "paper.judge",
+    "show.judge_plots": "paper.judge_section",
+    "simulation.prepared": "sweep.worker",
+    "sweep.identity": "sweep.description",
+    "sweep.table": "sweep.journal",
+}
 
 
 def _pairs() -> Iterator[tuple[str, str]]:

@@ -20,12 +20,11 @@ from .control.gains import Gains
 from .errors import InputError, SweepError
 from .simulation.simulate import Experiment
 from .sweep.distributions import LogUniform, Uniform
-from .sweep.draws import Generations
 from .sweep.evaluation import CrewOptions, Evaluation, progress_bar
 from .sweep.factors import Factor, gain
 from .sweep.journal import Journal
-from .sweep.measures import MEASURES
-from .sweep.rows import COMPLETED, columns
+from .sweep.measures import MEASURES, warn_of
+from .sweep.rows import COMPLETED, Generations, columns
 from .sweep.study import Study, StudyOptions
 from .sweep.worker import Job, Task
 
@@ -130,7 +129,7 @@ class _Search:
             self.run(generations, evaluation, bar)
             if journal is not None:
                 journal.finish()
-        evaluation.doubts.warn("tune", self.study.base.dt)
+        warn_of(evaluation.doubts, "tune", self.study.base.dt)
         return self.best()
 
     def run(self, generations: int, evaluation: Evaluation, bar: Any) -> None:

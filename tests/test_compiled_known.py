@@ -38,7 +38,7 @@ from synctrl.robots.parameters import LinearParameters, planar_two_link_paramete
 from synctrl.simulation.closed_loop import ClosedLoop
 from synctrl.simulation.plant import Plant
 from synctrl.sweep import Sweep, Uniform, gain
-from synctrl.sweep.prepared import Prepared
+from synctrl.sweep.worker import Prepared
 from synctrl.tasks import spaces
 from synctrl.tasks.redundancy import Pseudoinverse
 from synctrl.tune import tune

@@ -32,7 +32,7 @@ from synctrl.experiments import (
     rigid_object,
     ur5_payload,
 )
-from synctrl.sweep.prepared import Prepared
+from synctrl.sweep.worker import Prepared
 
 compiled = pytest.mark.skipif(
     find_spec("casadi") is None, reason="CasADi is an extra: pip install 'synctrl[compiled]'"

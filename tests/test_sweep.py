@@ -51,7 +51,7 @@ from synctrl.sweep import (
     weights,
 )
 from synctrl.sweep.description import difference
-from synctrl.sweep.prepared import Prepared
+from synctrl.sweep.worker import Prepared
 
 pytest.importorskip("pandas", reason="tables are read with pandas: pip install 'synctrl[sweep]'")
 TESTS = Path(__file__).parent

@@ -5,14 +5,13 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator, Sequence
 from itertools import islice
-from pathlib import Path
 from time import perf_counter
 from typing import Any, TypedDict
 
 from ..checks import choice, count
 from . import backends
-from .doubts import Doubts
-from .journal import KEPT, Journal
+from .journal import Journal, kept_file
+from .measures import Doubt
 from .rows import Row
 from .worker import Job, Outcome, Runner, Task
 
@@ -47,7 +46,7 @@ class Evaluation:
 
     Attributes:
         rows: of all runs that are made, by number of the run.
-        doubts: what is to be doubted of those that were made here.
+        doubts: what is to be doubted of those that were made here, to their end, by number of the run.
     """
 
     def __init__(
@@ -65,7 +64,7 @@ class Evaluation:
             count("batch", batch)
         self._runner, self._journal = Runner(job), journal  # whatever has to be compiled is compiled here
         self.rows: dict[int, Row] = {} if journal is None else journal.rows
-        self.doubts = Doubts()
+        self.doubts: dict[int, Doubt] = {}
 
     @contextlib.contextmanager
     def open(self) -> Iterator[None]:
@@ -117,8 +116,7 @@ class Evaluation:
 
     def _write(self, outcomes: Sequence[Outcome]) -> list[Row]:
         rows = [outcome.row for outcome in outcomes]
-        for outcome in outcomes:
-            self.doubts.add(outcome.row[0], outcome.doubt)
+        self.doubts.update({each.row[0]: each.doubt for each in outcomes if each.doubt is not None})
         if self._journal is None:
             self.rows.update({row[0]: row for row in rows})
             return rows
@@ -134,11 +132,6 @@ def batches(tasks: Sequence[Task], size: int) -> Iterator[list[Task]]:
     waiting = iter(tasks)
     while batch := list(islice(waiting, size)):
         yield batch
-
-
-def kept_file(folder: str | Path, run: int) -> Path:
-    """Where the trajectories of a run are kept."""
-    return Path(folder) / KEPT / f"{run:06d}.npz"
 
 
 def progress_bar(total: int, done: int, shown: bool) -> Any:

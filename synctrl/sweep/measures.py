@@ -1,4 +1,4 @@
-"""What a sweep keeps of a run: a few numbers over all robots, pairs and axes."""
+"""What a sweep keeps of a run: a few numbers over all robots, pairs and axes, and whether to trust them."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from ..analysis.metrics import (
 )
 from ..analysis.metrics import squared as squared_unit
 from ..coupling.cell import Cell
+from ..errors import SaturationWarning, StepWarning, warn
 from ..simulation.result import Result
 from ..simulation.step_error import LIMIT
 
@@ -91,6 +92,63 @@ def measures(result: Result, bands: Mapping[str, float]) -> list[float | None]:
 def cut_off(result: Result) -> float:
     """Share of the logged instants at which torque was cut off, of the joint where that was most."""
     return max((entry["share"] for entry in result.info["saturation"]), default=0.0)
+
+
+class Doubt(NamedTuple):
+    """Why the measures of one run are to be doubted.
+
+    Attributes:
+        estimate: error of its worst step, as a share of its largest velocity; None if its step will do.
+        advised: a step that does, s, or None.
+        share: of the instants at which the torque of a joint was cut off, the largest; 0 if none was.
+    """
+
+    estimate: float | None
+    advised: float | None
+    share: float
+
+
+def doubt_of(result: Result) -> Doubt:
+    """What is to be doubted of a run, by its `info`."""
+    step = result.info["step_error"] or {}
+    advised = step.get("advised_step")
+    return Doubt(None if advised is None else step["estimate"], advised, cut_off(result))
+
+
+def warn_of(doubts: Mapping[int, Doubt], what: str, dt: float) -> None:
+    """Warn whoever called the package, once of each kind, of what a single run would warn of.
+
+    Args:
+        doubts: of runs that went to their end, by number of the run.
+        what: made the runs, for the message.
+        dt: their step, s.
+    """
+    all_runs = f"of the {len(doubts)} runs that were made to their end"
+    errors = {run: doubt.estimate for run, doubt in doubts.items() if doubt.estimate is not None}
+    if errors:
+        worst = _largest(errors)
+        shortest = min(doubt.advised for doubt in doubts.values() if doubt.advised is not None)
+        warn(
+            f"{what}: dt = {dt:g} s is too long in {len(errors)} {all_runs}; in run {worst} a step errs by "
+            f"{errors[worst]:.2g} of the largest velocity, expected at most {LIMIT:g}. Begin again with a "
+            f"step of at most {shortest:g} s",
+            StepWarning,
+        )
+    shares = {run: doubt.share for run, doubt in doubts.items() if doubt.share > 0}
+    if shares:
+        worst = _largest(shares)
+        warn(
+            f"{what}: torque was cut off in {len(shares)} {all_runs}, most in run {worst}, at one joint for "
+            f"{shares[worst]:.0%} of the time. Estimates and integrals of the synchronization errors went on "
+            "meanwhile as if the robots had got it; lower the gains or their ranges, or ask for a slower "
+            "motion",
+            SaturationWarning,
+        )
+
+
+def _largest(values: Mapping[int, float]) -> int:
+    """The run with the largest value, the first one if there are more: whoever made it, and when."""
+    return max(values, key=lambda run: (values[run], -run))
 
 
 def _over_all(error: ErrorMetrics) -> list[float]:

@@ -11,13 +11,11 @@ from ..checks import choice, count, instance, positive_number
 from ..errors import InputError, SimulationError
 from ..simulation.recorder import versions
 from ..simulation.simulate import Experiment
-from .description import checked_bands
+from .description import checked_bands, describe_base
 from .factors import Factor, Setup
-from .identity import describe_base
 from .measures import MEASURES, definitions
-from .prepared import Prepared
 from .rows import columns
-from .worker import Job
+from .worker import Job, Prepared
 
 
 class StudyOptions(TypedDict, total=False):

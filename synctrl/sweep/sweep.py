@@ -10,10 +10,11 @@ from ..checks import count, index
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .distributions import Value
-from .draws import Draws
 from .evaluation import CrewOptions, Evaluation, progress_bar
 from .factors import Factor, Setup
 from .journal import Journal
+from .measures import warn_of
+from .rows import Draws
 from .study import Study, StudyOptions
 from .worker import Job, Runner, Task
 
@@ -143,7 +144,7 @@ class Sweep:
             for rows in evaluation.run(tasks):
                 bar.update(len(rows))
         table = journal.finish()
-        evaluation.doubts.warn("sweep", self.study.base.dt)
+        warn_of(evaluation.doubts, "sweep", self.study.base.dt)
         return table
 
     def _task(self, run: int) -> Task:
