@@ -37,6 +37,7 @@ _PARTS = {
     "show.judge_plots": "paper.judge_section",
     "simulation.prepared": "sweep.worker",
     "sweep.identity": "sweep.description",
+    "sweep.study": "sweep.sweep",
     "sweep.table": "sweep.journal",
 }
 

@@ -23,17 +23,10 @@ _SHORT.maxstring = LETTERS
 
 
 class Values(Protocol):
-    """Values a factor can have."""
+    """Values a factor can have; those of a distribution are drawn one by one, by `draw(rng)`."""
 
     def describe(self) -> dict[str, Any]:
         """Kind and parameters, as plain data."""
-
-
-class Distribution(Values, Protocol):
-    """Values that are drawn."""
-
-    def draw(self, rng: np.random.Generator) -> Value:
-        """One value."""
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from time import perf_counter
-from typing import Any, TypedDict
+from typing import Any
 
 from ..checks import choice, count
 from . import backends
@@ -22,15 +22,6 @@ BATCH_TIME = 1.0
 SHARES = 4
 #: how often the rest is begun again after a worker has died without a single run being finished in between
 RETRIES = 2
-
-
-class CrewOptions(TypedDict, total=False):
-    """Who makes the runs of a sweep or a search: arguments of `Evaluation`, which says what they mean."""
-
-    workers: int
-    backend: str
-    client: Any
-    batch: int | None
 
 
 class Evaluation:
@@ -125,6 +116,10 @@ class Evaluation:
                 outcome.kept.save(kept_file(self._journal.folder, outcome.row[0]))
         self._journal.append(rows)
         return rows
+
+
+#: an evaluation of a job and a journal, if there is one, by workers that were chosen before
+Evaluator = Callable[[Job, Journal | None], Evaluation]
 
 
 def batches(tasks: Sequence[Task], size: int) -> Iterator[list[Task]]:

@@ -151,23 +151,6 @@ class Journal:
             ) from error
 
 
-def read_rows(folder: str | Path, about: Mapping[str, Any]) -> dict[int, Row]:
-    """Rows of the finished runs in a folder, by number; an incomplete last line does not count.
-
-    Args:
-        folder: where.
-        about: what its description says, see `read_about`.
-
-    Raises:
-        ResultError: the file cannot be read.
-        SweepFileError: a complete line that cannot be of this sweep; the message names file and line.
-    """
-    path = Path(folder) / RUNS
-    with reported("read", path):
-        content = read_regular(path) if path.exists() else b""
-    return row_format(about).read(path, content)
-
-
 def load(folder: str | Path) -> Any:
     """The rows of all finished runs, also of a sweep that is not finished.
 
@@ -191,7 +174,10 @@ def load(folder: str | Path) -> Any:
         raise MissingDependencyError("reading a table needs pandas: pip install 'synctrl[sweep]'") from error
     about = read_about(folder)
     columns = about["columns"]
-    rows = read_rows(folder, about)
+    path = Path(folder) / RUNS
+    with reported("read", path):
+        content = read_regular(path) if path.exists() else b""
+    rows = row_format(about).read(path, content)
     table = pd.DataFrame([rows[run] for run in sorted(rows)], columns=columns)
     for name in columns[1:]:
         if name in TEXT or any(isinstance(value, str) for value in table[name]):

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from ..checks import choice
 from ..errors import SimulationError, SweepError, SynctrlError
-from ..simulation.engines import Engine, find_engine
+from ..simulation.engines import find_engine
 from ..simulation.result import Result
 from ..simulation.run import Run
 from ..simulation.simulate import Experiment
@@ -105,7 +105,12 @@ class Prepared:
         run = self._plan(experiment, None)
         run.check()
         self._known = list(_paths(experiment))
-        self._engine = _ready(run) if engine == "compiled" else find_engine(engine)
+        self._engine = find_engine(engine)
+        if engine == "compiled":
+            from ..compiled.engine import Compiled, Tables
+
+            self._engine = Compiled({}, Tables())
+            self._engine.load(run)
 
     def simulate(self, experiment: Experiment, control_period: float | None = None) -> Result:
         """Run a variation of the experiment.
@@ -205,15 +210,6 @@ def _runner(payload: bytes, thread: int) -> Runner:
     import pickle
 
     return Runner(pickle.loads(payload))
-
-
-def _ready(run: Run) -> Engine:
-    """The compiled engine, which has loaded what a run needs and will keep what it tabulates."""
-    from ..compiled.engine import Compiled, Tables
-
-    engine = Compiled({}, Tables())
-    engine.load(run)
-    return engine
 
 
 def _paths(experiment: Experiment) -> Iterator[Any]:
