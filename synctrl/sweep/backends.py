@@ -9,7 +9,8 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
-from types import FrameType, ModuleType
+from traceback import walk_stack
+from types import ModuleType
 from typing import Any
 
 from ..errors import InputError, MissingDependencyError, SweepError
@@ -47,7 +48,7 @@ def joblib(job: Job, workers: int) -> Iterator[Crew]:
         try:
             yield from outcomes
         except TerminatedWorkerError as error:
-            raise WorkerDied(_died(str(error))) from error
+            raise _died(error) from error
 
     yield crew
 
@@ -74,7 +75,7 @@ def dask(job: Job, workers: int, client: Any) -> Iterator[Crew]:
                     for batch in islice(waiting, 1):
                         running.add(submit(batch))
             except KilledWorker as error:
-                raise WorkerDied(_died(str(error))) from error
+                raise _died(error) from error
             finally:
                 connected.cancel(list(running.futures))
 
@@ -127,7 +128,7 @@ def pickled(job: Job) -> bytes:
         return bytes(cloudpickle.dumps(job))
     except Exception as error:
         raise InputError(
-            f"this sweep cannot be sent to other processes: {error}; use backend='serial'"
+            f"it cannot be sent to other processes: {error}; use backend='serial'", subject="sweep"
         ) from error
 
 
@@ -159,11 +160,9 @@ def check_main_guard(what: str) -> None:
 
 def _running_line(main: ModuleType) -> int | None:
     """The line of the main script that is being run, or None if it is another thread that runs it."""
-    frame: FrameType | None = sys._getframe()
-    while frame is not None:
+    for frame, line in walk_stack(sys._getframe()):
         if frame.f_globals is vars(main) and frame.f_code.co_name == "<module>":
-            return frame.f_lineno
-        frame = frame.f_back
+            return line
     return None
 
 
@@ -182,7 +181,8 @@ def _need(module: str, package: str | None = None) -> None:
 
     if find_spec(module) is None:
         raise MissingDependencyError(
-            f"this needs {package or module}: pip install 'synctrl[sweep]'; or use backend='serial'"
+            "it is not installed: pip install 'synctrl[sweep]'; or use backend='serial'",
+            subject=package or module,
         )
 
 
@@ -193,5 +193,6 @@ def _root(error: BaseException) -> BaseException:
     return error
 
 
-def _died(message: str) -> str:
-    return f"a worker process ended in the middle of its work: {message.strip().splitlines()[0]}"
+def _died(error: Exception) -> WorkerDied:
+    reason = str(error).strip().splitlines()[0]
+    return WorkerDied(f"it ended in the middle of its work: {reason}", subject="worker process")
