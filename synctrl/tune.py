@@ -27,7 +27,7 @@ from .sweep.journal import Journal
 from .sweep.measures import MEASURES, warn_of
 from .sweep.rows import COMPLETED, Generations, columns
 from .sweep.sweep import Study, StudyOptions
-from .sweep.worker import Job, Task
+from .sweep.worker import Task
 
 Range = Uniform | LogUniform
 
@@ -110,19 +110,15 @@ class _Search:
         self.runs = Generations({factor.name: factor.values for factor in study.factors}, self.population)
         self.history: list[dict[str, Any]] = []
 
-    def about(self, job: Job) -> dict[str, Any]:
-        """What the search is, but not how long: it can go on for more generations."""
-        limit = self.limit if np.isfinite(self.limit) else None
-        more = {"minimize": self.minimize, "torque_limit": limit, "population": self.population}
-        return self.study.about(job, search=more)
-
     def find(self, generations: int, folder: str | Path | None, progress: bool, crew: Evaluator) -> Tuned:
-        """Make all runs, in a folder if there is one, and return the best."""
+        """Make all runs, in a folder if there is one, and return the best; more generations may follow."""
+        limit = self.limit if np.isfinite(self.limit) else None
+        search = {"minimize": self.minimize, "torque_limit": limit, "population": self.population}
         with contextlib.ExitStack() as stack:
             journal = None if folder is None else stack.enter_context(Journal(folder))
             job = self.study.job(None if journal is None else journal.known())
             if journal is not None:
-                journal.begin(self.about(job), self.runs)
+                journal.begin(self.study.about(job, search=search), self.runs)
             evaluation = crew(job, journal)
             stack.enter_context(evaluation.open())
             runs = self.population * (1 + generations)

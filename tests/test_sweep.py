@@ -143,6 +143,11 @@ def test_grids_are_combined_and_sampled():
     assert len({v["model_error"] for v in values}) == 12
 
 
+def test_a_sweep_may_have_more_factors_than_arrays_have_axes():
+    factors = [Factor(f"factor {k}", Grid([0, 1] if k > 97 else [0]), lambda e, v: e) for k in range(100)]
+    assert [*Sweep(base(), factors).values(2).values()] == [0.0] * 98 + [1.0, 0.0]
+
+
 # -- factors ----------------------------------------------------------------------------------------------
 
 

@@ -78,7 +78,9 @@ class CompiledLoop:
         arrays = {name: np.zeros(shape(name, self.sizes)) for name in owned_by("work")}
         for name, array in {**arrays, **_constants(loop, classified.bases)}.items():
             setattr(self.quantities, name, self.address(checked(name, array, self.sizes)))
-        self.scratch = _work_sizes(library)
+        sizes = (ctypes.c_longlong * 4)()
+        library.work_sizes(sizes)
+        self.scratch = tuple(sizes)
         self.work = self._work()
         self.carried = _carried(loop.plant, self.sizes["bodies"])
 
@@ -251,10 +253,3 @@ def _carried(plant: Plant, bodies: int) -> np.ndarray:
         for row, robot in zip(rows, robots, strict=True):
             row[: 10 * robot.body_count] = robot.inertial_parameters
     return pi
-
-
-def _work_sizes(library: ctypes.CDLL) -> tuple[int, int, int, int]:
-    """Sizes of the scratch arrays, as the generated code asks for them."""
-    sizes = (ctypes.c_longlong * 4)()
-    library.work_sizes(sizes)
-    return tuple(sizes)

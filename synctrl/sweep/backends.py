@@ -28,19 +28,19 @@ class WorkerDied(SweepError):
 
 
 @contextlib.contextmanager
-def serial(runner: Runner) -> Iterator[Crew]:
+def serial(runner: Runner, *_: Any) -> Iterator[Crew]:
     """One run after another, in this process."""
     yield lambda batches: ([runner.outcome(task) for task in batch] for batch in batches)
 
 
 @contextlib.contextmanager
-def joblib(job: Job, workers: int) -> Iterator[Crew]:
+def joblib(runner: Runner, workers: int, *_: Any) -> Iterator[Crew]:
     """Worker processes of this machine."""
     _need("joblib")
     from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-    payload = pickled(job)
+    payload = pickled(runner.job)
 
     def crew(batches: Iterable[Batch]) -> Iterator[list[Outcome]]:
         parallel = Parallel(n_jobs=workers, backend="loky", return_as="generator_unordered", batch_size=1)
@@ -54,12 +54,12 @@ def joblib(job: Job, workers: int) -> Iterator[Crew]:
 
 
 @contextlib.contextmanager
-def dask(job: Job, workers: int, client: Any) -> Iterator[Crew]:
+def dask(runner: Runner, workers: int, client: Any) -> Iterator[Crew]:
     """A Dask cluster: a client, the address of a scheduler, or None for a cluster on this machine."""
     _need("distributed", "dask[distributed]")
     from distributed import KilledWorker, as_completed
 
-    payload = pickled(job)
+    payload = pickled(runner.job)
     with _connected(client, workers) as connected:
 
         def submit(batch: Batch) -> Any:
@@ -80,6 +80,9 @@ def dask(job: Job, workers: int, client: Any) -> Iterator[Crew]:
                 connected.cancel(list(running.futures))
 
         yield crew
+
+
+BACKENDS = {"joblib": joblib, "dask": dask, "serial": serial}
 
 
 @contextlib.contextmanager

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator, Sequence
-from itertools import islice
 from time import perf_counter
 from typing import Any
 
 from ..checks import choice, count
-from . import backends
+from .backends import BACKENDS, WorkerDied
 from .journal import Journal, kept_file
 from .measures import Doubt
 from .rows import Row
 from .worker import Job, Outcome, Runner, Task
 
-BACKENDS = ("joblib", "dask", "serial")
 #: how long a batch should take, s: what it costs to send one is then far below a hundredth of it
 BATCH_TIME = 1.0
 #: batches per worker at least, so that all of them have something to do until the end
@@ -50,7 +48,7 @@ class Evaluation:
         batch: int | None = None,
     ):
         self.workers, self._batch = count("workers", workers), batch
-        self._backend, self._client = choice("backend", backend, BACKENDS), client
+        self._backend, self._client = choice("backend", backend, tuple(BACKENDS)), client
         if batch is not None:
             count("batch", batch)
         self._runner, self._journal = Runner(job), journal  # whatever has to be compiled is compiled here
@@ -60,13 +58,7 @@ class Evaluation:
     @contextlib.contextmanager
     def open(self) -> Iterator[None]:
         """Have the workers ready."""
-        job = self._runner.job
-        crews = {
-            "serial": lambda: backends.serial(self._runner),
-            "joblib": lambda: backends.joblib(job, self.workers),
-            "dask": lambda: backends.dask(job, self.workers, self._client),
-        }
-        with crews[self._backend]() as self._crew:
+        with BACKENDS[self._backend](self._runner, self.workers, self._client) as self._crew:
             yield
 
     def run(self, tasks: Sequence[Task]) -> Iterator[list[Row]]:
@@ -83,10 +75,12 @@ class Evaluation:
         attempts = RETRIES
         while todo:
             try:
-                for outcomes in self._crew(batches(todo, self._batch or 1)):
+                size = self._batch or 1
+                batches = (todo[k : k + size] for k in range(0, len(todo), size))
+                for outcomes in self._crew(batches):
                     yield self._write(outcomes)
                 return
-            except backends.WorkerDied:
+            except WorkerDied:
                 left = [task for task in todo if task.run not in self.rows]
                 attempts = RETRIES if len(left) < len(todo) else attempts - 1
                 if attempts < 0:
@@ -120,13 +114,6 @@ class Evaluation:
 
 #: an evaluation of a job and a journal, if there is one, by workers that were chosen before
 Evaluator = Callable[[Job, Journal | None], Evaluation]
-
-
-def batches(tasks: Sequence[Task], size: int) -> Iterator[list[Task]]:
-    """The tasks in lists of a size."""
-    waiting = iter(tasks)
-    while batch := list(islice(waiting, size)):
-        yield batch
 
 
 def progress_bar(total: int, done: int, shown: bool) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -12,7 +12,6 @@ from ..analysis.metrics import (
     DEFINITIONS,
     ERRORS,
     SETTLING_FRACTION,
-    ErrorMetrics,
     Metrics,
     finite_or_none,
     metrics,
@@ -31,15 +30,21 @@ class Measure(NamedTuple):
     unit: str
 
 
-#: how the values of all robots (or pairs) and axes become one
-_OVER_ALL: Mapping[str, str] = MappingProxyType(
+#: how the values of all robots (or pairs) and axes become one: in words, and as a function of them
+_OVER_ALL: Mapping[str, tuple[str, Callable[[np.ndarray], Any]]] = MappingProxyType(
     {
-        "peak": "the largest over all {rows} and axes",
-        "rms": "the root of the mean of the squares over all {rows} and axes",
-        "ise": "the sum over all {rows} and axes",
-        "final": "the largest over all {rows} and axes, without its sign",
-        "settling_time": "the latest over all {rows} and axes; empty if one has not settled; the band is "
-        f"{SETTLING_FRACTION:.0%} of the largest error of the run of the base experiment",
+        "peak": ("the largest over all {rows} and axes", np.max),
+        "rms": (
+            "the root of the mean of the squares over all {rows} and axes",
+            lambda x: np.sqrt(np.mean(x**2)),
+        ),
+        "ise": ("the sum over all {rows} and axes", np.sum),
+        "final": ("the largest over all {rows} and axes, without its sign", lambda x: np.abs(x).max()),
+        "settling_time": (
+            "the latest over all {rows} and axes; empty if one has not settled; the band is "
+            f"{SETTLING_FRACTION:.0%} of the largest error of the run of the base experiment",
+            np.max,
+        ),
     }
 )
 _SHORT = {"tracking_error": "tracking", "sync_error": "sync"}
@@ -68,7 +73,7 @@ def definitions(cell: Cell) -> dict[str, Measure]:
     found = {}
     for kind, unit in units.items():
         special = {"ise": f"{squared_unit(unit)}·s", "settling_time": "s"}
-        for name, how in _OVER_ALL.items():
+        for name, (how, _) in _OVER_ALL.items():
             text = f"{DEFINITIONS[name].split(';')[0]}; {how.format(rows=_ROWS[kind])}"
             found[f"{_SHORT[kind]}_{name}"] = Measure(text, special.get(name, unit))
     text = f"{DEFINITIONS['peak_torque']}; the largest over all robots and joints"
@@ -84,7 +89,11 @@ def measures(result: Result, bands: Mapping[str, float]) -> list[float | None]:
     """
     with np.errstate(over="ignore", invalid="ignore"):
         computed: Metrics = metrics(result, bands)
-        values: list[Any] = [value for kind in ERRORS for value in _over_all(getattr(computed, kind))]
+        values: list[Any] = [
+            over_all(getattr(getattr(computed, kind), name))
+            for kind in ERRORS
+            for name, (_, over_all) in _OVER_ALL.items()
+        ]
     values += [computed.peak_torque.max(), cut_off(result), (result.info["step_error"] or {}).get("estimate")]
     return [finite_or_none(value) for value in values]
 
@@ -149,14 +158,3 @@ def warn_of(doubts: Mapping[int, Doubt], what: str, dt: float) -> None:
 def _largest(values: Mapping[int, float]) -> int:
     """The run with the largest value, the first one if there are more: whoever made it, and when."""
     return max(values, key=lambda run: (values[run], -run))
-
-
-def _over_all(error: ErrorMetrics) -> list[float]:
-    """In the order of `_OVER_ALL`."""
-    return [
-        error.peak.max(),
-        np.sqrt(np.mean(error.rms**2)),
-        error.ise.sum(),
-        np.abs(error.final).max(),
-        error.settling_time.max(),
-    ]

@@ -61,8 +61,7 @@ class Draws:
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(run,)))
         found: list[Value | None] = []
         known = True  # what is drawn after values of an unknown kind is not known either
-        point = np.unravel_index(run // self.samples, self._sizes)  # the last grid changes first
-        for (name, values), k in zip(self.factors.items(), point, strict=True):
+        for (name, values), k in zip(self.factors.items(), self._point(run // self.samples), strict=True):
             known = known and values is not None
             if isinstance(values, Grid):
                 found.append(values.values[k])
@@ -80,6 +79,14 @@ class Draws:
     @property
     def _sizes(self) -> list[int]:
         return [len(v.values) if isinstance(v, Grid) else 1 for v in self.factors.values()]
+
+    def _point(self, number: int) -> list[int]:
+        """A combination of the grids, by its number: the last grid changes first."""
+        point = []
+        for size in reversed(self._sizes):
+            number, k = divmod(number, size)
+            point.append(k)
+        return point[::-1]
 
 
 @dataclass(frozen=True)

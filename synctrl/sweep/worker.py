@@ -150,7 +150,8 @@ class Runner:
             SweepError: a function of the user failed.
         """
         try:
-            result = self.simulate(task)
+            setup = self._setup(task)
+            result = self._prepared.simulate(setup.experiment, setup.control_period)
         except SimulationError as error:
             return self._outcome(task, STOPPED, error, error.result)
         except SweepError:
@@ -159,22 +160,15 @@ class Runner:
             return self._outcome(task, REFUSED, error, None)
         return self._outcome(task, COMPLETED, None, result)
 
-    def simulate(self, task: Task) -> Result:
-        """The whole result of a run.
-
-        Raises:
-            SynctrlError: it stops or is refused.
-            SweepError: a function of the user failed.
-        """
+    def _setup(self, task: Task) -> Setup:
         try:
-            setup = self.job.setup(task.values)
+            return self.job.setup(task.values)
         except SynctrlError:
             raise
         except Exception as error:
             raise SweepError(
                 f"a factor's function failed with {type(error).__name__}: {error}", subject=f"run {task.run}"
             ) from error
-        return self._prepared.simulate(setup.experiment, setup.control_period)
 
     def _outcome(self, task: Task, status: str, error: SynctrlError | None, result: Result | None) -> Outcome:
         cause = None if error is None else _written(f"{type(error).__name__}: {error}")
