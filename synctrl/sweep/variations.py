@@ -92,11 +92,9 @@ def with_scaled_disturbance(experiment: Experiment, value: float, disturbance: i
 
 def with_disturbance_from(experiment: Experiment, value: float, disturbance: int) -> Experiment:
     """A disturbance that starts at another time and lasts as long as before."""
-
-    def move(d: Disturbance) -> Disturbance:
-        return replace(d, start=value, stop=value + (d.stop - d.start))
-
-    return _with_disturbance(experiment, disturbance, move)
+    return _with_disturbance(
+        experiment, disturbance, lambda d: replace(d, start=value, stop=value + (d.stop - d.start))
+    )
 
 
 def with_scaled_weights(experiment: Experiment, value: float, robot: int | None = None) -> Experiment:

@@ -171,7 +171,9 @@ class Runner:
             ) from error
 
     def _outcome(self, task: Task, status: str, error: SynctrlError | None, result: Result | None) -> Outcome:
-        cause = None if error is None else _written(f"{type(error).__name__}: {error}")
+        cause = None
+        if error is not None:  # halves of surrogate pairs, which a name may have, become question marks
+            cause = f"{type(error).__name__}: {error}".encode(errors="replace").decode()
         time = error.time if isinstance(error, SimulationError) else None
         values: list[Any] = [None] * len(MEASURES)
         doubt = None
@@ -185,11 +187,6 @@ class Runner:
             return None
         thin = result.decimated(self.job.keep_every)
         return replace(thin, info={**thin.info, "run": task.run}, experiment=None)
-
-
-def _written(text: str) -> str:
-    """A text that files can hold: halves of surrogate pairs, which a name may have, become question marks."""
-    return text.encode(errors="replace").decode()
 
 
 def run_batch(payload: bytes, tasks: Sequence[Task]) -> list[Outcome]:
