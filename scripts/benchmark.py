@@ -30,7 +30,7 @@ from benchmark_report import Table, is_installed, machine, markdown
 from naive_loop import BareCalls, NaiveLoop
 
 from synctrl import Experiment, load_robot
-from synctrl.compiled.run import Compiled
+from synctrl.compiled.engine import Compiled
 from synctrl.errors import SimulationError
 from synctrl.experiments import (
     a460_pair, mixed_four, mobile_robot, panda_four, planar_four, rigid_object, ur5_payload,

@@ -21,7 +21,6 @@ _MOVES = {
     "analysis paper": "baselines claims judge trials",
     "experiments paper": "reproduction theory",
     "show paper": "paper_sections plant_sections report",
-    "simulation sweep": "prepared",
 }
 _URDF = "checks", "document", "meshes", "reader", "writer", "xml"
 #: modules of today, and those that are a part of them now
@@ -39,6 +38,10 @@ _PARTS = {
     "paper.reproduction": "experiments.batch",
     "paper.theory": "show.theory_sections",
     "paper.trials": "analysis.matching",
+    "sweep.description": "sweep.identity",
+    "sweep.journal": "sweep.table",
+    "sweep.sweep": "sweep.study",
+    "sweep.worker": "simulation.prepared",
 }
 
 

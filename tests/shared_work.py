@@ -42,7 +42,7 @@ from synctrl.experiments.panda_four import circle_cell
 from synctrl.show.plots import joint_trajectories, save, sync_errors, tracking_errors
 from synctrl.simulation.payloads import Payload
 from synctrl.simulation.result import LAYOUT
-from synctrl.sweep.prepared import Prepared
+from synctrl.sweep.worker import Prepared
 
 DT = 1e-3
 

@@ -46,11 +46,11 @@ from synctrl.show.plots import common_limits, joint_trajectories, sync_errors, t
 from synctrl.show.real_cells import formation_scene
 from synctrl.simulation.guard import Finding
 from synctrl.simulation.guard import stopped as stopped_by
+from synctrl.sweep.description import describe_base
 from synctrl.sweep.factors import Setup
-from synctrl.sweep.identity import describe_base
 from synctrl.sweep.measures import MEASURES, definitions, measures
-from synctrl.sweep.prepared import Prepared
 from synctrl.sweep.variations import with_scaled_weights
+from synctrl.sweep.worker import Prepared
 
 DURATION, DT = 0.01, 1e-3  # s
 needs_casadi = pytest.mark.skipif(

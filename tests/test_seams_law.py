@@ -32,7 +32,7 @@ from synctrl.experiments import (
     rigid_object,
     ur5_payload,
 )
-from synctrl.sweep.prepared import Prepared
+from synctrl.sweep.worker import Prepared
 
 compiled = pytest.mark.skipif(
     find_spec("casadi") is None, reason="CasADi is an extra: pip install 'synctrl[compiled]'"
@@ -252,8 +252,9 @@ class Gossip(Pulling):
 @pytest.mark.parametrize("law", [Clockwork(1.0), Gossip(1.0)])
 def test_a_law_that_cannot_be_traced_is_refused_by_name_and_runs_in_the_reference_engine(law):
     run = replace(planar_four(), law=law)
-    with pytest.raises(InputError, match=r"cannot trace the law .*(Ticking|Listening)"):
+    with refused(InputError, "law") as caught:
         run.simulate(0.01, engine="compiled")
+    assert caught.value.found.endswith((".Ticking", ".Listening"))
     assert run.simulate(0.01).status == "completed"
 
 
@@ -412,7 +413,7 @@ def test_another_network_than_the_one_that_made_a_result_is_noticed():
 
 @compiled
 def test_a_network_of_ones_own_is_refused_by_name_in_the_compiled_engine():
-    with pytest.raises(InputError, match=r"network .*BoundLagging.*engine='pinocchio'"):
+    with refused(InputError, "network", found="seams.lagging_network.BoundLagging"):
         lagging().simulate(0.01, engine="compiled")
 
 

@@ -110,7 +110,7 @@ def test_a_sweep_takes_a_space_of_ones_own(tmp_path):
 
 
 def test_the_compiled_engine_refuses_a_space_of_ones_own_by_name():
-    with pytest.raises(InputError, match=r"space seams\.degrees\.Degrees"):
+    with refused(InputError, "space", found="seams.degrees.Degrees"):
         experiment(Degrees()).simulate(engine="compiled")
 
 

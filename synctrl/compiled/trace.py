@@ -25,7 +25,7 @@ from ..tasks.redundancy import Inversion, velocity_lost
 from ..tasks.spaces import Measurement
 from .algebra import SYMBOLS, array_of, column_of
 from .kind import Kind
-from .learning import Learning
+from .plugged import Learning
 from .quantities import DESIRED, FUNCTIONS, HEARD, QUANTITIES, columns
 
 
@@ -144,7 +144,7 @@ class Trace:
             Lambda, beta, K_eps = map(self._row, ("Lambda", "beta", "K_eps"))
             return BoundSunMills(Lambda, beta, K_eps, kind.reference_acceleration).command(errors)
         rows = (column_of(getattr(errors, name)) for name in ROWS)
-        parts = kind.law.command(*rows, self.given["weights"])
+        parts = kind.law(*rows, self.given["weights"])
         return Asked(*(array_of(part, -1) for part in parts))
 
     def estimate(self, learning: Learning) -> Any:

@@ -49,7 +49,7 @@ class Reference:
 #: the engines that have a name: their module and class, which is imported when it is asked for
 ENGINES = {
     "pinocchio": ("synctrl.simulation.engines", "Reference"),
-    "compiled": ("synctrl.compiled.run", "Compiled"),
+    "compiled": ("synctrl.compiled.engine", "Compiled"),
 }
 
 
