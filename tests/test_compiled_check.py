@@ -244,7 +244,7 @@ def test_code_that_was_made_from_a_wrong_line_of_the_law_is_found(monkeypatch):
     from synctrl.control import law
 
     with monkeypatch.context() as patch:
-        patch.setattr(law, "compute_weighted_errors", lambda c, c_dot, error: np.matvec(c, error))
+        patch.setattr(law, "compute_weighted_errors", lambda weights, error: np.matvec(weights.c, error))
         wrong = list(program.generate(classify(loop.controller).kinds))
     monkeypatch.setattr(program, "generate", lambda kinds: iter(wrong))
     with refused(CompilationError, "generated code") as caught:

@@ -373,7 +373,7 @@ CLASSES = {
     "a method": (Controller, "evaluate", lambda *_: None),
     "a computed attribute": (Robot, "gravity_vector", property(lambda self: np.zeros(3))),
     "a line of the law": (law, "compute_joint_command", lambda asked, *_: asked),
-    "another line of the law": (law, "compute_weighted_errors", lambda c, c_dot, error: error),
+    "another line of the law": (law, "compute_weighted_errors", lambda weights, error: error),
     "a dressed method": (Controller, "evaluate", dressed(Controller.evaluate)),
     "a dressed line of the law": (law, "compute_joint_command", dressed(law.compute_joint_command)),
     "a dressed line with a memory": (

@@ -83,8 +83,7 @@ class Trace:
         """Where the robot is, and how it errs."""
         motion, desired = (np.stack([*map(self._row, names)]) for names in (("q", "v"), DESIRED))
         task = self.space.measure(motion, desired)
-        c, c_dot = self._weights()[:2]
-        w, w_dot = law.compute_weighted_errors(c, c_dot, task.error)
+        w, w_dot = law.compute_weighted_errors(Weights(*self._weights()), task.error)
         way = {} if task.inversion is None else task.inversion._asdict()
         return self._function(
             "measure",

@@ -203,7 +203,7 @@ class Controller:
         q, v = motion
         space, weights = self.cell.task, reference.weights
         task = space.measure(motion, reference.desired)
-        w = law.compute_weighted_errors(weights.c, weights.c_dot, task.error)
+        w = law.compute_weighted_errors(weights, task.error)
         received = self.network.exchange(reference.t, w, integral)
         errors = Errors(reference.t, task.error, task.motion[1], task.rates, w, received.shares, weights)
         asked = self.law.command(errors)

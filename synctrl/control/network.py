@@ -167,8 +167,7 @@ class Messages:
         """
         if not times:
             return memory
-        error, (c, c_dot, _, _) = self._measure(motion, reference.desired).error, reference.weights
-        w = compute_weighted_errors(c, c_dot, error)
+        w = compute_weighted_errors(reference.weights, self._measure(motion, reference.desired).error)
         for t in times:
             memory = self._after(t, w, memory)
         return memory

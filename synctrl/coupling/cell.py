@@ -27,7 +27,7 @@ from .member_checks import (
     check_trajectory,
     member_parameters,
 )
-from .weights import Weights
+from .weights import StillWeights, Weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +195,7 @@ class Cell:
         """The instants in a part of a table, one after another."""
         desired, times = np.ascontiguousarray(table.desired[part]), table.t[part].tolist()
         if self.coupling.is_constant:
-            constant = Weights(*(weight[0] for weight in table.weights))
+            constant = StillWeights(*(weight[0] for weight in table.weights))
             return (Reference(row, constant, t) for row, t in zip(desired, times, strict=True))
         rows = zip(desired, times, *(weight[part] for weight in table.weights), strict=True)
         return (Reference(row, Weights(*weights), t) for row, t, *weights in rows)

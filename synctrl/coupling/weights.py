@@ -30,6 +30,17 @@ class Weights(NamedTuple):
     c_ddot: np.ndarray
     c_inv: np.ndarray
 
+    @property
+    def move(self) -> bool:
+        """Whether c' and c'' have to be asked for."""
+        return True
+
+
+class StillWeights(Weights):
+    """Weights of which c' and c'' are zero for good: nothing has to be multiplied by them."""
+
+    move = False
+
 
 class WeightSource(Protocol):
     """Where the weights of n robots come from."""
