@@ -16,7 +16,7 @@ from .robots.friction_parameters import FrictionParameters
 from .robots.parameters import FullParameters, LinearParameters
 from .robots.robot import Robot, load_robot
 from .simulation.disturbances import Disturbance
-from .simulation.mujoco_model import mujoco_model
+from .simulation.mujoco import mujoco_model
 from .simulation.payloads import Payload
 from .simulation.result import Result
 from .simulation.simulate import Experiment, simulate

@@ -33,7 +33,13 @@ _MOVES = (
 )
 _URDF = "checks", "document", "meshes", "reader", "writer", "xml"
 #: modules that are a part of another one now
-_PARTS = {"experiments.judged": "paper.judge", "show.judge_plots": "paper.judge_section"}
+_PARTS = {
+    "experiments.judged": "paper.judge",
+    "show.judge_plots": "paper.judge_section",
+    "simulation.damping": "simulation.limits",
+    "simulation.mujoco_plant": "simulation.mujoco",
+    "simulation.sampled": "simulation.controls",
+}
 
 
 def _pairs() -> Iterator[tuple[str, str]]:

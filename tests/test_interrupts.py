@@ -29,8 +29,8 @@ from synctrl import (
 )
 from synctrl.compiled import engine as compiled
 from synctrl.errors import CouplingError, NonFiniteError, RunInterrupted, SimulationError, TrajectoryError
+from synctrl.simulation import advance
 from synctrl.simulation import run as runs
-from synctrl.simulation import steps
 from synctrl.simulation.closed_loop import ClosedLoop
 from synctrl.simulation.handover import up_to_a_failure
 from synctrl.simulation.plant import Plant
@@ -468,7 +468,7 @@ def test_bits_do_not_depend_on_the_blocks_in_which_a_run_is_made(engine, control
     for block, away in ((1, 0.05), (7, 1e-12), (1000, 1e-12), (1000, 1e9)):
         monkeypatch.setattr(compiled, "BLOCK_STEPS", block)
         monkeypatch.setattr(compiled, "AWAY", away)
-        monkeypatch.setattr(steps, "BLOCK", block)
+        monkeypatch.setattr(advance, "BLOCK", block)
         assert run.simulate(**options) == expected
 
 

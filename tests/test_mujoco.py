@@ -28,7 +28,7 @@ from synctrl.experiments import a460_pair, planar_four
 from synctrl.robots.documents import planar_arm
 from synctrl.robots.urdf import describe
 from synctrl.robots.urdf.document import Document, Inertial, Pose
-from synctrl.simulation.mujoco_plant import MujocoArm, _for_mujoco
+from synctrl.simulation.mujoco import MujocoArm, _for_mujoco
 
 #: equal accelerations up to rounding in chains of seven bodies
 SAME = 1e-10

@@ -29,8 +29,7 @@ from synctrl import (
 )
 from synctrl.errors import InputError, MissingDependencyError
 from synctrl.experiments import ur5_payload
-from synctrl.simulation.mujoco_model import JointMap
-from synctrl.simulation.mujoco_plant import MujocoArm
+from synctrl.simulation.mujoco import JointMap, MujocoArm
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is an extra: pip install 'synctrl[mujoco]'")
 

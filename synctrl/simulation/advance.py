@@ -16,7 +16,7 @@ there; only a sample that is due is still taken, and its torque is in the last r
 Of these only events of the plant (`step.loop.meet`) and what the controller does (`control.begin`) are calls
 that the loop below makes. The rest is in the step itself, because it does not move the state but changes what
 the state will do: `step.loop` has the plant with the loads of this step, `step.stages` the desired motion
-and `step.push` the torque from outside. `steps.py` looks loop and push up in the middle of the step, which is
+and `step.push` the torque from outside. `steps` looks loop and push up in the middle of the step, which is
 on the right side of every jump; what is desired at its end is taken from just before it.
 """
 
@@ -29,11 +29,51 @@ import numpy as np
 
 from ..control.controller import Signals
 from ..coupling.cell import Reference
-from .clock import Clock
+from .clock import Clock, Stretch
 from .closed_loop import ClosedLoop
 from .disturbances import DisturbanceSchedule
+from .handover import up_to_a_failure
 from .state import State
-from .steps import Step, steps
+
+#: steps whose references are evaluated together
+BLOCK = 256
+
+
+class Step(NamedTuple):
+    """One step of a run, within which everything is smooth.
+
+    Attributes:
+        t, t_next: its start and end, s.
+        stages: what is desired at its start, in its middle, and just before its end, which are the three
+            instants at which the Runge-Kutta method evaluates rates.
+        loop: the closed loop with the plant as it is in between, with the loads that it carries then.
+        push: torque from outside in between, (n, nv), N·m.
+        number: which multiple of dt it begins at or after.
+        checked: whether it begins at that multiple: there the run is watched, and samples fall.
+        logged: whether it begins at an instant that is logged.
+        joined: whether all goes on smoothly from the step before, so that its error can be estimated across
+            the instant between them.
+    """
+
+    t: float
+    t_next: float
+    stages: tuple[Reference, Reference, Reference]
+    loop: ClosedLoop
+    push: np.ndarray
+    number: int
+    checked: bool
+    logged: bool
+    joined: bool
+
+    @property
+    def h(self) -> float:
+        """Its length, s."""
+        return self.t_next - self.t
+
+    @property
+    def middle(self) -> float:
+        """Halfway through it, s."""
+        return 0.5 * (self.t + self.t_next)
 
 
 class Sample(NamedTuple):
@@ -136,3 +176,37 @@ def advance(
             yield Sample(step.t, y.flat, step.push, signals, step.logged)
         y = solver.carry(control, step, y, rate)
     yield Sample(clock.end, y.flat, step.push, control.finish(clock.end, y))
+
+
+def steps(loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule) -> Iterator[Step]:
+    """Every step of the clock; all that come before an instant whose references cannot be had, and its error.
+
+    Raises:
+        SynctrlError: a desired motion or weight fails.
+    """
+
+    def make(first: int, last: int) -> list[Step]:
+        return list(_tabulated(loop, clock, clock.stretch(first, last), schedule))
+
+    for first, last in clock.stretches(BLOCK):
+        for made in up_to_a_failure(make, first, last):
+            yield from made
+
+
+def _tabulated(
+    loop: ClosedLoop, clock: Clock, stretch: Stretch, schedule: DisturbanceSchedule
+) -> Iterator[Step]:
+    """The steps of a stretch, their references evaluated together."""
+    table, n = loop.cell.reference_table(stretch.stages.ravel()), len(stretch.starts)
+    stages = (loop.cell.instants(table, slice(i * n, (i + 1) * n)) for i in range(3))
+    middles = stretch.middles
+    columns = stretch.number, stretch.checked, stretch.logged, clock.joined(stretch.first, stretch.starts)
+    return map(
+        Step,
+        stretch.starts.tolist(),
+        stretch.times[1:].tolist(),
+        zip(*stages, strict=True),
+        map(loop.at, middles.tolist()),
+        map(schedule.torques.__getitem__, schedule.windows(middles).tolist()),
+        *(column.tolist() for column in columns),
+    )

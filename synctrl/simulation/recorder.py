@@ -1,8 +1,13 @@
-"""Collects the instants of a run into the arrays of a Result."""
+"""Collects the instants of a run into the arrays of a Result, with what the plant says of its own state.
+
+A plant of a user's own may carry a state through a run that nobody else understands, see `Plant`. At the end
+of the run its methods `report` and `outputs` say what became of it. Both are code of the user's, so what they
+give is checked here before it gets into a `Result`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, NamedTuple
@@ -11,16 +16,27 @@ import numpy as np
 
 from ..checks import printable
 from ..control.controller import Signals
-from .account import NOTHING, Account, account_of
+from ..errors import InputError
+from ..robots.limits import joint_limits
 from .advance import Sample
 from .clock import Clock
 from .closed_loop import ClosedLoop
-from .damping import DampingLog
-from .limits import limit_report, torque_limits
+from .limits import APPLIED, DampingLog, applied_output, limit_report, saturation_report
 from .memory import check_fits
+from .plant import Output, Plant
 from .result import LAYOUT, Result, unit_of
-from .saturation import APPLIED, applied_output, saturation_report
 from .state import State
+
+
+class Account(NamedTuple):
+    """What a plant adds to a result: entries of `info`, and outputs by name."""
+
+    report: Mapping[str, Any]
+    outputs: Mapping[str, Output]
+
+
+#: of a plant that has nothing to say
+NOTHING = Account({}, {})
 
 
 class Recorder:
@@ -191,11 +207,9 @@ def describe(loop: ClosedLoop) -> dict[str, Any]:
                 "joints": list(robot.joint_names),
                 "parameters": list(parameters.names),
                 "theta": [float(value) for value in parameters.theta],
-                "torque_limits": [float(x) if np.isfinite(x) else None for x in limits[: robot.nv]],
+                "torque_limits": [float(x) if np.isfinite(x) else None for x in joint_limits(robot).torque],
             }
-            for name, robot, parameters, limits in zip(
-                cell.names, cell.robots, cell.parameters, torque_limits(cell), strict=True
-            )
+            for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True)
         ],
         "axes": list(cell.labels),
         "task_unit": cell.space.unit,
@@ -226,3 +240,47 @@ def _version(package: str) -> str:
         return version(package)
     except PackageNotFoundError:
         return "not installed as a package"
+
+
+def account_of(
+    plant: Plant, hidden: np.ndarray, taken: Collection[str], lengths: Mapping[str, int]
+) -> Account:
+    """Ask a plant.
+
+    Args:
+        plant: the plant.
+        hidden: its own state at the logged instants, (T, size of the state).
+        taken: names of entries and outputs that are not the plant's to give.
+        lengths: of the axes that have one in this run, "time" among them.
+
+    Raises:
+        InputError: something else than entries by name, a name that is taken, or an output that is no array
+            with a unit and one axis per dimension, time first.
+        Exception: what the plant raises.
+    """
+    found = Account(plant.report(hidden), plant.outputs(hidden))
+    for what, entries in found._asdict().items():
+        where = f"plant {type(plant).__qualname__}, {what}"
+        if not isinstance(entries, Mapping):
+            raise InputError(f"{where}: expected entries by name, found {entries!r:.80}")
+        for name in entries:
+            if not isinstance(name, str) or not name.isidentifier() or name in taken:
+                raise InputError(f"{where}: expected names that are not taken, found {name!r:.80}")
+    for name, output in found.outputs.items():
+        _check_output(f"plant {type(plant).__qualname__}, outputs, {name}", output, lengths)
+    return found
+
+
+def _check_output(where: str, output: Any, lengths: Mapping[str, int]) -> None:
+    try:
+        array, unit, axes = output
+        named = isinstance(unit, str) and axes[0] == "time" and all(isinstance(axis, str) for axis in axes)
+        fits = all(lengths.get(axis, k) == k for axis, k in zip(axes, array.shape, strict=True))
+        sound = named and fits and array.dtype == np.float64
+    except (TypeError, ValueError, AttributeError, IndexError):
+        sound = False
+    if not sound:
+        raise InputError(
+            f"{where}: expected an array of floats over {lengths['time']} instants, its unit, and the names "
+            f"of its axes, of which the first is 'time', found {output!r:.80}"
+        )

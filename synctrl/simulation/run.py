@@ -11,19 +11,17 @@ import numpy as np
 from ..coupling.motion_checks import check_motions
 from ..coupling.reachability import SAMPLES, check_reachable
 from ..errors import RunInterrupted, SimulationError, SynctrlError
-from .account import NOTHING, Account
 from .advance import Sample, Solver, advance
 from .clock import Clock
 from .closed_loop import ClosedLoop
-from .continuous import Continuous
+from .controls import Continuous, Sampled
 from .diagnosis import diagnosed
 from .disturbances import DisturbanceSchedule
 from .guard import Guard
 from .handover import Progress, date, tell, user_failure
 from .integrators import RungeKutta, Scipy
-from .recorder import Recorder
+from .recorder import NOTHING, Account, Recorder
 from .result import Result
-from .sampled import Sampled
 from .step_error import StepError, step_report
 
 #: instants at which weights are looked at before a run, at most

@@ -30,18 +30,17 @@ from ..control.network import Network
 from ..coupling.cell import Cell
 from ..errors import InputError
 from ..renamed import names_elsewhere
-from .clock import TIE, make_clock
+from .clock import TIE, make_clock, multiple
 from .closed_loop import ClosedLoop
 from .disturbances import Disturbance, DisturbanceSchedule
 from .engines import Engine, find_engine
 from .handover import Progress
 from .integrators import ADAPTIVE
+from .limits import warn_of_saturation
 from .payloads import Payload
 from .plant import PHYSICS, Plant
 from .result import Result
 from .run import Run, run_adaptive
-from .sampled import steps_per_sample
-from .saturation import warn_of_saturation
 from .step_error import StepError, warn_of_step
 
 
@@ -184,7 +183,7 @@ class Experiment:
         if control_period is None:
             edges += loop.messages.between(0.0, positive_number("duration", duration))
         clock = make_clock(duration, dt, edges, self.cell.breaks, log_dt)
-        every = None if control_period is None else steps_per_sample(control_period, dt)
+        every = None if control_period is None else multiple("control_period", control_period, dt)
         info: dict[str, Any] = {"integrator": "rk4", "dt": float(dt), "duration": float(duration)}
         info["log_dt"] = float(dt if log_dt is None else log_dt)
         info["engine"] = "pinocchio"
