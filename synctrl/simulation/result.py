@@ -14,8 +14,8 @@ import numpy as np
 
 from ..checks import instance
 from ..errors import InputError, ResultError
-from .result_file import read_result, write_result
-from .result_schema import FORMAT, LAYOUT, check_shape, shapes, unit_of
+from .result_file import LAYOUT, check_shape, read_result, shapes, unit_of, write_result
+from .schema import FORMAT
 
 __all__ = ["FORMAT", "LAYOUT", "Result", "unit_of"]
 
