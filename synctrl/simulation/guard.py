@@ -71,16 +71,13 @@ class Guard:
         if not isfinite(np.add.reduce(sample.y)) and not np.isfinite(sample.y).all():
             return Finding("state")
         task, tau = sample.signals.task, sample.signals.tau
-        if (found := self._beyond(task) or self._crossed(task)) is not None:
+        if (beyond := first_beyond(self._space, task)) is not None:
+            return Finding(beyond.name, beyond.robot, beyond.value)
+        if (found := self._crossed(task)) is not None:
             return found
         if not isfinite(np.add.reduce(tau, axis=None)) and (rows := _non_finite_rows(tau)).size:
             return Finding("torque", int(rows[0]))
         return None
-
-    def _beyond(self, task: Measurement) -> Finding | None:
-        """The first number that has reached its limit, or is none."""
-        found = first_beyond(self._space, task)
-        return None if found is None else Finding(found.name, found.robot, found.value)
 
     def _crossed(self, task: Measurement) -> Finding | None:
         """The first robot on the other side of a singular configuration than at the instant before."""
@@ -101,36 +98,28 @@ def stopped(loop: ClosedLoop, t: float, y: np.ndarray, v: np.ndarray, found: Fin
         v: joint velocities at the instant before, (n, nv), rad/s.
         found: what stopped it.
     """
-    i, value = found.robot, found.value
-    if found.check == "state":
+    check, robot, value = found
+    name = loop.cell.names[robot]
+    about: dict[str, Any] = {"time": t, "robot": robot}
+    if check == "state":
         return _run_away(loop, t, y, v)
-    if found.check == "torque":
-        return _not_finite(loop.cell, t, i, "torque")
-    if found.check not in ("orientation", "condition", "side"):
-        return _invalid(loop.cell, t, found)
-    if found.check == "orientation":
+    if check == "torque":
+        return _not_finite(loop.cell, t, robot, check)
+    if check == "orientation":
         return OrientationError(
-            f"the orientation error of {loop.cell.names[i]} is {value:.3g} rad at t = {t:g} s; expected at "
-            f"most {MAX_ANGLE:g} rad, because at pi its direction is not defined",
-            time=t,
-            robot=i,
+            f"the orientation error of {name} is {value:.3g} rad at t = {t:g} s; expected at most "
+            f"{MAX_ANGLE:g} rad, because at pi its direction is not defined",
+            **about,
         )
-    seen = "its determinant changed sign since the instant before"
-    return SingularJacobianError(
-        f"the Jacobian of {loop.cell.names[i]} is singular at t = {t:g} s: "
-        + (seen if found.check == "side" else f"its condition number is {_large(value)}"),
-        time=t,
-        robot=i,
-    )
-
-
-def _invalid(cell: Cell, t: float, found: Finding) -> SimulationError:
-    """The error of task coordinates that a space of another kind calls invalid."""
+    if check in ("condition", "side"):
+        large = f"{value:.3g}" if value < 1e12 else "infinite"  # above it is made of rounding errors
+        side = "its determinant changed sign since the instant before"
+        seen = side if check == "side" else f"its condition number is {large}"
+        return SingularJacobianError(f"the Jacobian of {name} is singular at t = {t:g} s: {seen}", **about)
     return SimulationError(
-        f"the {found.check} of {cell.names[found.robot]} is {found.value:.3g} at t = {t:g} s; "
-        f"{cell.space!r} says that its coordinates mean nothing there",
-        time=t,
-        robot=found.robot,
+        f"the {check} of {name} is {value:.3g} at t = {t:g} s; {loop.cell.space!r} says that its coordinates "
+        "mean nothing there",
+        **about,
     )
 
 
@@ -155,11 +144,6 @@ def _not_finite(cell: Cell, t: float, robot: int, what: str) -> NonFiniteError:
     return NonFiniteError(
         f"the {what} of {cell.names[robot]} is no longer finite at t = {t:g} s", time=t, robot=robot
     )
-
-
-def _large(condition: float) -> str:
-    """A condition number in words; above 1e12 it is made of rounding errors."""
-    return f"{condition:.3g}" if condition < 1e12 else "infinite"
 
 
 def _non_finite_rows(part: np.ndarray) -> np.ndarray:
