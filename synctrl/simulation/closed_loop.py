@@ -195,8 +195,8 @@ class ClosedLoop:
         """Name parts that users wrote when a finite state becomes numbers that mean nothing.
 
         Raises:
-            NonFiniteError: a torque, a rate of an estimate or an acceleration that is not finite; without
-                the time, which is not known here.
+            NonFiniteError: a torque, a rate of estimates or of the network's memory, or an acceleration that
+                is not finite; without the time, which is not known here.
         """
         if not self._foreign or not np.isfinite(state.flat).all():
             return
@@ -208,13 +208,14 @@ class ClosedLoop:
         for what, rows in found.items():
             if not np.isfinite(rows).all():
                 i = int(np.argmin(np.isfinite(rows).all(axis=1)))
-                names = " or ".join(dict.fromkeys(kind.__qualname__ for kind in self._foreign))
-                raise NonFiniteError(
-                    f"{names} gives {self.cell.names[i]} {rows[i].tolist()} as its {what}, from a state that "
-                    "is finite; expected finite numbers",
-                    robot=i,
-                    cause="part",
-                )
+                raise self._lost(f"{self.cell.names[i]} {rows[i].tolist()} as its {what}", i)
+        if not np.isfinite(signals.memory_dot).all():
+            raise self._lost(f"{signals.memory_dot.tolist()!s:.200} as the rate of its memory", None)
+
+    def _lost(self, what: str, robot: int | None) -> NonFiniteError:
+        names = " or ".join(dict.fromkeys(kind.__qualname__ for kind in self._foreign))
+        text = f"{names} gives {what}, from a state that is finite; expected finite numbers"
+        return NonFiniteError(text, robot=robot, cause="part")
 
 
 def _memory_of(network: BoundNetwork) -> np.ndarray:

@@ -125,11 +125,13 @@ def stopped(loop: ClosedLoop, t: float, y: np.ndarray, v: np.ndarray, found: Fin
 
 def _run_away(loop: ClosedLoop, t: float, y: np.ndarray, v: np.ndarray) -> NonFiniteError:
     """The error of a state with infinite or undefined numbers."""
-    parts = zip(PARTS, loop.split(y), strict=True)
-    broken = [(name, bad) for name, part in parts if (bad := _non_finite_rows(part)).size]
-    if not broken:
-        return NonFiniteError(f"the plant's own state is no longer finite at t = {t:g} s", time=t)
-    name, rows = broken[0]
+    state = loop.state(y)
+    parts = state.q, state.v, state.z, loop.controller.network.integral(state.memory)
+    named = zip(PARTS, map(_non_finite_rows, parts), strict=True)
+    name, rows = next(((name, rows) for name, rows in named if rows.size), (None, np.zeros(0)))
+    if name is None:
+        what = "network's memory" if not np.isfinite(state.memory).all() else "plant's own state"
+        return NonFiniteError(f"the {what} is no longer finite at t = {t:g} s", time=t)
     robots = rows if name != PARTS[3] else np.unique(loop.cell.coupling.edges[rows])
     return _not_finite(loop.cell, t, _fastest(robots, v), name)
 
