@@ -39,6 +39,7 @@ _PARTS = {
     "simulation.damping": "simulation.limits",
     "simulation.mujoco_plant": "simulation.mujoco",
     "simulation.sampled": "simulation.controls",
+    "simulation.state": "simulation.closed_loop",
 }
 
 

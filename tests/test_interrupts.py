@@ -30,7 +30,7 @@ from synctrl import (
 from synctrl.compiled import engine as compiled
 from synctrl.errors import CouplingError, NonFiniteError, RunInterrupted, SimulationError, TrajectoryError
 from synctrl.simulation import advance
-from synctrl.simulation import run as runs
+from synctrl.simulation import engines as runs
 from synctrl.simulation.closed_loop import ClosedLoop
 from synctrl.simulation.handover import up_to_a_failure
 from synctrl.simulation.plant import Plant
@@ -358,7 +358,7 @@ def test_an_interrupt_before_the_start_hands_over_nothing_but_an_empty_result(mo
     def interrupt(*arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("synctrl.simulation.run.check_reachable", interrupt)
+    monkeypatch.setattr("synctrl.simulation.engines.check_reachable", interrupt)
     with pytest.raises(RunInterrupted) as stop:
         experiment().simulate()
     assert len(stop.value.result.t) == 0

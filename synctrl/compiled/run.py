@@ -5,10 +5,10 @@ from __future__ import annotations
 from ctypes import CDLL
 
 from ..errors import InputError
+from ..simulation.engines import Run, before_the_start, finish
 from ..simulation.handover import Progress
 from ..simulation.recorder import Recorder
 from ..simulation.result import Result
-from ..simulation.run import Run, before_the_start, finish
 from .engine import Tables, advance
 from .known import check_known
 from .program import Program

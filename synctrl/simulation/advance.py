@@ -30,10 +30,9 @@ import numpy as np
 from ..control.controller import Signals
 from ..coupling.cell import Reference
 from .clock import Clock, Stretch
-from .closed_loop import ClosedLoop
+from .closed_loop import ClosedLoop, State
 from .disturbances import DisturbanceSchedule
 from .handover import up_to_a_failure
-from .state import State
 
 #: steps whose references are evaluated together
 BLOCK = 256

@@ -19,8 +19,7 @@ from ..control.discrete import DiscreteController
 from ..coupling.cell import Reference
 from .advance import Agenda, Step
 from .clock import Clock
-from .closed_loop import ClosedLoop
-from .state import State
+from .closed_loop import ClosedLoop, State
 from .step_error import StepError
 
 

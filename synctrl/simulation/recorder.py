@@ -15,17 +15,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..checks import printable
-from ..control.controller import Signals
 from ..errors import InputError
 from ..robots.limits import joint_limits
 from .advance import Sample
 from .clock import Clock
-from .closed_loop import ClosedLoop
+from .closed_loop import ClosedLoop, State
 from .limits import APPLIED, DampingLog, applied_output, limit_report, saturation_report
 from .memory import check_fits
 from .plant import Output, Plant
 from .result import LAYOUT, Result, unit_of
-from .state import State
 
 
 class Account(NamedTuple):
@@ -69,9 +67,9 @@ class Recorder:
     def add(self, sample: Sample) -> None:
         """Log one instant."""
         state = self._loop.state(sample.y)
-        at = Instant(sample, sample.signals, state, self._loop.controller.network.integral(state.memory))
+        integral = self._loop.controller.network.integral(state.memory)
         for name, array in self._arrays.items():
-            array[self.count] = ROW[name](at)
+            array[self.count] = ROW[name](sample, state, integral)
         self._damping.add(self.count, sample.signals)
         self.count += 1
 
@@ -126,37 +124,28 @@ class Recorder:
         return Result(**arrays, info=described, outputs=outputs, experiment=experiment)
 
 
-class Instant(NamedTuple):
-    """What a row of the log is read from: a sample, its signals, the parts of its state, and int epsilon."""
-
-    sample: Sample
-    signals: Signals
-    state: State
-    integral: np.ndarray
-
-
 #: outputs that have what an adaptation, a network and a plant have of their own in the state of the loop
 ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE = "adaptation_state", "network_state", "plant_state"
 #: further names of entries and outputs that a result gets from elsewhere
 OF_EVERY_RUN = "status", "outputs", "damping", "limits", "saturation", "step_error", "run", "format", APPLIED
-#: how every array is read from an instant
-ROW: dict[str, Callable[[Instant], Any]] = {
-    "t": lambda at: at.sample.t,
-    "x": lambda at: at.signals.task.motion[0],
-    "x_desired": lambda at: at.signals.reference.desired[0],
-    "tracking_error": lambda at: at.signals.e,
-    "sync_error": lambda at: at.signals.epsilon,
-    "sync_integral": lambda at: at.integral,
-    "coupled_error": lambda at: at.signals.e_star,
-    "q": lambda at: at.state.q,
-    "v": lambda at: at.state.v,
-    "v_error": lambda at: at.signals.s_q,
-    "tau": lambda at: at.signals.tau,
-    "disturbance": lambda at: at.sample.disturbance,
-    "theta_hat": lambda at: at.signals.theta_hat,
-    ADAPTATION_STATE: lambda at: at.state.z,
-    NETWORK_STATE: lambda at: at.state.memory.ravel(),
-    PLANT_STATE: lambda at: at.state.hidden,
+#: how every array is read from a sample and the parts of its state; the last one from int epsilon
+ROW: dict[str, Callable[[Sample, State, np.ndarray], Any]] = {
+    "t": lambda at, y, _: at.t,
+    "x": lambda at, y, _: at.signals.task.motion[0],
+    "x_desired": lambda at, y, _: at.signals.reference.desired[0],
+    "tracking_error": lambda at, y, _: at.signals.e,
+    "sync_error": lambda at, y, _: at.signals.epsilon,
+    "sync_integral": lambda at, y, integral: integral,
+    "coupled_error": lambda at, y, _: at.signals.e_star,
+    "q": lambda at, y, _: y.q,
+    "v": lambda at, y, _: y.v,
+    "v_error": lambda at, y, _: at.signals.s_q,
+    "tau": lambda at, y, _: at.signals.tau,
+    "disturbance": lambda at, y, _: at.disturbance,
+    "theta_hat": lambda at, y, _: at.signals.theta_hat,
+    ADAPTATION_STATE: lambda at, y, _: y.z,
+    NETWORK_STATE: lambda at, y, _: y.memory.ravel(),
+    PLANT_STATE: lambda at, y, _: y.hidden,
 }
 _STATE_AXES = {
     ADAPTATION_STATE: ("time", "robot", "state"),

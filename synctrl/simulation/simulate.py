@@ -20,6 +20,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
+import numpy as np
+
 from ..checks import boolean, choice, instance, label, positive_number
 from ..control.adaptation import Adaptation
 from ..control.controller import Controller
@@ -33,14 +35,13 @@ from ..renamed import names_elsewhere
 from .clock import TIE, make_clock, multiple
 from .closed_loop import ClosedLoop
 from .disturbances import Disturbance, DisturbanceSchedule
-from .engines import Engine, find_engine
+from .engines import Engine, Run, find_engine, run_adaptive
 from .handover import Progress
 from .integrators import ADAPTIVE
 from .limits import warn_of_saturation
 from .payloads import Payload
 from .plant import PHYSICS, Plant
 from .result import Result
-from .run import Run, run_adaptive
 from .step_error import StepError, warn_of_step
 
 
@@ -192,7 +193,8 @@ class Experiment:
         info["control_period"] = control_period
         info["disturbances"] = [_describe(d) for d in self.disturbances]
         info["payloads"] = [payload.as_dict() for payload in self.payloads]
-        info["events"] = loop.events_within(clock.end - TIE * dt)
+        events = [float(t) for t in np.sort(loop.events) if 0 <= t < clock.end - TIE * dt]
+        info["events"] = [{"t": t, "part": type(loop.plant).__qualname__} for t in events]
         return Run(self, loop, clock, schedule, every, info, StepError(self.cell.n, self.cell.nv))
 
 
@@ -273,4 +275,4 @@ def _describe(disturbance: Disturbance) -> dict[str, Any]:
     }
 
 
-__getattr__ = names_elsewhere(__name__, ".run", "run_reference")
+__getattr__ = names_elsewhere(__name__, ".engines", "run_reference")

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..checks import choice
-from ..simulation.engines import Engine, find_engine
+from ..simulation.engines import Engine, Run, find_engine
 from ..simulation.result import Result
-from ..simulation.run import Run
 from ..simulation.simulate import Experiment
 
 
