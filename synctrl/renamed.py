@@ -34,9 +34,12 @@ _MOVES = (
 _URDF = "checks", "document", "meshes", "reader", "writer", "xml"
 #: modules that are a part of another one now
 _PARTS = {
+    "analysis.identification": "analysis.convergence",
     "experiments.judged": "paper.judge",
     "show.judge_plots": "paper.judge_section",
     "simulation.damping": "simulation.limits",
+    "simulation.disturbances": "simulation.schedules",
+    "simulation.payloads": "simulation.schedules",
     "simulation.mujoco_plant": "simulation.mujoco",
     "simulation.sampled": "simulation.controls",
     "simulation.state": "simulation.closed_loop",

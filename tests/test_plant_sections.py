@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from synctrl.analysis.identification import identify
+from synctrl.analysis.convergence import identify
 from synctrl.errors import InputError
 from synctrl.experiments import a460_full_pair, a460_pair
 from synctrl.paper.judge import AGREEMENT, compare_runs, joint_pair
