@@ -31,8 +31,8 @@ from synctrl.compiled import engine as compiled
 from synctrl.errors import CouplingError, NonFiniteError, RunInterrupted, SimulationError, TrajectoryError
 from synctrl.simulation import advance
 from synctrl.simulation import engines as runs
+from synctrl.simulation.advance import up_to_a_failure
 from synctrl.simulation.closed_loop import ClosedLoop
-from synctrl.simulation.handover import up_to_a_failure
 from synctrl.simulation.plant import Plant
 from synctrl.simulation.result import LAYOUT
 

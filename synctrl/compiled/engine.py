@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..coupling.cell import Cell
+from ..simulation.advance import up_to_a_failure
 from ..simulation.clock import Clock, Stretch
-from ..simulation.disturbances import DisturbanceSchedule
-from ..simulation.guard import Finding, checks, limits_of, stopped
-from ..simulation.handover import tell, up_to_a_failure
+from ..simulation.guard import Finding, checks, limits_of, stopped, tell
 from ..simulation.recorder import Recorder
+from ..simulation.schedules import DisturbanceSchedule
 from ..simulation.step_error import StepError
 from . import structs
 from .program import Program, one_after_another

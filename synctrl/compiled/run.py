@@ -6,7 +6,7 @@ from ctypes import CDLL
 
 from ..errors import InputError
 from ..simulation.engines import Run, before_the_start, finish
-from ..simulation.handover import Progress
+from ..simulation.guard import Progress
 from ..simulation.recorder import Recorder
 from ..simulation.result import Result
 from .engine import Tables, advance

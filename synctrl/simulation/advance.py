@@ -22,8 +22,8 @@ on the right side of every jump; what is desired at its end is taken from just b
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -31,9 +31,9 @@ from ..control.controller import Signals
 from ..coupling.cell import Reference
 from .clock import Clock, Stretch
 from .closed_loop import ClosedLoop, State
-from .disturbances import DisturbanceSchedule
-from .handover import up_to_a_failure
+from .schedules import DisturbanceSchedule
 
+Made = TypeVar("Made")
 #: steps whose references are evaluated together
 BLOCK = 256
 
@@ -209,3 +209,38 @@ def _tabulated(
         map(schedule.torques.__getitem__, schedule.windows(middles).tolist()),
         *(column.tolist() for column in columns),
     )
+
+
+def up_to_a_failure(make: Callable[[int, int], Made], first: int, last: int) -> Iterator[Made]:
+    """What is made for the steps [first, last) in one go, or, if that fails, for those before the failure.
+
+    Args:
+        make: first, last -> what is made.
+        first, last: the steps.
+
+    Raises:
+        Exception, KeyboardInterrupt: what `make` raised for the first step for which it fails. An interrupt
+            that does not come again was not of its doing, and is raised at once.
+    """
+    made, failure = _attempt(make, first, last)
+    if failure is None:
+        yield made  # type: ignore[misc]
+        return
+    good, bad = first, last
+    while bad - good > 1:
+        middle = (good + bad) // 2
+        found = _attempt(make, good, middle)[1]
+        good, bad, failure = (middle, bad, failure) if found is None else (good, middle, found)
+    again = _attempt(make, good, bad)[1]
+    if again is not None and good > first:
+        yield make(first, good)
+    raise failure if again is None else again
+
+
+def _attempt(
+    make: Callable[[int, int], Made], first: int, last: int
+) -> tuple[Made | None, BaseException | None]:
+    try:
+        return make(first, last), None
+    except (Exception, KeyboardInterrupt) as error:
+        return None, error

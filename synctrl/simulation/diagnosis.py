@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import NonFiniteError, OrientationError, SimulationError, SingularJacobianError
 from .closed_loop import ClosedLoop
-from .disturbances import DisturbanceSchedule
+from .schedules import DisturbanceSchedule
 from .stop import Excess, Push, Stop
 
 #: an acceleration from outside that no step follows: 0.2 rad in a millisecond, rad/s^2

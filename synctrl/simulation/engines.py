@@ -24,12 +24,11 @@ from .clock import Clock
 from .closed_loop import ClosedLoop
 from .controls import Continuous, Sampled
 from .diagnosis import diagnosed
-from .disturbances import DisturbanceSchedule
-from .guard import Guard
-from .handover import Progress, date, tell, user_failure
+from .guard import Guard, Progress, date, tell, user_failure
 from .integrators import RungeKutta, Scipy
 from .recorder import NOTHING, Recorder
 from .result import Result
+from .schedules import DisturbanceSchedule
 from .step_error import StepError, step_report
 
 #: instants at which weights are looked at before a run, at most

@@ -1,15 +1,23 @@
-"""Watches a run and stops it when its numbers no longer mean anything."""
+"""Watches a run, stops it when its numbers no longer mean anything, and says what else has ended it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from math import isfinite
+from traceback import walk_tb
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from ..coupling.cell import Cell
-from ..errors import NonFiniteError, OrientationError, SimulationError, SingularJacobianError
+from ..errors import (
+    NonFiniteError,
+    OrientationError,
+    SimulationError,
+    SingularJacobianError,
+    SynctrlError,
+    failed,
+)
 from ..tasks.measurement import first_beyond
 from ..tasks.measurement import limits_of as limits_of
 from ..tasks.pose import MAX_ANGLE
@@ -17,6 +25,10 @@ from ..tasks.spaces import Measurement
 from .advance import Sample
 from .closed_loop import ClosedLoop
 
+Progress = Callable[[float], Any]
+
+#: packages in which no function of the user's stands
+LIBRARIES = frozenset({"synctrl", "numpy", "scipy", "pinocchio", "mujoco", "casadi"})
 #: parts of the state, in order
 PARTS = ("position", "velocity", "parameter estimate", "integral of the synchronization error")
 
@@ -133,12 +145,8 @@ def _run_away(loop: ClosedLoop, t: float, y: np.ndarray, v: np.ndarray) -> NonFi
         what = "network's memory" if not np.isfinite(state.memory).all() else "plant's own state"
         return NonFiniteError(f"the {what} is no longer finite at t = {t:g} s", time=t)
     robots = rows if name != PARTS[3] else np.unique(loop.cell.coupling.edges[rows])
-    return _not_finite(loop.cell, t, _fastest(robots, v), name)
-
-
-def _fastest(robots: np.ndarray, v: np.ndarray) -> int:
-    """Of robots that broke down in one step, as coupled ones do, the one that moved fastest before."""
-    return int(robots[np.abs(v[robots]).max(axis=1).argmax()])
+    fastest = np.abs(v[robots]).max(axis=1).argmax()  # of robots that broke down together, as coupled ones do
+    return _not_finite(loop.cell, t, int(robots[fastest]), name)
 
 
 def _not_finite(cell: Cell, t: float, robot: int, what: str) -> NonFiniteError:
@@ -150,3 +158,45 @@ def _not_finite(cell: Cell, t: float, robot: int, what: str) -> NonFiniteError:
 
 def _non_finite_rows(part: np.ndarray) -> np.ndarray:
     return np.flatnonzero(~np.isfinite(part).all(axis=1))
+
+
+def user_failure(error: Exception, t: float) -> SimulationError:
+    """The error of a run that an exception ended which nobody foresaw, with the function that it came from.
+
+    Args:
+        error: the exception, with its traceback.
+        t: simulated time of the last instant reached, s.
+    """
+    frames = [*walk_tb(error.__traceback__)]
+    names = [str(frame.f_globals.get("__name__", "")) for frame, _ in frames]
+    own = [f for f, name in zip(frames, names, strict=True) if name.partition(".")[0] not in LIBRARIES]
+    frame, line = (own or frames)[-1]
+    code = frame.f_code
+    return failed(f"'{code.co_qualname}' ({code.co_filename}, line {line})", t, error)
+
+
+def date(error: SynctrlError, t: float) -> None:
+    """Say when a failure happened that was raised where the time was not known.
+
+    Args:
+        error: the failure.
+        t: simulated time of the last instant reached, s.
+    """
+    if isinstance(error, SimulationError) and error.time is None:
+        error.time, error.args = t, (f"{error}, in the step from t = {t:g} s",)
+
+
+def tell(progress: Progress | None, t: float) -> None:
+    """Report the time reached to whoever wants to know.
+
+    Raises:
+        SimulationError: the function of the user's failed.
+    """
+    if progress is None:
+        return
+    try:
+        progress(t)
+    except SynctrlError:
+        raise
+    except Exception as error:
+        raise failed("the function given as progress", t, error) from error

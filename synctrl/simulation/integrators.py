@@ -16,7 +16,7 @@ from ..errors import InputError, NonFiniteError, SynctrlError
 from .advance import Control, Step
 from .clock import Clock, before
 from .closed_loop import ClosedLoop, State
-from .handover import user_failure
+from .guard import user_failure
 
 ADAPTIVE = ("RK45", "RK23", "DOP853", "Radau", "BDF", "LSODA")
 #: weights of the four stages, times 6

@@ -15,7 +15,7 @@ from ..robots.forest import forests
 from ..robots.limits import joint_limits
 from ..robots.robot import Robot
 from ..tasks.padding import padded
-from .payloads import Payload, PayloadSchedule
+from .schedules import Payload, PayloadSchedule
 
 Output = tuple[np.ndarray, str, tuple[str, ...]]
 """An array over time, its unit, and the names of its axes, the first of which is "time"."""

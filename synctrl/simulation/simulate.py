@@ -34,14 +34,13 @@ from ..errors import InputError
 from ..renamed import names_elsewhere
 from .clock import TIE, make_clock, multiple
 from .closed_loop import ClosedLoop
-from .disturbances import Disturbance, DisturbanceSchedule
 from .engines import Engine, Run, find_engine, run_adaptive
-from .handover import Progress
+from .guard import Progress
 from .integrators import ADAPTIVE
 from .limits import warn_of_saturation
-from .payloads import Payload
 from .plant import PHYSICS, Plant
 from .result import Result
+from .schedules import Disturbance, DisturbanceSchedule, Payload
 from .step_error import StepError, warn_of_step
 
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from ..errors import SimulationError
 from .closed_loop import ClosedLoop
-from .disturbances import DisturbanceSchedule
 from .rates import HELD, HELD_SPRING, RUNGE_KUTTA, SWING, Rate, loop_rates
+from .schedules import DisturbanceSchedule
 
 #: a joint that moves farther than this in one step is not followed any more, rad
 FAR = 0.2

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..simulation.disturbances import DisturbanceSchedule
 from ..simulation.recorder import describe
+from ..simulation.schedules import DisturbanceSchedule
 from .factors import Setup
 
 #: instants at which desired motion and closed loop are looked at
