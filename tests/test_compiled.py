@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from synctrl import CartesianSpace, Cell, Circle, Coupling, Disturbance, Gains, Member, load_robot
 from synctrl.compiled import build, engine
@@ -145,7 +146,7 @@ def test_a_run_that_breaks_down_ends_alike(gains):
 
 
 def test_what_the_compiled_engine_does_not_do_is_said():
-    with pytest.raises(InputError, match="'rk4' only"):
+    with refused(InputError, "integrator"):
         planar_four().simulate(integrator="DOP853", engine="compiled")
     with pytest.raises(InputError, match="expected one of 'pinocchio', 'compiled'"):
         planar_four().simulate(engine="fortran")

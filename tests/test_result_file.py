@@ -411,7 +411,7 @@ def test_what_is_no_result_is_an_error_of_the_toolkit(experiment, name, thing):
 def test_figures_and_scenes_refuse_an_experiment_of_another_cell(result):
     other = Experiment(small_cell(3), SMALL_GAINS, 1.0)
     for name in ("planar_scene", "cell_layout", "certify"):
-        with pytest.raises(InputError, match="experiment"):
+        with refused(InputError, "experiment"):
             CONSUMERS[name](replace(result, experiment=None), other)
 
 

@@ -260,7 +260,7 @@ def _check_sizes(result: Result, loop: ClosedLoop) -> None:
         array = result.outputs.get(name) if name in own else getattr(result, name)
         found = None if array is None else array.shape[1:]
         if found != shape:
-            raise _another(f"its {name} has the shape {shape} at an instant, but the result's has {found}")
+            raise _another(f"its {name} has the shape {shape} at an instant, the result's {found}", name)
     if not len(result.t):
         raise InputError("expected at least one logged instant, found none", subject="result")
 
@@ -287,10 +287,11 @@ def _check_same(result: Result, rows: Moment) -> None:
         k = int(np.argmax(wrong))
         raise _another(
             f"at t = {result.t[k]:g} s it gives a velocity error of {rows.s_q[k].tolist()}, but the result "
-            f"has {result.v_error[k].tolist()}"
+            f"has {result.v_error[k].tolist()}",
+            "v_error",
         )
 
 
-def _another(reason: str) -> InputError:
-    """The error about an experiment that is another one than that of the result."""
-    return InputError(f"expected the one that made the result; {reason}", subject="experiment")
+def _another(reason: str, part: str) -> InputError:
+    """The error about an experiment that is another one than that of the result, with what differs."""
+    return InputError(f"expected the one that made the result; {reason}", subject="experiment", found=part)

@@ -125,15 +125,15 @@ class ClosedLoop:
 
     def _check_given(self, shapes: Mapping[str, tuple[int, ...]], found: Any, when: str = "") -> None:
         """Refuse what the plant gives unless it is a tuple of arrays of these shapes."""
-        where = f"plant, {type(self.plant).__qualname__}"
+        subject = f"plant {type(self.plant).__qualname__}"
         if not isinstance(found, (tuple, list)) or len(found) != len(shapes):
-            seen = f"{len(found)}" if isinstance(found, (tuple, list)) else type(found).__qualname__
-            raise InputError(f"{where}: expected {len(shapes)}, ({', '.join(shapes)}){when}, found {seen}")
-        for (what, expected), part in zip(shapes.items(), found, strict=True):
-            if np.shape(part) != expected:
-                raise InputError(
-                    f"{where}: expected {expected} numbers as its {what}{when}, found {np.shape(part)}"
-                )
+            seen = len(found) if isinstance(found, (tuple, list)) else type(found).__qualname__
+            expected = f"expected {len(shapes)}, ({', '.join(shapes)}){when}"
+            raise InputError(f"{expected}, found {seen}", subject=subject, found=seen)
+        for (what, shape), part in zip(shapes.items(), map(np.shape, found), strict=True):
+            if part != shape:
+                text = f"expected {shape} numbers as its {what}{when}, found {part}"
+                raise InputError(text, subject=subject, found=part)
 
     def state(self, y: np.ndarray | None = None) -> State:
         """The parts of y, or of a new y that holds nothing yet."""

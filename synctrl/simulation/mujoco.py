@@ -107,12 +107,13 @@ def require_mujoco() -> Any:
         import mujoco
     except ImportError as error:
         raise MissingDependencyError(
-            "plant='mujoco' needs MuJoCo; install it with: pip install 'synctrl[mujoco]'"
+            "plant='mujoco' needs it: pip install 'synctrl[mujoco]'", subject="MuJoCo"
         ) from error
     if int(mujoco.__version__.partition(".")[0]) < OLDEST:
         raise MissingDependencyError(
-            f"plant='mujoco' needs MuJoCo {OLDEST}.0 or newer, found {mujoco.__version__}, which reads "
-            "inertias in turned axes wrongly; install one with: pip install --upgrade 'synctrl[mujoco]'",
+            f"plant='mujoco' needs {OLDEST}.0 or newer, found {mujoco.__version__}, which reads inertias in "
+            "turned axes wrongly; install one with: pip install --upgrade 'synctrl[mujoco]'",
+            subject="MuJoCo",
             found=mujoco.__version__,
         )
     return mujoco
@@ -140,7 +141,8 @@ def _model(mujoco: Any, robot: Robot) -> Any:
     try:
         return mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
-        raise InputError(f"MuJoCo refuses the URDF of robot '{robot.name}': {error}") from error
+        subject = f"plant='mujoco', robot '{robot.name}'"
+        raise InputError(f"MuJoCo refuses its URDF: {error}", subject=subject) from error
 
 
 def _for_mujoco(document: Document) -> Document:

@@ -251,10 +251,11 @@ def account_of(
     for what, entries in found._asdict().items():
         where = f"plant {type(plant).__qualname__}, {what}"
         if not isinstance(entries, Mapping):
-            raise InputError(f"{where}: expected entries by name, found {entries!r:.80}")
+            raise InputError(f"expected entries by name, found {entries!r:.80}", subject=where)
         for name in entries:
             if not isinstance(name, str) or not name.isidentifier() or name in taken:
-                raise InputError(f"{where}: expected names that are not taken, found {name!r:.80}")
+                text = f"expected names that are not taken, found {name!r:.80}"
+                raise InputError(text, subject=where, found=name)
     for name, output in found.outputs.items():
         _check_output(f"plant {type(plant).__qualname__}, outputs, {name}", output, lengths)
     return found
@@ -270,6 +271,7 @@ def _check_output(where: str, output: Any, lengths: Mapping[str, int]) -> None:
         sound = False
     if not sound:
         raise InputError(
-            f"{where}: expected an array of floats over {lengths['time']} instants, its unit, and the names "
-            f"of its axes, of which the first is 'time', found {output!r:.80}"
+            f"expected an array of floats over {lengths['time']} instants, its unit, and the names of its "
+            f"axes, of which the first is 'time', found {output!r:.80}",
+            subject=where,
         )

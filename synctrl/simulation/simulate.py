@@ -249,7 +249,7 @@ def _carry_out(
     if adaptive:
         _needs_rk4(integrator, engine, run.info["control_period"])
     elif (reason := by.refuses(run)) is not None:
-        raise InputError(reason)
+        raise InputError(reason, subject="engine")
     run.check()
     result = run_adaptive(run, integrator, rtol, atol, progress) if adaptive else by.run(run, progress)
     warn_of_step(result.info["step_error"], result.names, run.info["dt"])
@@ -259,7 +259,8 @@ def _carry_out(
 
 def _needs_rk4(integrator: str, engine: str | Engine, control_period: float | None) -> None:
     if engine != "pinocchio":
-        raise InputError(f"engine={engine!r} has the integrator 'rk4' only, found {integrator!r}")
+        expected = f"engine={engine!r} has 'rk4' only"
+        raise InputError(f"{expected}, found {integrator!r}", subject="integrator", found=integrator)
     if control_period is not None:
         expected = "sampled control needs the integrator 'rk4'"
         raise InputError(f"{expected}, found {integrator!r}", subject="control_period")

@@ -116,8 +116,8 @@ class StepError:
     def _errors(self, v: np.ndarray, a: np.ndarray, gaps: np.ndarray, h: np.ndarray) -> np.ndarray:
         """Errors of every instant; what is not finite does not count.
 
-        The larger one of (h/6) |k_4 - k_1|, and of what two steps that are equal and smooth have gained against
-        Simpson's rule.
+        The larger one of (h/6) |k_4 - k_1|, and of what two steps that are equal and smooth have gained
+        against Simpson's rule.
         """
         step = h[2:, None]
         equal = (h[2:] > 0) & (np.abs(h[2:] - h[1:-1]) <= EQUAL * h[2:])
