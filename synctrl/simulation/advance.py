@@ -22,7 +22,8 @@ on the right side of every jump; what is desired at its end is taken from just b
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -130,22 +131,12 @@ class Solver(Protocol):
         """
 
 
-class Agenda:
-    """Instants, each of which comes up once.
-
-    Args:
-        instants: in any order, s; those before the run are left out.
-    """
-
-    def __init__(self, instants: Iterable[float]):
-        self._left = sorted((t for t in instants if t >= 0), reverse=True)
-
-    def until(self, t: float) -> list[float]:
-        """What comes up until time t, in order."""
-        due = []
-        while self._left and self._left[-1] <= t:
-            due.append(self._left.pop())
-        return due
+def due(agenda: deque[float], t: float) -> list[float]:
+    """Take from instants in order those that come up until time t, s."""
+    found = []
+    while agenda and agenda[0] <= t:
+        found.append(agenda.popleft())
+    return found
 
 
 def advance(
@@ -166,9 +157,10 @@ def advance(
     Raises:
         SynctrlError: the run cannot go on.
     """
-    y, rate, events = loop.state(loop.initial_state()), loop.state(np.zeros(loop.size)), Agenda(loop.events)
+    y, rate = loop.state(loop.initial_state()), loop.state(np.zeros(loop.size))
+    events = deque(sorted(t for t in loop.events.tolist() if t >= 0))
     for step in steps(loop, clock, schedule):
-        for event in events.until(step.middle):
+        for event in due(events, step.middle):
             step.loop.meet(event, y)
         signals = control.begin(step, y, rate)
         if step.checked:

@@ -9,6 +9,7 @@ from one of its samples to the next.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +18,7 @@ import numpy as np
 from ..control.controller import Signals
 from ..control.discrete import DiscreteController
 from ..coupling.cell import Reference
-from .advance import Agenda, Step
+from .advance import Step, due
 from .clock import Clock
 from .closed_loop import ClosedLoop, State
 from .step_error import StepError
@@ -34,13 +35,13 @@ class Continuous:
 
     def __init__(self, loop: ClosedLoop, clock: Clock, step_error: StepError):
         self._loop, self._step_error = loop, step_error
-        self._messages = Agenda(loop.messages.between(0.0, clock.end))
+        self._messages = deque(loop.messages.between(0.0, clock.end))
         self._h, self._expected = 0.0, np.nan
 
     def begin(self, step: Step, y: State, rate: State) -> Signals:
-        reference, due = step.stages[0], self._messages.until(step.middle)
-        if due:
-            y.memory[...] = self._loop.messages.received(due, reference, y.motion, y.memory)
+        reference, messages = step.stages[0], due(self._messages, step.middle)
+        if messages:
+            y.memory[...] = self._loop.messages.received(messages, reference, y.motion, y.memory)
         signals = step.loop.derive(reference, y, step.push, rate)
         h = self._h if step.joined else 0.0
         self._step_error.add(step.t, y.v, h, self._expected - rate.v, rate.v)
@@ -77,8 +78,8 @@ class Sampled:
         step_error.add(0.0, loop.cell.v0)
 
     def begin(self, step: Step, y: State, rate: State) -> Signals:
-        due = step.checked and step.number % self._every == 0
-        signals = self._sample(step.t, y) if due else self._look(step.stages[0], y)
+        samples = step.checked and step.number % self._every == 0
+        signals = self._sample(step.t, y) if samples else self._look(step.stages[0], y)
         self.rate(step, step.stages[0], y, rate)
         step.loop.watch(y, signals, rate.v)
         return signals

@@ -22,7 +22,7 @@ from .clock import Clock
 from .closed_loop import ClosedLoop, State
 from .limits import APPLIED, DampingLog, applied_output, limit_report, saturation_report
 from .memory import check_fits
-from .plant import Output, Plant
+from .plant import Output
 from .result import LAYOUT, Result, unit_of
 
 
@@ -93,16 +93,22 @@ class Recorder:
         return {name: array[: self.count] for name, array in self._arrays.items()}
 
     def account(self, info: Mapping[str, Any]) -> Account:
-        """What the plant says of its own state until now, under names that `info` does not have.
+        """What the plant says of its own state until now, under names that neither `info` nor the run has.
 
         Raises:
-            InputError: nothing that a result can hold.
+            InputError: something else than entries by name, a name that is taken, or an output that is no
+                array with a unit and one axis per dimension, time first.
             Exception: what the plant raises.
         """
         loop, nothing = self._loop, np.zeros((self.count, 0))
-        taken = {*info, *describe(loop), *LAYOUT, *_STATE_AXES, *OF_EVERY_RUN}
         hidden, lengths = self.logged().get(PLANT_STATE, nothing), {"time": self.count, **sizes(loop)}
-        return account_of(loop.plant, hidden, taken, lengths)
+        taken = {*info, *describe(loop), *LAYOUT, *_STATE_AXES, *OF_EVERY_RUN}
+        found = Account(loop.plant.report(hidden), loop.plant.outputs(hidden))
+        for what, entries in found._asdict().items():
+            _check_names(f"plant {type(loop.plant).__qualname__}, {what}", entries, taken)
+        for name, output in found.outputs.items():
+            _check_output(f"plant {type(loop.plant).__qualname__}, outputs, {name}", output, lengths)
+        return found
 
     def result(
         self, status: str, info: Mapping[str, Any], experiment: Any, account: Account = NOTHING
@@ -231,34 +237,13 @@ def _version(package: str) -> str:
         return "not installed as a package"
 
 
-def account_of(
-    plant: Plant, hidden: np.ndarray, taken: Collection[str], lengths: Mapping[str, int]
-) -> Account:
-    """Ask a plant.
-
-    Args:
-        plant: the plant.
-        hidden: its own state at the logged instants, (T, size of the state).
-        taken: names of entries and outputs that are not the plant's to give.
-        lengths: of the axes that have one in this run, "time" among them.
-
-    Raises:
-        InputError: something else than entries by name, a name that is taken, or an output that is no array
-            with a unit and one axis per dimension, time first.
-        Exception: what the plant raises.
-    """
-    found = Account(plant.report(hidden), plant.outputs(hidden))
-    for what, entries in found._asdict().items():
-        where = f"plant {type(plant).__qualname__}, {what}"
-        if not isinstance(entries, Mapping):
-            raise InputError(f"expected entries by name, found {entries!r:.80}", subject=where)
-        for name in entries:
-            if not isinstance(name, str) or not name.isidentifier() or name in taken:
-                text = f"expected names that are not taken, found {name!r:.80}"
-                raise InputError(text, subject=where, found=name)
-    for name, output in found.outputs.items():
-        _check_output(f"plant {type(plant).__qualname__}, outputs, {name}", output, lengths)
-    return found
+def _check_names(where: str, entries: Any, taken: Collection[str]) -> None:
+    if not isinstance(entries, Mapping):
+        raise InputError(f"expected entries by name, found {entries!r:.80}", subject=where)
+    for name in entries:
+        if not isinstance(name, str) or not name.isidentifier() or name in taken:
+            text = f"expected names that are not taken, found {name!r:.80}"
+            raise InputError(text, subject=where, found=name)
 
 
 def _check_output(where: str, output: Any, lengths: Mapping[str, int]) -> None:

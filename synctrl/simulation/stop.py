@@ -124,11 +124,6 @@ class Stop:
         k, joint = np.unravel_index(np.argmax(speed >= 0.999 * speed.max()), speed.shape)
         return robots[int(k)], int(joint)
 
-    def place(self, robot: int | None, joint: int | None) -> str:
-        """A joint in words, or a robot."""
-        name = "the cell" if robot is None else self.loop.cell.names[robot]
-        return name if joint is None else f"joint {joint + 1} of {name}"
-
     # -- how fast it wants to move ------------------------------------------------------------------------
 
     def excesses(self, driven: bool) -> list[Excess]:
