@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import count, finite_array, instance, positive_number
 from ..control.controller import Controller
-from ..coupling.cell import Cell
+from ..control.gains import spread
 from ..errors import InputError
 from ..renamed import names_elsewhere
 from ..simulation.result import Result
@@ -137,7 +137,7 @@ def gain_condition_in_box(
 
     Args:
         experiment: the cell and its gains.
-        lower, upper: corners of the box, (nv,) for every robot or (n, nv), rad.
+        lower, upper: corners of the box, (nv,) for every robot or (n, nv), or a number, rad.
         duration: the weights are those of 0 <= t <= duration, s; by default the experiment's.
         samples: number of samples per robot.
 
@@ -147,7 +147,8 @@ def gain_condition_in_box(
     instance("experiment", experiment, Experiment, "an Experiment")
     count("samples", samples)
     cell = experiment.cell
-    low, high = (_corner(name, corner, cell) for name, corner in (("lower", lower), ("upper", upper)))
+    corners = {name: finite_array(name, corner) for name, corner in (("lower", lower), ("upper", upper))}
+    low, high = (spread(name, corner, (cell.n, cell.nv)) for name, corner in corners.items())
     if (low > high).any():
         raise InputError(
             f"expected lower <= upper, found {low.tolist()} and {high.tolist()}", subject="lower, upper"
@@ -224,14 +225,6 @@ def _condition(controller: Controller, i: int, t: float, q: np.ndarray, values: 
     K_r_min, needed = float(controller.K_r[i, :size].min()), controller.reference_acceleration == "paper"
     margin, corrected, printed = values
     return GainCondition(margin, corrected, printed, K_r_min, i, float(t), tuple(map(float, q)), needed)
-
-
-def _corner(name: str, corner: ArrayLike, cell: Cell) -> np.ndarray:
-    shape = cell.n, cell.nv
-    array = finite_array(name, corner)
-    if array.shape not in (shape, shape[1:]):
-        raise InputError(f"expected shape {shape[1:]} or {shape}, found {array.shape}", subject=name)
-    return np.broadcast_to(array, shape)
 
 
 __getattr__ = names_elsewhere(__name__, ".gain_condition", gain_condition_of="gain_condition")
