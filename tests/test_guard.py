@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 from cells import SMALL_GAINS, small_cell
+from refusals import refused
 from seams.lagging_network import Lagging
 
 from synctrl import (
@@ -229,17 +230,17 @@ def test_inverse_kinematics_finds_what_forward_kinematics_gives():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "says"),
+    ("arguments", "subject"),
     [
-        (("a460", [0.3, 0.3, 0.3], [0, 0]), "robot: expected a Robot"),
-        ((ARM, [0.3], [0, 0], CartesianSpace("xy")), r"target: expected shape \(2,\)"),
-        ((ARM, [0.3, np.nan], [0, 0], CartesianSpace("xy")), "target: expected finite"),
-        ((ARM, [0.3, 0.3], [0], CartesianSpace("xy")), r"q: expected shape \(2,\)"),
-        ((ARM, [0.3, 0.3], [0, 0], "xy"), "space: expected a CartesianSpace"),
+        (("a460", [0.3, 0.3, 0.3], [0, 0]), "robot"),
+        ((ARM, [0.3], [0, 0], CartesianSpace("xy")), "target"),
+        ((ARM, [0.3, np.nan], [0, 0], CartesianSpace("xy")), "target"),
+        ((ARM, [0.3, 0.3], [0], CartesianSpace("xy")), "q"),
+        ((ARM, [0.3, 0.3], [0, 0], "xy"), "space"),
     ],
 )
-def test_inverse_kinematics_refuses_what_it_cannot_solve(arguments, says):
-    with pytest.raises(InputError, match=says):
+def test_inverse_kinematics_refuses_what_it_cannot_solve(arguments, subject):
+    with refused(InputError, subject):
         inverse_kinematics(*arguments)
 
 
