@@ -49,8 +49,12 @@ class MujocoArm:
 
     def __init__(self, robot: Robot):
         self._mujoco = mujoco = require_mujoco()
-        self._robot = robot
-        self.model = model = _model(mujoco, robot)
+        self._robot, text = robot, describe_arm(robot)
+        try:
+            self.model = model = mujoco.MjModel.from_xml_string(text)
+        except ValueError as error:
+            subject = f"plant='mujoco', robot '{robot.name}'"
+            raise InputError(f"MuJoCo refuses its URDF: {error}", subject=subject) from error
         model.opt.gravity = robot.gravity_vector
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         names = [model.joint(k).name for k in range(model.njnt)]
@@ -134,15 +138,6 @@ def describe_arm(robot: Robot) -> str:
     text = dynamics_xml(_for_mujoco(robot.document))
     start = text.index(">", text.index("<robot")) + 1
     return text[:start] + COMPILER + text[start:]
-
-
-def _model(mujoco: Any, robot: Robot) -> Any:
-    text = describe_arm(robot)
-    try:
-        return mujoco.MjModel.from_xml_string(text)
-    except ValueError as error:
-        subject = f"plant='mujoco', robot '{robot.name}'"
-        raise InputError(f"MuJoCo refuses its URDF: {error}", subject=subject) from error
 
 
 def _for_mujoco(document: Document) -> Document:
@@ -243,15 +238,15 @@ def mujoco_model(cell: Cell, timestep: float = 1e-3) -> tuple[Any, JointMap]:
 
 
 def _common_gravity(cell: Cell) -> np.ndarray:
-    vectors = [robot.gravity_vector for robot in cell.robots]
-    for name, vector in zip(cell.names, vectors, strict=True):
-        if not np.array_equal(vector, vectors[0]):
+    expected = cell.robots[0].gravity_vector
+    for name, robot in zip(cell.names, cell.robots, strict=True):
+        if not np.array_equal(robot.gravity_vector, expected):
             raise InputError(
                 f"MuJoCo has one gravity for all robots, expected that of {cell.names[0]}, "
-                f"{vectors[0].tolist()} m/s^2, for {name} as well, found {vector.tolist()}",
+                f"{expected.tolist()} m/s^2, for {name} as well, found {robot.gravity_vector.tolist()}",
                 subject="cell",
             )
-    return vectors[0]
+    return expected
 
 
 def _arm(mujoco: Any, robot: Robot) -> Any:
@@ -280,8 +275,7 @@ def _draw(mujoco: Any, body: Any, end: np.ndarray) -> None:
 
 
 def _joint_map(cell: Cell, model: Any, joints: list[str]) -> JointMap:
-    count = np.array([robot.nv for robot in cell.robots])
-    mask = np.arange(cell.nv) < count[:, None]
+    mask = np.arange(cell.nv) < np.array([[robot.nv] for robot in cell.robots])
     qpos = np.array([model.joint(name).qposadr[0] for name in joints])
     dof = np.array([model.joint(name).dofadr[0] for name in joints])
     motor = np.array([model.actuator(name).id for name in joints])

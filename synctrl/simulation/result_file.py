@@ -15,6 +15,7 @@ import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import chain
+from math import prod
 from pathlib import Path
 from types import MappingProxyType
 from typing import IO, Any, NamedTuple
@@ -190,9 +191,7 @@ def _read_header(stream: IO[bytes], member: zipfile.ZipInfo) -> Header:
     shape = tuple(int(k) for k in lengths.replace(",", " ").split())
     if kind == "f" and width != "8":
         raise ResultError(f"expected float64, found float{8 * int(width)}", subject=f"{member.filename!a}")
-    size = int(width) * (4 if kind == "U" else 1)
-    for k in shape:
-        size *= k
+    size = int(width) * (4 if kind == "U" else 1) * prod(shape)
     if len(start) + length + size != member.file_size:
         raise ResultError(
             f"expected {size} bytes of an array of shape {shape}, found "
