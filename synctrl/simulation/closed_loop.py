@@ -88,11 +88,8 @@ class ClosedLoop:
         self.cell, self._law = controller.cell, controller.unchecked
         if not _is_ours(type(controller.adaptation)):
             check_adaptation(controller)
-        network = f"network {type(controller.network).__qualname__}, start"
-        self._z0, self._memory0 = (
-            controller.adaptation.start(),
-            finite_array(network, controller.network.start()),
-        )
+        self._z0, network = controller.adaptation.start(), controller.network
+        self._memory0 = finite_array(f"network {type(network).__qualname__}, start", network.start())
         where = f"plant {type(plant).__qualname__}, hidden0"
         instance(where, plant.hidden0, np.ndarray, "an array")
         finite_array(where, plant.hidden0, (None,))
