@@ -36,7 +36,7 @@ from synctrl.experiments import (
     a460_pair, mixed_four, mobile_robot, panda_four, planar_four, rigid_object, ur5_payload,
 )  # fmt: skip
 from synctrl.files import write_whole
-from synctrl.simulation.run import run_reference
+from synctrl.simulation.engines import run_reference
 
 DT = 1e-3
 MOST_STEPS = 10_000

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from synctrl.analysis.identification import Identification, identify
+from synctrl.analysis.convergence import Identification, identify
 from synctrl.analysis.metrics import as_data, metrics, settling_bands, write_metrics
 from synctrl.errors import SynctrlError
 from synctrl.paper.claims import Claim

@@ -15,10 +15,9 @@ from .robots.friction import Friction
 from .robots.friction_parameters import FrictionParameters
 from .robots.parameters import FullParameters, LinearParameters
 from .robots.robot import Robot, load_robot
-from .simulation.disturbances import Disturbance
-from .simulation.mujoco_model import mujoco_model
-from .simulation.payloads import Payload
+from .simulation.mujoco import mujoco_model
 from .simulation.result import Result
+from .simulation.schedules import Disturbance, Payload
 from .simulation.simulate import Experiment, simulate
 from .tasks.pose import PoseSpace
 from .tasks.poses import Attached, AxisRotation, FunctionOrientation, PoseTrajectory

@@ -25,6 +25,7 @@ _MOVES = {
 _URDF = "checks", "document", "meshes", "reader", "writer", "xml"
 #: modules of today, and those that are a part of them now
 _PARTS = {
+    "analysis.convergence": "analysis.identification",
     "tasks.measurement": "tasks.tips",
     "coupling.desired": "tasks.weight_checks",
     "coupling.member_checks": "tasks.member_parameters",
@@ -38,6 +39,11 @@ _PARTS = {
     "paper.reproduction": "experiments.batch",
     "paper.theory": "show.theory_sections",
     "paper.trials": "analysis.matching",
+    "simulation.closed_loop": "simulation.state",
+    "simulation.controls": "simulation.sampled",
+    "simulation.limits": "simulation.damping",
+    "simulation.mujoco": "simulation.mujoco_plant",
+    "simulation.schedules": "simulation.disturbances simulation.payloads",
     "sweep.description": "sweep.identity",
     "sweep.journal": "sweep.table",
     "sweep.sweep": "sweep.study",

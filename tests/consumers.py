@@ -7,9 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 from synctrl.analysis.certify import certify
-from synctrl.analysis.convergence import convergence
+from synctrl.analysis.convergence import convergence, identify
 from synctrl.analysis.gain_condition import gain_condition
-from synctrl.analysis.identification import identify
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.analysis.metrics import as_data, metrics, row_names, settling_bands
 from synctrl.errors import SynctrlError

@@ -40,8 +40,8 @@ from synctrl.experiments import (
 from synctrl.experiments.mixed_four import STATIONS
 from synctrl.experiments.panda_four import circle_cell
 from synctrl.show.plots import joint_trajectories, save, sync_errors, tracking_errors
-from synctrl.simulation.payloads import Payload
 from synctrl.simulation.result import LAYOUT
+from synctrl.simulation.schedules import Payload
 from synctrl.sweep.worker import Prepared
 
 DT = 1e-3

@@ -146,7 +146,7 @@ def test_a_run_that_breaks_down_ends_alike(gains):
 
 
 def test_what_the_compiled_engine_does_not_do_is_said():
-    with pytest.raises(InputError, match="'rk4' only"):
+    with refused(InputError, "integrator"):
         planar_four().simulate(integrator="DOP853", engine="compiled")
     with refused(InputError, "engine"):
         planar_four().simulate(engine="fortran")

@@ -14,8 +14,8 @@ from synctrl.compiled.known import check_known
 from synctrl.compiled.program import Program
 from synctrl.errors import InputError, SaturationWarning
 from synctrl.experiments import a460_pair, planar_four, ur5_payload
-from synctrl.simulation.payloads import PayloadSchedule
 from synctrl.simulation.result import LAYOUT
+from synctrl.simulation.schedules import PayloadSchedule
 
 pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
 

@@ -24,8 +24,8 @@ from synctrl import (
     Result,
     load_robot,
 )
+from synctrl.analysis.convergence import identify
 from synctrl.analysis.gain_condition import gain_condition
-from synctrl.analysis.identification import identify
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.coupling.weights import Weights
 from synctrl.errors import InputError, SimulationError

@@ -25,9 +25,8 @@ from synctrl import (
     load_robot,
 )
 from synctrl.analysis.certify import certify
-from synctrl.analysis.convergence import convergence
+from synctrl.analysis.convergence import convergence, identify
 from synctrl.analysis.gain_condition import gain_condition, gain_condition_in_box
-from synctrl.analysis.identification import identify
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.analysis.metrics import as_data, metrics, row_names, settling_bands
 from synctrl.analysis.replay import replay

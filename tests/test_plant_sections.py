@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from synctrl.analysis.identification import identify
+from synctrl.analysis.convergence import identify
 from synctrl.errors import InputError
 from synctrl.experiments import a460_full_pair, a460_pair
 from synctrl.paper.judge import AGREEMENT, compare_runs, differences, joint_pair, judge_section

@@ -20,7 +20,7 @@ MOVED = {
     "synctrl.control.controller": ("synctrl.control.laws.sun_mills", ["REFERENCE_ACCELERATIONS"]),
     "synctrl.show.lyapunov_plots": ("synctrl.analysis.lyapunov", ["ENERGIES", "POWERS", "THEOREM"]),
     "synctrl.show.plots": ("synctrl.show.legends", ["WIDE", "NARROW"]),
-    "synctrl.simulation.simulate": ("synctrl.simulation.run", ["run_reference"]),
+    "synctrl.simulation.simulate": ("synctrl.simulation.engines", ["run_reference"]),
     "synctrl.coupling.weights": ("synctrl.coupling.desired", ["check_weights"]),
 }
 #: names by the module that had them, the module that has them now, and what they are called there

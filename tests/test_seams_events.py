@@ -250,18 +250,19 @@ class Torn(Flat):
 
 @pytest.mark.parametrize("options", WAYS.values(), ids=WAYS)
 @pytest.mark.parametrize(
-    ("kind", "error", "says"),
+    ("kind", "error", "data"),
     [
-        (Flat, InputError, r"Flat: expected \(2, 3\) numbers as its velocities after the event at 0\.002 s"),
-        (Short, InputError, r"Short: expected 3, \(positions, .*\) after the event at 0\.002 s, found 2"),
-        (Mute, InputError, r"Mute: expected 3, \(positions, .*\) after the event .*, found NoneType"),
-        (Broken, SimulationError, r"Broken\.meet.*no hands"),
-        (Torn, NonFiniteError, r"Torn gives .*inf.* as its velocities after the event at 0\.002 s"),
+        (Flat, InputError, {"subject": "plant Flat", "found": (3,)}),
+        (Short, InputError, {"subject": "plant Short", "found": 2}),
+        (Mute, InputError, {"subject": "plant Mute", "found": "NoneType"}),
+        (Broken, SimulationError, {"cause": None}),
+        (Torn, NonFiniteError, {"cause": "part", "time": 2e-3}),
     ],
 )
-def test_an_event_that_goes_wrong_ends_the_run_which_hands_over_what_it_has(kind, error, says, options):
-    with pytest.raises(error, match=says) as stop:
+def test_an_event_that_goes_wrong_ends_the_run_which_hands_over_what_it_has(kind, error, data, options):
+    with refused(error, **data) as stop:
         replace(a460_pair(), plant_type=kind).simulate(0.02, dt=1e-3, **options)
+    assert kind.__name__ in str(stop.value)
     assert len(stop.value.result.t) == 2 and stop.value.result.status.startswith("stopped")
 
 
@@ -271,5 +272,6 @@ def test_events_that_are_no_instants_are_refused(events):
         pass
 
     Vague.events = events
-    with pytest.raises(InputError, match=r"events of the plant .*Vague"):
+    with refused(InputError) as caught:
         replace(a460_pair(), plant_type=Vague)
+    assert caught.value.subject.startswith("events of the plant")

@@ -87,16 +87,11 @@ def metrics(result: Result, bands: Mapping[str, float] | None = None) -> Metrics
 
 def error_metrics(t: np.ndarray, e: np.ndarray, band: float) -> ErrorMetrics:
     """Metrics of an error e, (T, ...), at the instants t, (T,), s."""
-    ise = integral_of_square(t, e)
+    ise = np.trapezoid(np.square(e), t, axis=0)
     span = t[-1] - t[0]
     rms = np.sqrt(ise / span) if span > 0 else np.abs(e[-1])
     band = non_negative_number("settling band", band)
     return ErrorMetrics(np.abs(e).max(axis=0), rms, ise, settling_time(t, e, band), e[-1].copy(), band)
-
-
-def integral_of_square(t: np.ndarray, e: np.ndarray) -> np.ndarray:
-    """Integral of e^2 over time by the trapezoidal rule, (...), for e of shape (T, ...)."""
-    return np.trapezoid(np.square(e), t, axis=0)
 
 
 def settling_time(t: np.ndarray, e: np.ndarray, band: float) -> np.ndarray:
@@ -152,7 +147,9 @@ def as_data(result: Result, computed: Metrics) -> dict[str, Any]:
     data["duration_unit"] = "s"
     for kind in ERRORS:
         data[kind] = _error_data(result, kind, getattr(computed, kind))
-    data["peak_torque"] = {"unit": result.unit("tau"), "values": _torque_data(result, computed)}
+    peaks = zip(info["robots"], computed.peak_torque.tolist(), strict=True)
+    torque = {robot["name"]: dict(zip(robot["joints"], row, strict=False)) for robot, row in peaks}
+    data["peak_torque"] = {"unit": result.unit("tau"), "values": torque}
     data["gains"], data["versions"] = info["gains"], info["versions"]
     data["step_error"] = info.get("step_error")
     return data
@@ -170,13 +167,6 @@ def _error_data(result: Result, kind: str, computed: ErrorMetrics) -> dict[str, 
     }
     units = {"peak": unit, "rms": unit, "ise": f"{squared(unit)}·s", "settling_time": "s", "final": unit}
     return {"units": units, "settling_band": computed.band, "settling_band_unit": unit, "values": values}
-
-
-def _torque_data(result: Result, computed: Metrics) -> dict[str, dict[str, float]]:
-    return {
-        robot["name"]: {joint: float(value) for joint, value in zip(robot["joints"], row, strict=False)}
-        for robot, row in zip(result.info["robots"], computed.peak_torque, strict=True)
-    }
 
 
 def squared(unit: str) -> str:

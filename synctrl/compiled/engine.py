@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..coupling.cell import Cell
+from ..simulation.advance import up_to_a_failure
 from ..simulation.clock import Clock, Stretch
-from ..simulation.guard import Finding, checks, limits_of, stopped
-from ..simulation.handover import Progress, tell, up_to_a_failure
+from ..simulation.engines import Run, before_the_start, finish
+from ..simulation.guard import Finding, Progress, checks, limits_of, stopped, tell
 from ..simulation.recorder import Recorder
 from ..simulation.result import Result
-from ..simulation.run import Run, before_the_start, finish
 from . import structs
 from .known import check_known
 from .program import Program, one_after_another

@@ -32,8 +32,8 @@ from ..robots.friction_parameters import FrictionParameters
 from ..robots.parameters import FullParameters, LinearParameters
 from ..robots.robot import Robot
 from ..simulation.closed_loop import ClosedLoop
-from ..simulation.payloads import PayloadSchedule
 from ..simulation.plant import Plant
+from ..simulation.schedules import PayloadSchedule
 from ..tasks import algebra, rotations
 from ..tasks.measurement import Tips
 from ..tasks.pose import BoundPoseSpace, PoseSpace

@@ -27,7 +27,7 @@ from ..coupling.cell import Cell, Member
 from ..coupling.synchronization import SynchronizationFunction
 from ..robots.parameters import LinearParameters
 from ..robots.robot import Robot, load_robot
-from ..simulation.disturbances import Disturbance
+from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
 from ..tasks.spaces import JointSpace
 from ..tasks.trajectories import Motion

@@ -11,7 +11,7 @@ from ..control.gains import Gains
 from ..control.laws import Law
 from ..control.network import Network
 from ..coupling.cell import Cell
-from ..simulation.disturbances import Disturbance
+from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
 
 

@@ -18,7 +18,7 @@ from ..coupling.coupling import Coupling
 from ..errors import InputError
 from ..robots.parameters import planar_two_link_parameters, theta_50
 from ..robots.robot import Robot, load_robot
-from ..simulation.disturbances import Disturbance
+from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
 from ..tasks.spaces import CartesianSpace
 from ..tasks.trajectories import ExponentialApproach

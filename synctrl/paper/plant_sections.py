@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..analysis.identification import LEARNED, Identification
+from ..analysis.convergence import LEARNED, Identification
 from ..checks import instance
 from ..show.plots import common_limits, joint_trajectories, sync_errors, tracking_errors
 from ..show.style import display

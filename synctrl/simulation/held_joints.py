@@ -114,11 +114,9 @@ class HeldJointsPlant(Plant):
     def outputs(self, hidden: np.ndarray) -> dict[str, Output]:
         """Positions, velocities and torques of the held joints, each (T, n, held joints)."""
         rows = hidden.reshape(len(hidden), -1, 3, self._count)
-        parts = {"rad": rows[:, :, 0], "rad/s": rows[:, :, 1], "N·m": self._torque(rows)}
-        return {
-            name: (part.copy(), unit, ("time", "robot", "held joint"))
-            for name, (unit, part) in zip(HELD, parts.items(), strict=True)
-        }
+        parts = ("rad", rows[:, :, 0]), ("rad/s", rows[:, :, 1]), ("N·m", self._torque(rows))
+        axes = "time", "robot", "held joint"
+        return {name: (part.copy(), unit, axes) for name, (unit, part) in zip(HELD, parts, strict=True)}
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         """How far the held joints were moved, in rad: `held_joints`, one entry per robot."""

@@ -15,8 +15,8 @@ from ..analysis.metrics import ERRORS
 from ..checks import count, instance, non_negative_number, positive_number
 from ..errors import InputError, ResultError
 from ..files import read_regular
-from ..simulation.disturbances import DisturbanceSchedule
 from ..simulation.recorder import describe
+from ..simulation.schedules import DisturbanceSchedule
 from .distributions import Values, described
 from .factors import Setup
 from .measures import MEASURES, TRUST

@@ -16,7 +16,7 @@ from ..robots.base_parameters import BaseParameters
 from ..robots.friction_parameters import FrictionParameters
 from ..robots.parameters import FullParameters, LinearParameters, Parameters
 from ..robots.robot import Robot
-from ..simulation.disturbances import Disturbance
+from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
 from .distributions import Value
 

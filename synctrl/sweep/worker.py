@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 
 from ..checks import choice
 from ..errors import SimulationError, SweepError, SynctrlError
-from ..simulation.engines import find_engine
+from ..simulation.engines import Run, find_engine
 from ..simulation.result import Result
-from ..simulation.run import Run
 from ..simulation.simulate import Experiment
 from .distributions import Value
 from .factors import Factor, Setup
