@@ -21,7 +21,7 @@ from synctrl.errors import FrameNotFound, InputError, RobotError, RobotWarning
 from synctrl.robots.urdf import describe, existing_file, lock_joints, model_from_xml, read_urdf, urdf_folder
 from synctrl.robots.urdf.checks import check_model
 from synctrl.robots.urdf.document import Pose
-from synctrl.robots.urdf.meshes import data_folder
+from synctrl.robots.urdf.packages import data_folder
 from synctrl.robots.urdf.reader import read_document
 from synctrl.robots.urdf.writer import to_xml
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..errors import InputError, MissingDependencyError, RobotError, near
 from .urdf.description import Description, read_urdf, urdf_folder
-from .urdf.meshes import data_folder
+from .urdf.packages import data_folder
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,8 @@ from ...checks import finite_number, instance
 from ...errors import FrameNotFound, RobotError, RobotWarning, near, warn
 from .checks import check_bodies, check_model, check_tree
 from .document import Document, Geometry, Joint, Link
-from .meshes import data_folder, find_mesh
+from .meshes import find_mesh
+from .packages import data_folder
 from .reader import read_document
 from .writer import dynamics_xml
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from importlib import metadata
 from pathlib import Path
 from typing import NoReturn
 
@@ -65,15 +64,6 @@ def find_mesh(filename: str, folder: Path, package_dirs: Iterable[Path]) -> Path
             _check_file(file, root)
             return file
     return None
-
-
-def data_folder() -> Path | None:
-    """The folder of the packages of example-robot-data, or None where it is not installed."""
-    try:
-        found = metadata.distribution("example-robot-data").locate_file("cmeel.prefix/share")
-    except metadata.PackageNotFoundError:
-        return None
-    return Path(str(found))
 
 
 def _candidates(filename: str, folder: Path, package_dirs: Iterable[Path]) -> Iterator[tuple[Path, str]]:
