@@ -30,6 +30,8 @@ def build_model(document: Document) -> pin.Model:
     named = {name: joint for joint, name in joints.items()}
     for k, name in enumerate(list(model.names)):
         model.names[k] = named.get(name, name)
+    rotors = {joint.name: joint.armature for joint in document.moving_joints}
+    model.armature = np.array([rotors[name] for name in list(model.names)[1:]])
     return model
 
 

@@ -161,7 +161,11 @@ class Mimic:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint. `axis` is of unit length; `remarks` are what there is to say about it if it moves."""
+    """A joint.
+
+    `axis` is of unit length; `armature` is the inertia of a rotor that turns along, in kg·m^2 (or kg);
+    `remarks` are what there is to say about it if it moves.
+    """
 
     name: str
     type: str
@@ -172,6 +176,7 @@ class Joint:
     limit: Limit | None = None
     damping: float = 0.0
     friction: float = 0.0
+    armature: float = 0.0
     mimic: Mimic | None = None
     line: int = 0
     remarks: tuple[Note, ...] = ()
