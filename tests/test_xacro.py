@@ -8,8 +8,10 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from synctrl import load_robot
 from synctrl.errors import InputError, MissingDependencyError, RobotError
 from synctrl.robots.urdf import xacro as xacro_module
 from synctrl.robots.urdf.xacro import expand_xacro
@@ -263,3 +265,41 @@ def test_a_process_that_dies_is_said(tmp_path: Path) -> None:
     file = write(tmp_path / "a.xacro", expression(f"{GLOBALS}['_exit'](3)"))
     with pytest.raises(RobotError, match="ended without an answer"):
         expand_xacro(file)
+
+
+# -- robots ------------------------------------------------------------------------------------------------
+
+
+def arm(body: str = "") -> str:
+    """The links of the planar arm, in a xacro file."""
+    text = Path(load_robot("planar2r").document.file).read_text(encoding="utf-8")
+    return text[text.index(">", text.index("<robot")) + 1 : text.rindex("</robot>")] + body
+
+
+@needs_xacro
+def test_a_xacro_file_loads_as_the_urdf_that_it_expands_to(tmp_path: Path) -> None:
+    urdf = load_robot("planar2r")
+    robot = load_robot(write(tmp_path / "arm.urdf.xacro", arm()))
+    assert robot.joint_names == urdf.joint_names
+    assert np.array_equal(robot.inertial_parameters, urdf.inertial_parameters)
+
+
+@needs_xacro
+def test_arguments_reach_the_robot(tmp_path: Path) -> None:
+    text = '<xacro:arg name="tool" default="a"/>' + link("$(arg tool)")
+    joint = '<joint name="mount" type="fixed"><parent link="tip"/><child link="$(arg tool)"/></joint>'
+    file = write(tmp_path / "arm.xacro", arm(text + joint))
+    assert load_robot(file, tip="gripper", xacro_args={"tool": "gripper"}).tip == "gripper"
+
+
+@needs_xacro
+def test_what_it_expands_to_is_checked_as_any_urdf(tmp_path: Path) -> None:
+    file = write(tmp_path / "arm.xacro", arm('<link name="tip"/>'))
+    with pytest.raises(RobotError, match=r"arm\.xacro.*unique name"):
+        load_robot(file)
+
+
+def test_arguments_for_another_kind_of_file_are_refused() -> None:
+    file = load_robot("planar2r").document.file
+    with pytest.raises(InputError, match="xacro_args"):
+        load_robot(file, xacro_args={"a": 1})

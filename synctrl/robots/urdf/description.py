@@ -24,9 +24,9 @@ from .inertials import with_inertials
 from .locks import settle_locks
 from .meshes import find_mesh
 from .names import remark_names
-from .packages import data_folder
-from .reader import read_document
+from .packages import Packages, data_folder
 from .report import NOTHING, Notes, Report, warn_of
+from .sources import read_source
 from .suspicions import suspect
 from .tips import check_tip, default_tip
 from .xml import quoted
@@ -82,13 +82,20 @@ class Description:
         return tuple(link.name for link in self.document.links)
 
 
-def read_urdf(path: str | Path, package_dirs: Iterable[str | Path] = (), **options: Any) -> Description:
-    """A robot from a URDF file.
+def read_urdf(
+    path: str | Path,
+    package_dirs: Iterable[str | Path] = (),
+    *,
+    xacro_args: Mapping[str, object] | None = None,
+    **options: Any,
+) -> Description:
+    """A robot from a URDF file, a xacro file or MJCF, see `read_source`.
 
     Args:
         path: the file.
         package_dirs: folders in which packages are looked for when a mesh is `package://name/...`, before
             those of example-robot-data.
+        xacro_args: values of a xacro file's arguments.
         options: `tip`, `locked`, `inertials` and `strict` as in `describe`.
 
     Raises:
@@ -102,7 +109,8 @@ def read_urdf(path: str | Path, package_dirs: Iterable[str | Path] = (), **optio
     """
     file = existing_file(path)
     notes = Notes(file, strict=boolean("strict", options.pop("strict", False)))
-    return describe(read_document(file, notes), package_dirs, notes=notes, **options)
+    document = read_source(file, Packages(file, package_dirs), notes, xacro_args)
+    return describe(document, package_dirs, notes=notes, **options)
 
 
 def describe(
