@@ -9,6 +9,7 @@ tried in a process of its own with a time limit, so that a crash is a row too.
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import multiprocessing
 import os
@@ -24,12 +25,13 @@ import survey_one
 from survey_one import LIBRARIES, Row
 
 TIME_LIMIT = 120.0
-NAMES = ("Pinocchio", "yourdfpy", "MuJoCo")
 
 
 def main(arguments: Sequence[str] | None = None) -> list[Row]:
     """Survey a folder, and print or write the table."""
     options = _options(arguments)
+    for library in ("yourdfpy", "mujoco", *(["casadi", "scipy.linalg"] if options.compare else [])):
+        importlib.import_module(library)  # once, not in every process
     patterns = ["*.urdf", *(["*.xacro"] if options.xacro else [])]
     rows: dict[Path, list[Row]] = {}
     for collection in _collections(options.folder):
