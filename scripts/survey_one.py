@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import math
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
@@ -47,42 +47,66 @@ class Row:
     loop: float = math.nan
 
 
-def survey(path: Path, folder: Path, compare: bool, packages: Sequence[Path] = ()) -> Row:
-    """Try one file."""
-    row = Row(str(path.relative_to(folder)))
-    text = _text(path, packages, row)
+@dataclass(frozen=True)
+class Task:
+    """A file in the folder of its collection, and values of its arguments if it is a xacro file."""
+
+    path: Path
+    folder: Path
+    args: Mapping[str, str] | None = None
+
+    @property
+    def name(self) -> str:
+        words = [
+            str(self.path.relative_to(self.folder)),
+            *(f"{k}:={v}" for k, v in (self.args or {}).items()),
+        ]
+        return " ".join(words)
+
+    def text(self) -> str:
+        """The URDF, expanded if it is xacro."""
+        if self.path.suffix == ".xacro":
+            return expand_xacro(self.path, self.args, [self.folder])
+        return self.path.read_text(encoding="utf-8", errors="replace")
+
+    def load(self) -> Robot:
+        return load_robot(self.path, package_dirs=[self.folder], xacro_args=self.args)
+
+
+def survey(task: Task, compare: bool) -> Row:
+    """Try one file; packages are looked for in its collection too."""
+    row, path = Row(task.name), task.path
+    text = _text(task, row)
     if text is not None:
         row.what = what_it_is(text)
     if row.what != "arm":
         return row
     assert text is not None
     row.others = {name: _reason(lambda read=read: read(text, path)) for name, read in LIBRARIES.items()}
-    robot = _load(path, packages, row)
+    robot = _load(task, row)
     if compare and robot is not None:
         _compare(robot, text, row)
     return row
 
 
-def _text(path: Path, packages: Sequence[Path], row: Row) -> str | None:
-    """The URDF, expanded if it is xacro; None, and the reason in `row.what`, if there is none."""
+def _text(task: Task, row: Row) -> str | None:
+    """Its URDF; None, and the reason in `row.what`, if there is none."""
     try:
-        if path.suffix == ".xacro":
-            return expand_xacro(path, package_dirs=packages)
-        return path.read_text(encoding="utf-8", errors="replace")
+        return task.text()
     except SynctrlError as error:
-        row.what = "does not expand: " + str(error).removeprefix(f"{path}: ").partition("found: ")[2]
+        row.what = "does not expand: " + str(error).partition("found: ")[2]
     except OSError as error:
         row.what = f"cannot be read: {error.strerror}"
     return None
 
 
-def _load(path: Path, packages: Sequence[Path], row: Row) -> Robot | None:
+def _load(task: Task, row: Row) -> Robot | None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            robot = load_robot(path, package_dirs=packages)
+            robot = task.load()
         except SynctrlError as error:
-            row.refusal = str(error).removeprefix(f"{path}:")
+            row.refusal = str(error).removeprefix(f"{task.path}:")
             return None
         except Exception as error:  # a fault of ours
             row.refusal = f"CRASH {type(error).__name__}: {error}"
@@ -115,6 +139,9 @@ def what_it_is(text: str) -> str:
         return "nothing moves"
     if not any(_mass(link) > 0 for link in root.findall("link")):
         return "no masses"
+    links = {link.get("name") for link in root.findall("link")}
+    if any(joint.find("parent") is None or joint.find("parent").get("link") not in links for joint in joints):
+        return "a part, to be fixed to a link that it lacks"
     return _shape(_chains(joints))
 
 

@@ -1,9 +1,10 @@
 """Load every robot below a folder, and say in a table what became of them.
 
-python scripts/survey_robots.py FOLDER [--xacro] [--compare] [--packages FOLDER] [--out TABLE.md]
+python scripts/survey_robots.py FOLDER [--xacro] [--compare] [--out TABLE.md]
 
-Each folder in FOLDER is a collection; a file `.commit` in it says which state of it that is. Each file is
-tried in a process of its own with a time limit, so that a crash is a row too.
+Each folder in FOLDER is a collection; a file `.commit` in it says which state of it that is. A xacro file is
+tried as it is, and with each set of arguments that `.xacro_args.json` has for it: {"file": [{"name": "value"}]}.
+Each is tried in a process of its own with a time limit, so that a crash is a row too.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
+from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-import survey_one
-from survey_one import LIBRARIES, Row
+from survey_one import LIBRARIES, Row, Task, survey
 
 TIME_LIMIT = 120.0
 
@@ -37,8 +38,8 @@ def main(arguments: Sequence[str] | None = None) -> list[Row]:
     for collection in _collections(options.folder):
         files = sorted({file for pattern in patterns for file in collection.rglob(pattern)})
         with ThreadPoolExecutor(options.workers) as pool:
-            tasks = [(file, collection, options.compare, options.packages) for file in files]
-            rows[collection] = list(pool.map(lambda task: _apart(*task), tasks))
+            tasks = [task for file in files for task in _tasks(file, collection)]
+            rows[collection] = list(pool.map(partial(_apart, compare=options.compare), tasks))
         print(f"{collection.name}: {len(files)} files", flush=True)
     text = table(rows)
     print(text)
@@ -54,7 +55,6 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--xacro", action="store_true", help="expand and try xacro files too")
     parser.add_argument("--compare", action="store_true", help="compare dynamics, run both engines")
-    parser.add_argument("--packages", type=Path, action="append", default=[], help="where packages are")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path, help="write the table there, and every row beside it as JSON")
     return parser.parse_args(arguments)
@@ -67,18 +67,23 @@ def _collections(folder: Path) -> list[Path]:
     return [child for child in sorted(folder.iterdir()) if child.is_dir()]
 
 
+def _tasks(file: Path, collection: Path) -> list[Task]:
+    """A file without arguments, or with each set of them that is known."""
+    known = collection / ".xacro_args.json"
+    sets = json.loads(known.read_text(encoding="utf-8")) if known.is_file() else {}
+    return [Task(file, collection, args) for args in sets.get(str(file.relative_to(collection)), [None])]
+
+
 # -- one file, one process ---------------------------------------------------------------------------------
 
 
-def _apart(path: Path, folder: Path, compare: bool, packages: Sequence[Path]) -> Row:
+def _apart(task: Task, compare: bool) -> Row:
     """The row of a file, from a process that may crash or hang."""
     here, there = multiprocessing.Pipe(duplex=False)
-    process = multiprocessing.Process(
-        target=_send, args=(there, path, folder, compare, packages), daemon=True
-    )
+    process = multiprocessing.Process(target=_send, args=(there, task, compare), daemon=True)
     process.start()
     there.close()
-    row = Row(str(path.relative_to(folder)), refusal=f"CRASH: no answer within {TIME_LIMIT:g} s")
+    row = Row(task.name, refusal=f"CRASH: no answer within {TIME_LIMIT:g} s")
     try:
         if here.poll(TIME_LIMIT):
             row = here.recv()
@@ -90,11 +95,11 @@ def _apart(path: Path, folder: Path, compare: bool, packages: Sequence[Path]) ->
     return row
 
 
-def _send(there: Connection, path: Path, folder: Path, compare: bool, packages: Sequence[Path]) -> None:
+def _send(there: Connection, task: Task, compare: bool) -> None:
     quiet = os.open(os.devnull, os.O_WRONLY)  # the other libraries' parsers write whatever they find
     os.dup2(quiet, 1)
     os.dup2(quiet, 2)
-    there.send(survey_one.survey(path, folder, compare, packages))
+    there.send(survey(task, compare))
 
 
 # -- the table ---------------------------------------------------------------------------------------------

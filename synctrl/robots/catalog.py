@@ -120,13 +120,9 @@ def load_description(
         strict: whether everything that would be a warning is an error.
         xacro_args: values of the arguments of a xacro file, by name: texts, numbers, truth values.
 
-    Raises:
-        RobotError: an unknown name, with the near ones, or a description that is refused.
-        FrameNotFound: there is no such tip.
+    Raises, warns: as `read_urdf`, and:
+        RobotError: an unknown name, with the near ones.
         MissingDependencyError: a package that has the robot, or reads its kind of file, is not installed.
-
-    Warns:
-        RobotWarning: as `read_urdf`.
     """
     if not isinstance(source, (str, Path)):
         raise InputError(f"expected a name or a path, found {type(source).__name__}", subject="robot")

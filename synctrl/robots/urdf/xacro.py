@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Mapping
@@ -65,8 +66,11 @@ def expand(file: Path, args: Mapping[str, object] | None, packages: Packages) ->
 
 
 def _advice(reason: str) -> str:
-    _, missing, name = reason.partition("Undefined substitution argument ")
-    return f"; give it with xacro_args={{{name.split(',')[0]!r}: ...}}" if missing else ""
+    if found := re.search(r"Undefined substitution argument (\w+)", reason):
+        return f"; give it with xacro_args={{{found[1]!r}: ...}}"
+    if re.search(r"package '[^']*' is not found", reason):
+        return "; give a folder that holds it with package_dirs=[...]"
+    return ""
 
 
 def _mappings(args: Mapping[str, object]) -> dict[str, str]:
