@@ -36,6 +36,7 @@ class Row:
         others: by library, why it refuses the same; empty if it takes it.
         errors: largest relative difference of M, C, g and the regressor from plain Pinocchio, by name.
         loop: largest difference between the two engines in a short closed loop, rad or m.
+        stopped: why there was no such loop.
     """
 
     file: str
@@ -45,6 +46,7 @@ class Row:
     others: dict[str, str] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)
     loop: float = math.nan
+    stopped: str = ""
 
 
 @dataclass(frozen=True)
@@ -69,8 +71,8 @@ class Task:
             return expand_xacro(self.path, self.args, [self.folder])
         return self.path.read_text(encoding="utf-8", errors="replace")
 
-    def load(self) -> Robot:
-        return load_robot(self.path, package_dirs=[self.folder], xacro_args=self.args)
+    def load(self, tip: str | None = None) -> Robot:
+        return load_robot(self.path, tip, package_dirs=[self.folder], xacro_args=self.args)
 
 
 def survey(task: Task, compare: bool) -> Row:
@@ -86,6 +88,7 @@ def survey(task: Task, compare: bool) -> Row:
     robot = _load(task, row)
     if compare and robot is not None:
         _compare(robot, text, row)
+        _run(task, robot.tip, row)
     return row
 
 
@@ -231,8 +234,16 @@ def _compare(robot: Robot, text: str, row: Row) -> None:
     except ValueError as error:
         row.errors = {"not compared": math.nan}
         row.others["Pinocchio"] = row.others["Pinocchio"] or str(error)
-        return
-    row.loop = loop_difference(robot)
+
+
+def _run(task: Task, tip: str, row: Row) -> None:
+    """Run it in both engines; of a branched robot the arm that carries the tip."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            row.loop = loop_difference(task.load(tip))
+        except SynctrlError as error:
+            row.stopped = str(error)
 
 
 def differences(robot: Robot, model: pin.Model) -> dict[str, float]:
@@ -301,7 +312,5 @@ def loop_difference(robot: Robot, duration: float = 0.1) -> float:
     cell = Cell([Member(robot, Hold(start + shift)) for shift in (0.0, 0.05)], Coupling.pair())
     inertia = np.diag(robot.mass_matrix(start))
     gains = Gains(Lambda=5.0, beta=1.0, K_r=10 * inertia, K_eps=10 * float(inertia.min()), Gamma=0.0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        runs = [simulate(cell, gains, duration, engine=engine) for engine in ("pinocchio", "compiled")]
+    runs = [simulate(cell, gains, duration, engine=engine) for engine in ("pinocchio", "compiled")]
     return float(abs(runs[0].q - runs[1].q).max())

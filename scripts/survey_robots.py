@@ -3,7 +3,7 @@
 python scripts/survey_robots.py FOLDER [--xacro] [--compare] [--out TABLE.md]
 
 Each folder in FOLDER is a collection; a file `.commit` in it says which state of it that is. A xacro file is
-tried as it is, and with each set of arguments that `.xacro_args.json` has for it: {"file": [{"name": "value"}]}.
+tried as it is, or with each set of arguments that `.xacro_args.json` has for it: {"file": [{"name": "ur5"}]}.
 Each is tried in a process of its own with a time limit, so that a crash is a row too.
 """
 
@@ -165,10 +165,11 @@ def _exactness(rows: Sequence[Row]) -> list[str]:
     worst = {name: max(row.errors[name] for row in compared) for name in compared[0].errors}
     loops = [row.loop for row in compared if row.loop == row.loop]
     words = ", ".join(f"{name} {value:.1e}" for name, value in worst.items())
-    apart = max(loops, default=0.0)
+    apart, stopped = max(loops, default=0.0), Counter(_kind(row.stopped) for row in compared if row.stopped)
     return [
         f"Largest relative difference from plain Pinocchio over {len(compared)} arms: {words}.",
         f"Largest difference between the engines after a short run of {len(loops)} arms: {apart:.1e}.",
+        *(f"No such run: {line[2:]}" for line in _counted(stopped) if stopped),
     ]
 
 

@@ -151,6 +151,11 @@ def test_an_equality_with_a_number_holds_a_joint_there(tmp_path: Path) -> None:
         ("<worldbody>", '<worldbody><body><freejoint/><geom size=".1"/></body>', "free joint"),
         ("<worldbody>", "<worldbody><unknown/>", "MuJoCo compiles.*unrecognized"),
         ("<worldbody>", '<extension><plugin plugin="mujoco.pid"/></extension><worldbody>', "plugin"),
+        (
+            "<actuator>",
+            '<tendon><fixed armature=".3"><joint joint="spin" coef="1"/></fixed></tendon><actuator>',
+            "MuJoCo computes",
+        ),
         ("<mujoco", "<!DOCTYPE mujoco><mujoco", "DOCTYPE"),
     ],
 )
@@ -165,6 +170,7 @@ def test_what_is_no_arm_is_refused_with_the_reason(old: str, new: str, reason: s
     [
         ('name="spin"', 'name="spin" stiffness="3"', "a spring of 3"),
         ("<compiler", '<option gravity="0 0 -1.62"/><compiler', "in place of 0 0 -1.62"),
+        ("<compiler", '<option><flag gravity="disable"/></option><compiler', "in place of 0 0 0"),
         ('<body name="hand"', '<body name="hand" gravcomp="1"', "gravcomp"),
         ('forcerange="-7 7"', 'forcerange="-7 9"', "smaller limit of force, 7"),
     ],
@@ -173,6 +179,11 @@ def test_what_acts_and_is_not_taken_is_said(old: str, new: str, said: str, tmp_p
     with pytest.warns(RobotWarning):
         robot = load_robot(write(tmp_path, ARM.replace(old, new)))
     assert said in str(robot.report)
+
+
+def test_a_model_in_which_nothing_moves_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match="joints that move"):
+        quietly(write(tmp_path, "<mujoco><worldbody><body><geom size='.1'/></body></worldbody></mujoco>"))
 
 
 def test_an_urdf_with_the_ending_xml_is_read_as_one(tmp_path: Path) -> None:

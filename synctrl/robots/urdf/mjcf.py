@@ -124,8 +124,10 @@ class _Writer:
         for body in np.flatnonzero(model.body_gravcomp):
             where = f"body '{self.bodies[body]}'"
             self.notes.add("left out", where, "gravcomp: the body has its whole weight here")
-        if not np.allclose(model.opt.gravity, (0, 0, -9.81)):
-            found = " ".join(f"{g:g}" for g in model.opt.gravity)
+        off = model.opt.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+        gravity = np.zeros(3) if off else model.opt.gravity
+        if not np.allclose(gravity, (0, 0, -9.81)):
+            found = " ".join(f"{g:g}" for g in gravity)
             self.notes.add("assumed", "option", f"gravity of 0 0 -9.81 m/s^2 in place of {found}")
 
     # -- bodies -------------------------------------------------------------------------------------------
