@@ -24,9 +24,8 @@ def build_model(document: Document) -> pin.Model:
         RobotError: Pinocchio refuses it all the same.
     """
     taken = {"universe", *(link.name for link in document.links)}
-    links = {"universe": _other("universe", taken)}
     joints = {joint.name: _other(joint.name, taken) for joint in document.joints if joint.name in taken}
-    model = model_from_xml(document.source, dynamics_xml(document.renamed(links, joints)))
+    model = model_from_xml(document.source, dynamics_xml(document.renamed(joints)))
     named = {name: joint for joint, name in joints.items()}
     for k, name in enumerate(list(model.names)):
         model.names[k] = named.get(name, name)

@@ -62,6 +62,7 @@ class Description:
         Raises:
             FrameNotFound: there is none of that name.
         """
+        instance("frame", tip, str, "a name")
         if not self.model.existFrame(tip):
             raise FrameNotFound(self.name, tip, [frame.name for frame in self.model.frames])
         return replace(self, tip=tip)
@@ -136,14 +137,9 @@ def describe(
     Raises, warns: as `read_urdf`.
     """
     notes = notes or Notes(document.file)
+    instance("frame", tip, (str, type(None)), "a name")
     document = with_inertials(document, {} if inertials is None else inertials)
-    check_some_mass(document)
-    check_tree(document)
-    document, held = settle_locks(document, {} if locked is None else locked, tip, notes)
-    check_tree(document)
-    check_bodies(document, notes)
-    remark_names(document, notes)
-    suspect(document, notes)
+    document, held = _settled(document, {} if locked is None else locked, tip, notes)
     model = build_model(document)
     check_model(document, model)
     visual = _build_visual(document, model, _package_dirs(package_dirs), notes)
@@ -154,6 +150,21 @@ def describe(
     return Description(name, model, visual, tip, document, tuple(held), report)
 
 
+def _settled(
+    document: Document, locked: Mapping[str, float], tip: str | None, notes: Notes
+) -> tuple[Document, dict[str, float]]:
+    """The document with its joints held, checked, and the positions of these joints."""
+    check_some_mass(document)
+    check_tree(document)
+    check_tip(document, tip, notes)
+    document, held = settle_locks(document, locked, tip, notes)
+    check_tree(document)
+    check_bodies(document, notes)
+    remark_names(document, notes)
+    suspect(document, notes)
+    return document, held
+
+
 def _tip(
     document: Document, model: pin.Model, tip: str | None, held: Mapping[str, float], notes: Notes
 ) -> str:
@@ -161,7 +172,6 @@ def _tip(
         return default_tip(document, held, notes)
     if not model.existFrame(tip):
         raise FrameNotFound(document.name, tip, [frame.name for frame in model.frames])
-    check_tip(document, tip, notes)
     return tip
 
 

@@ -240,15 +240,10 @@ class Document:
         joint = Joint(f"{name}_mount", "fixed", name, self.root, pose)
         return replace(self, links=(Link(name), *self.links), joints=(joint, *self.joints))
 
-    def renamed(self, links: Mapping[str, str], joints: Mapping[str, str]) -> Self:
-        """The document with other names for some links and joints."""
-
-        def joint(joint: Joint) -> Joint:
-            parent, child = (links.get(end, end) for end in (joint.parent, joint.child))
-            return replace(joint, name=joints.get(joint.name, joint.name), parent=parent, child=child)
-
-        named = (replace(link, name=links.get(link.name, link.name)) for link in self.links)
-        return replace(self, links=tuple(named), joints=tuple(map(joint, self.joints)))
+    def renamed(self, names: Mapping[str, str]) -> Self:
+        """The document with other names for some joints."""
+        joints = (replace(joint, name=names.get(joint.name, joint.name)) for joint in self.joints)
+        return replace(self, joints=tuple(joints))
 
     def error(
         self,

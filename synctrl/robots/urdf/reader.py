@@ -21,6 +21,7 @@ JOINT_PARTS = (
     *("calibration", "safety_controller"),
 )
 
+WORLD = "universe"
 _NO_AXIS = 1e-6
 _UNIT_AXIS = 1e-3
 
@@ -67,7 +68,7 @@ def _link(element: Element, colors: dict[str, Vector]) -> Link:
     element.know(("inertial", "visual", "collision", *LINK_EXTENSIONS), ("name", "type"))
     inertial = element.optional("inertial")
     return Link(
-        name=element.name(),
+        name=_link_name(element, "name"),
         inertial=None if inertial is None else _inertial(inertial),
         visuals=read_shapes(element, "visual", colors),
         collisions=read_shapes(element, "collision", {}),
@@ -120,7 +121,13 @@ def _joint(element: Element) -> Joint:
 def _end(element: Element, role: str) -> str:
     end = element.required(role)
     end.know((), ("link",))
-    return end.name("link")
+    return _link_name(end, "link")
+
+
+def _link_name(element: Element, attribute: str) -> str:
+    """The name of a link; what engines call the world cannot be one."""
+    name = element.name(attribute)
+    return f"{name} (link)" if name == WORLD else name
 
 
 def _moving(element: Element, joint: Joint) -> Joint:
