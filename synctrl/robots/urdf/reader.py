@@ -7,21 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...errors import near
-from .document import (
-    INERTIA,
-    MOVING_TYPES,
-    ZERO,
-    Document,
-    Geometry,
-    Inertial,
-    Joint,
-    Limit,
-    Link,
-    Pose,
-    Shape,
-    Vector,
-)
-from .meshes import check_filename
+from .document import INERTIA, MOVING_TYPES, ZERO, Document, Inertial, Joint, Limit, Link, Pose, Vector
+from .pictures import Colors, read_colors, read_geometry
 from .xml import Element, parse_xml, quoted, read_bytes, shown_tag
 
 JOINT_TYPES = (*MOVING_TYPES, "fixed")
@@ -29,7 +16,6 @@ JOINT_PARTS = (
     *("parent", "child", "origin", "axis", "limit", "dynamics", "mimic"),
     *("calibration", "safety_controller"),
 )
-SHAPES = ("box", "cylinder", "sphere", "capsule", "mesh")
 EXTENSIONS = ("gazebo", "transmission", "ros2_control", "sensor")
 LINK_EXTENSIONS = ("contact", "surface", "gravity", "kinematic", "self_filter", "collision_checking")
 """Elements of other programs, which say nothing about the mechanism."""
@@ -56,7 +42,7 @@ def read_text(file: Path, data: bytes) -> Document:
         root.refuse("a URDF with the root element <robot>", f"<{shown_tag(root.tag)}>")
     _refuse_xacro(root)
     root.know(("link", "joint", "material", *EXTENSIONS), ("name", "version"))
-    colors = _colors(root)
+    colors = read_colors(root)
     return Document(
         name=root.name(),
         links=tuple(_link(element, colors) for element in root.all("link")),
@@ -74,14 +60,14 @@ def _refuse_xacro(root: Element) -> None:
 # -- links -------------------------------------------------------------------------------------------------
 
 
-def _link(element: Element, colors: dict[str, Vector]) -> Link:
+def _link(element: Element, colors: Colors) -> Link:
     element.know(("inertial", "visual", "collision", *LINK_EXTENSIONS), ("name", "type"))
     inertial = element.optional("inertial")
     return Link(
         name=element.name(),
         inertial=None if inertial is None else _inertial(inertial),
-        visuals=tuple(_geometry(visual, colors) for visual in element.all("visual")),
-        collisions=tuple(_geometry(collision, {}) for collision in element.all("collision")),
+        visuals=tuple(read_geometry(visual, _origin(visual), colors) for visual in element.all("visual")),
+        collisions=tuple(read_geometry(shape, _origin(shape), {}) for shape in element.all("collision")),
         line=element.line,
     )
 
@@ -105,79 +91,6 @@ def _origin(element: Element) -> Pose:
         return Pose()
     origin.know((), ("xyz", "rpy"))
     return Pose(origin.numbers("xyz", 3, ZERO), origin.numbers("rpy", 3, ZERO))
-
-
-# -- shapes ------------------------------------------------------------------------------------------------
-
-
-def _geometry(element: Element, colors: dict[str, Vector]) -> Geometry:
-    element.know(("origin", "geometry", "material", "verbose"), ("name",))
-    return Geometry(
-        shape=_shape(element.required("geometry")),
-        origin=_origin(element),
-        color=_color(element, colors) if element.tag == "visual" else None,
-        line=element.line,
-    )
-
-
-def _shape(geometry: Element) -> Shape:
-    geometry.know(SHAPES, ("name",))
-    shapes = [child for child in geometry.children if child.tag in SHAPES]
-    if len(shapes) != 1:
-        geometry.refuse(f"one shape of {', '.join(SHAPES)}", str(len(shapes)))
-    shape = shapes[0]
-    if shape.tag == "mesh":
-        return _mesh(shape)
-    if shape.tag == "box":
-        shape.know((), ("size",))
-        size = shape.numbers("size", 3)
-        if min(size) <= 0:
-            shape.refuse("a size above 0 in each direction", " ".join(f"{s:g}" for s in size))
-        return Shape("box", size)
-    measures = ("radius",) if shape.tag == "sphere" else ("radius", "length")
-    shape.know((), measures)
-    return Shape(shape.tag, tuple(shape.positive(measure) for measure in measures))
-
-
-def _mesh(mesh: Element) -> Shape:
-    mesh.know((), ("filename", "scale"))
-    scale = mesh.numbers("scale", 3, (1.0, 1.0, 1.0))
-    if 0 in scale:
-        mesh.refuse("a scale other than 0 in each direction", " ".join(f"{s:g}" for s in scale))
-    return Shape("mesh", scale, check_filename(mesh))
-
-
-def _colors(root: Element) -> dict[str, Vector]:
-    """Colours by the name of their material; those of the robot come before those inside links."""
-    visuals = [visual for link in root.all("link") for visual in link.all("visual")]
-    colors: dict[str, Vector] = {}
-    for material in [m for parent in (root, *visuals) for m in parent.all("material")]:
-        material.know(("color", "texture"), ("name",))
-        color = material.optional("color")
-        if color is not None:
-            colors.setdefault(material.attributes.get("name", ""), _rgba(color))
-    return colors
-
-
-def _rgba(color: Element) -> Vector:
-    color.know((), ("rgba",))
-    rgba = color.numbers("rgba", 4)
-    if min(rgba) < 0 or max(rgba) > 1:
-        color.refuse("rgba of 4 numbers from 0 to 1", " ".join(f"{c:g}" for c in rgba))
-    return rgba
-
-
-def _color(element: Element, colors: dict[str, Vector]) -> Vector | None:
-    material = element.optional("material")
-    if material is None or material.optional("texture") is not None:
-        return None
-    color = material.optional("color")
-    if color is not None:
-        return _rgba(color)
-    name = material.attributes.get("name", "")
-    if name not in colors:
-        material.warn(f"no colour is known for material {quoted(name)}{near(name[:60], colors)}")
-    return colors.get(name)
 
 
 # -- joints ------------------------------------------------------------------------------------------------
