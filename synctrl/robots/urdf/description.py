@@ -19,12 +19,13 @@ import numpy as np
 import pinocchio as pin
 
 from ...checks import finite_number, instance
-from ...errors import FrameNotFound, RobotError, RobotWarning, near, warn
+from ...errors import FrameNotFound, RobotError, near
 from .checks import check_bodies, check_model, check_tree
-from .document import Document, Geometry, Joint, Link
-from .meshes import find_mesh
-from .packages import data_folder
+from .document import Document, Joint, Shape
+from .meshes import find_pictures
+from .packages import Packages
 from .reader import read_document
+from .report import Notes, warn_of
 from .writer import dynamics_xml
 
 DEFAULT_COLOR = (0.9, 0.9, 0.9, 1.0)
@@ -110,7 +111,10 @@ def describe(
     tip = tip or document.last_link
     if not model.existFrame(tip):
         raise FrameNotFound(document.name, tip, [frame.name for frame in model.frames])
-    visual = _build_visual(document, model, _package_dirs(package_dirs))
+    notes = Notes(document.file)
+    document = find_pictures(document, Packages(document.file, package_dirs), notes)
+    warn_of(notes.report(document.source))
+    visual = _build_visual(document, model)
     return Description(document.name, model, visual, tip, document, locked)
 
 
@@ -179,16 +183,6 @@ def existing_file(path: str | Path) -> Path:
     raise RobotError(f"expected a URDF file, found {kind}{hint}", file=file)
 
 
-def _package_dirs(package_dirs: Iterable[str | Path]) -> tuple[Path, ...]:
-    folders = (package_dirs,) if isinstance(package_dirs, (str, Path)) else package_dirs
-    instance("package_dirs", folders, Iterable, "folders")
-    folders = tuple(folders)
-    for folder in folders:
-        instance("package_dirs", folder, (str, Path), "folders")
-    stock = data_folder()
-    return (*map(Path, folders), *([stock] if stock else []))
-
-
 # -- Pinocchio ---------------------------------------------------------------------------------------------
 
 
@@ -242,35 +236,25 @@ def _standard_error() -> Iterator[list[str]]:
 # -- shapes ------------------------------------------------------------------------------------------------
 
 
-def _build_visual(document: Document, model: pin.Model, package_dirs: tuple[Path, ...]) -> pin.GeometryModel:
+def _build_visual(document: Document, model: pin.Model) -> pin.GeometryModel:
     """All shapes for display, each at its place in the frame of its link."""
     visual = pin.GeometryModel()
     for link in document.links:
         frame_id = model.getFrameId(link.name, pin.BODY)
         frame = model.frames[frame_id]
         for k, geometry in enumerate(link.visuals):
-            found = _shape(document, link, geometry, package_dirs)
-            if found is None:
+            if geometry.shape.hidden:
                 continue
             colored, color = geometry.color is not None, np.array(geometry.color or DEFAULT_COLOR)
             placement = frame.placement * geometry.origin.se3
             place = (f"{link.name}_{k}", frame.parentJoint, frame_id, placement)
-            visual.addGeometryObject(pin.GeometryObject(*place, *found, colored, color))
+            visual.addGeometryObject(pin.GeometryObject(*place, *_solid(geometry.shape), colored, color))
     return visual
 
 
-def _shape(
-    document: Document, link: Link, geometry: Geometry, package_dirs: tuple[Path, ...]
-) -> tuple[coal.CollisionGeometry, str, np.ndarray] | None:
-    """Coal's geometry, and path and scale of a mesh; None where the mesh is missing."""
-    shape = geometry.shape
-    if shape.kind != "mesh":
-        kinds = {"box": coal.Box, "cylinder": coal.Cylinder, "capsule": coal.Capsule, "sphere": coal.Sphere}
-        return kinds[shape.kind](*shape.size), "", np.ones(3)
-    folder = document.file.parent if document.file else Path.cwd()
-    file = find_mesh(shape.filename or "", folder, package_dirs)
-    if file is None:
-        missing = f"mesh '{shape.filename}' is missing and will not be shown"
-        warn(str(document.error(missing, link, line=geometry.line)), RobotWarning)
-        return None
-    return coal.BVHModelOBBRSS(), str(file), np.array(shape.size)
+def _solid(shape: Shape) -> tuple[coal.CollisionGeometry, str, np.ndarray]:
+    """Coal's geometry, and path and scale of a mesh."""
+    if shape.kind == "mesh":
+        return coal.BVHModelOBBRSS(), str(shape.file), np.array(shape.size)
+    kinds = {"box": coal.Box, "cylinder": coal.Cylinder, "capsule": coal.Capsule, "sphere": coal.Sphere}
+    return kinds[shape.kind](*shape.size), "", np.ones(3)

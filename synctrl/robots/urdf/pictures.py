@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from ...errors import near
 from .document import Geometry, Pose, Shape, Vector
-from .meshes import check_filename
 from .xml import Element, quoted
 
 SHAPES = ("box", "cylinder", "sphere", "capsule", "mesh")
@@ -47,7 +46,7 @@ def _mesh(mesh: Element) -> Shape:
     scale = mesh.numbers("scale", 3, (1.0, 1.0, 1.0))
     if 0 in scale:
         mesh.refuse("a scale other than 0 in each direction", " ".join(f"{s:g}" for s in scale))
-    return Shape("mesh", scale, check_filename(mesh))
+    return Shape("mesh", scale, mesh.text("filename"))
 
 
 def read_colors(root: Element) -> Colors:
