@@ -1,4 +1,7 @@
-"""Mesh files as shapes: whole, in metres, one for each colour. They are read by trimesh, which opens nothing."""
+"""Mesh files as shapes: whole, in metres, one for each colour.
+
+They are read by trimesh, which opens no file by itself.
+"""
 
 from __future__ import annotations
 

@@ -10,7 +10,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from urllib.parse import unquote
 
-from .document import Document, Geometry, Link, Vector
+import coal
+import numpy as np
+import pinocchio as pin
+
+from .document import Document, Geometry, Link, Shape, Vector
 from .mesh_files import check_mesh
 from .packages import Packages
 from .regular import Unusable, read_regular, require_regular
@@ -18,6 +22,7 @@ from .report import Notes
 from .textures import MAX_TEXTURE_BYTES, mean_color
 from .xml import quoted
 
+DEFAULT_COLOR = (0.9, 0.9, 0.9, 1.0)
 SCHEMES = ("package://", "model://", "file://")
 
 
@@ -33,6 +38,30 @@ def find_pictures(document: Document, packages: Packages, notes: Notes) -> Docum
     visuals = [tuple(finder.visual(link, visual) for visual in link.visuals) for link in document.links]
     links = (replace(link, visuals=found) for link, found in zip(document.links, visuals, strict=True))
     return replace(document, links=tuple(links))
+
+
+def build_visual(document: Document, model: pin.Model) -> pin.GeometryModel:
+    """All shapes for display, each at its place in the frame of its link."""
+    visual = pin.GeometryModel()
+    for link in document.links:
+        frame_id = model.getFrameId(link.name, pin.BODY)
+        frame = model.frames[frame_id]
+        for k, geometry in enumerate(link.visuals):
+            if geometry.shape.hidden:
+                continue
+            colored, color = geometry.color is not None, np.array(geometry.color or DEFAULT_COLOR)
+            placement = frame.placement * geometry.origin.se3
+            place = (f"{link.name}_{k}", frame.parentJoint, frame_id, placement)
+            visual.addGeometryObject(pin.GeometryObject(*place, *_solid(geometry.shape), colored, color))
+    return visual
+
+
+def _solid(shape: Shape) -> tuple[coal.CollisionGeometry, str, np.ndarray]:
+    """Coal's geometry, and path and scale of a mesh."""
+    if shape.kind == "mesh":
+        return coal.BVHModelOBBRSS(), str(shape.file), np.array(shape.size)
+    kinds = {"box": coal.Box, "cylinder": coal.Cylinder, "capsule": coal.Capsule, "sphere": coal.Sphere}
+    return kinds[shape.kind](*shape.size), "", np.ones(3)
 
 
 def find_file(filename: str, packages: Packages) -> Path:

@@ -72,6 +72,10 @@ class Report(Sequence[Note]):
         return self.notes[index]
 
 
+NOTHING = Report()
+"""The report of a robot about which there is nothing to say."""
+
+
 def _more(notes: tuple[Note, ...]) -> str:
     return f"; and {len(notes) - 1} more" if len(notes) > 1 else ""
 
@@ -100,6 +104,16 @@ class Notes:
         note = Note(kind, where, text, line)
         if note not in self.collected:
             self.collected.append(note)
+
+    def absorb(self, error: RobotError) -> None:
+        """Leave out, with a note of why, what could not be read and is not needed.
+
+        Raises:
+            RobotError: the error itself, if the collector is strict.
+        """
+        if self.strict:
+            raise error
+        self.add("left out", error.subject or "", error.problem, error.line or 0)
 
     def report(self, source: str) -> Report:
         """What was collected."""
