@@ -19,13 +19,19 @@ COLLADA = """<?xml version="1.0" encoding="utf-8"?>
 <source id="p"><float_array id="pa" count="9">{corners}</float_array><technique_common>
 <accessor source="#pa" count="3" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
 <param name="Z" type="float"/></accessor></technique_common></source>
+<source id="t"><float_array id="ta" count="6">0 0 1 0 0 1</float_array><technique_common>
+<accessor source="#ta" count="3" stride="2"><param name="S" type="float"/><param name="T" type="float"/>
+</accessor></technique_common></source>
 <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-<triangles count="1" material="m"><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles>
+<triangles count="1" material="m"><input semantic="VERTEX" source="#v" offset="0"/>
+<input semantic="TEXCOORD" source="#t" offset="0" set="0"/><p>0 1 2</p></triangles>
 </mesh></geometry></library_geometries>
 {nodes}<library_visual_scenes><visual_scene id="s">{scene}</visual_scene></library_visual_scenes>
 <scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
-SHAPE = """<node id="n"><instance_geometry url="#g"><bind_material><technique_common>
-<instance_material symbol="m" target="#mm"/></technique_common></bind_material></instance_geometry></node>"""
+SHAPE = '<node id="n"><instance_geometry url="#g"/></node>'
+COLORED = """<node id="n"><instance_geometry url="#g"><bind_material><technique_common>
+<instance_material symbol="m" target="#mm"><bind_vertex_input semantic="UV" input_semantic="TEXCOORD"
+input_set="0"/></instance_material></technique_common></bind_material></instance_geometry></node>"""
 MATERIALS = """<library_images><image id="i"><init_from>{0}</init_from></image></library_images>
 <library_effects><effect id="e"><profile_COMMON>
 <newparam sid="su"><surface type="2D"><init_from>i</init_from></surface></newparam>
@@ -36,13 +42,13 @@ MATERIALS = """<library_images><image id="i"><init_from>{0}</init_from></image><
 
 
 def collada(
-    unit: str = "", nodes: str = "", scene: str = SHAPE, texture: str = "", corners: np.ndarray = TRIANGLE
+    unit: str = "", nodes: str = "", scene: str = "", texture: str = "", corners: np.ndarray = TRIANGLE
 ) -> bytes:
     """A COLLADA file with one triangle, `unit` in its asset, further nodes, its scene, and a texture."""
     words = " ".join(str(number) for number in np.ravel(corners))
     materials = MATERIALS.format(texture) if texture else ""
     parts = {"asset": ASSET.format(unit), "materials": materials, "corners": words, "nodes": nodes}
-    return COLLADA.format(**parts, scene=scene).encode()
+    return COLLADA.format(**parts, scene=scene or (COLORED if texture else SHAPE)).encode()
 
 
 def stl(corners: np.ndarray = TRIANGLE) -> bytes:

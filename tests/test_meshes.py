@@ -226,7 +226,7 @@ HOSTILE = {
     "utf16.dae": meshes.collada().decode().encode("utf-16"),
     "other.dae": b"<html/>",
     "deep.dae": b"<COLLADA>" + b"<a>" * 100_000 + b"</a>" * 100_000 + b"</COLLADA>",
-    "empty.dae": meshes.collada(scene=""),
+    "empty.dae": meshes.collada(scene="<node/>"),
     "balloon.dae": meshes.collada(nodes=BALLOON, scene=AT_THE_TOP),
     "circle.dae": meshes.collada(nodes=CIRCLE, scene=AT_THE_TOP),
     "empty.obj": b"v 0 0 0\n",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,9 +17,9 @@ from . import shapes
 from .colors import ColorLike, hex_color, read_color, within_unit
 from .html import frame, page
 from .meshes import MeshLibrary
-from .nodes import Node, bounding_box, label, pack, scene_commands
+from .nodes import Node, bounding_box, label, pack, paint, scene_commands
 from .rotations import TINY, continuous, towards
-from .shapes import Color, Shape
+from .shapes import Shape
 from .view import fit_camera, view_commands, viewer_axes
 
 if TYPE_CHECKING:
@@ -93,7 +92,7 @@ class Scene:
         self._say_faults(name, (Path(geometry.meshPath) for geometry in visual.geometryObjects))
         robot = Node(label("robot", name), children=[link for link in links if link.shapes])
         if color is not None:
-            _paint(robot, read_color(name, color))
+            paint(robot, read_color(name, color))
         self._add(robot)
 
     def add_line(self, name: str, points: ArrayLike, color: ColorLike, width: float = 0.006) -> None:
@@ -260,7 +259,7 @@ class Scene:
         node.quaternion = _unit(name, self._series(f"{name}: quaternion", quaternion, 4))
         node.rgb = self._colors(name, color)
         node.shapes = [solid]
-        _paint(node, read_color(name, color if node.rgb is None else node.rgb[0]))
+        paint(node, read_color(name, color if node.rgb is None else node.rgb[0]))
         self._add(node)
 
     def _series(self, name: str, value: ArrayLike, width: int) -> np.ndarray:
@@ -288,13 +287,6 @@ class Scene:
         if isinstance(color, str) or np.ndim(color) != 2:
             return None
         return within_unit(name, self._series(f"{name}: color", color, 3))
-
-
-def _paint(node: Node, color: Color) -> None:
-    """Give all shapes of a node and of its children one colour."""
-    node.shapes = [replace(shape, color=color) for shape in node.shapes]
-    for child in node.children:
-        _paint(child, color)
 
 
 def _unit(name: str, quaternion: np.ndarray) -> np.ndarray:
