@@ -29,14 +29,13 @@ def read_mesh(path: Path) -> list[tuple[Shape, Color | None]]:
     Raises:
         Unusable: the file is of no use, see `check_mesh`, or trimesh cannot read it.
     """
-    import trimesh
-
     groups: dict[Color | None, list[Any]] = {}
-    for part in _parts(path):
+    for part, color in _parts(path):
         if not np.abs(part.vertices).max() < FARTHEST:
             raise Unusable("it has corners that are nowhere")
-        bare = trimesh.Trimesh(part.vertices, part.faces, process=False)
-        groups.setdefault(_color(part.visual), []).append(bare)
+        groups.setdefault(color, []).append(part)
+    if not groups:
+        raise Unusable("it holds no triangles")
     return [(merged(parts), color) for color, parts in groups.items()]
 
 
@@ -50,20 +49,30 @@ def merged(parts: list[Any]) -> Shape:
     return mesh(smooth.vertices, smooth.faces)
 
 
-def _parts(path: Path) -> list[Any]:
+def _parts(path: Path) -> list[tuple[Any, Color | None]]:
+    """The parts of a mesh file, each in its place and with its colour, and nothing else of it."""
     import trimesh
 
     data = io.BytesIO(check_mesh(path))
     try:
         scene = trimesh.load_scene(data, path.suffix[1:].lower(), resolver=_Package(path), process=False)
-        if path.suffix.lower() == ".dae" and scene.geometry:  # other formats are in metres, or do not say
-            scene = scene.convert_units("meters")
-        parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+        return [_part(scene, node) for node in scene.graph.nodes_geometry if _is_solid(scene, node)]
     except Exception as error:  # each format has its own library, and each library its own errors
         raise Unusable(f"it cannot be read ({type(error).__name__}: {error})") from error
-    if not parts:
-        raise Unusable("it holds no triangles")
-    return parts
+
+
+def _is_solid(scene: Any, node: str) -> bool:
+    return len(getattr(scene.geometry[scene.graph[node][1]], "faces", ())) > 0
+
+
+def _part(scene: Any, node: str) -> tuple[Any, Color | None]:
+    import trimesh
+
+    placement, name = scene.graph[node]
+    part = scene.geometry[name]
+    meter = trimesh.units.unit_conversion(part.units, "meters") if part.units else 1.0
+    bare = trimesh.Trimesh(part.vertices, part.faces, process=False)
+    return bare.apply_transform(placement).apply_scale(meter), _color(part.visual)
 
 
 class _Package:
