@@ -115,13 +115,9 @@ def load_description(
             "com" and "inertia".
         strict: whether everything that would be a warning is an error.
 
-    Raises:
-        RobotError: an unknown name, with the near ones, or a description that is refused.
-        FrameNotFound: there is no such tip.
+    Raises, warns: as `read_urdf`, and:
+        RobotError: an unknown name, with the near ones.
         MissingDependencyError: example-robot-data is not installed.
-
-    Warns:
-        RobotWarning: as `read_urdf`.
     """
     if not isinstance(source, (str, Path)):
         raise InputError(f"expected a name or a path, found {type(source).__name__}", subject="robot")

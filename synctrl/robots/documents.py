@@ -23,6 +23,7 @@ from .urdf.checks import check_bodies, check_tree, inertial_fault
 from .urdf.description import Description
 from .urdf.document import Document, Geometry, Inertial, Joint, Limit, Link, Pose, Shape, upper_triangle
 from .urdf.locks import lock_joints
+from .urdf.names import is_plain
 from .urdf.suspicions import triangle_fault
 from .urdf.writer import to_xml
 
@@ -191,8 +192,9 @@ def _triple(name: str, value: ArrayLike) -> tuple[float, ...]:
 
 
 def _check_name(what: str, name: str) -> None:
-    if not isinstance(name, str) or not name:
-        raise InputError(f"expected a name, found {name!r}", subject=what)
+    if not isinstance(name, str) or not is_plain(name):
+        rule = "1 to 128 letters, digits, '_', '-' or '.', beginning with a letter, a digit or '_'"
+        raise InputError(f"expected {rule}, found {name!r}", subject=what)
 
 
 def _check_meshes(document: Document, file: Path) -> None:

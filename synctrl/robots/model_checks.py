@@ -44,7 +44,7 @@ def check_inertia(robot: str, joint: str, row: np.ndarray) -> None:
     if row[0] <= 0:
         raise RobotError(f"expected a mass above 0 kg, found {row[0]:g}", subject=body, found=row[0])
     lowest, _, highest = principal_moments(row)
-    if lowest < -NO_MOMENT or highest <= NO_MOMENT:
+    if lowest < -NO_MOMENT or highest <= 0:
         raise RobotError(
             f"expected a positive definite inertia about the centre of mass, found a smallest eigenvalue of "
             f"{lowest:g} kg·m^2",

@@ -243,7 +243,7 @@ def _body_fault(joint: Joint, parameters: np.ndarray) -> str | None:
             "inertials={...} gives it one, locked={...} holds the joint"
         )
     lowest, _, highest = principal_moments(parameters)  # not negative, as those of each link are not
-    if highest <= max(NO_MOMENT, 1e-15 * abs(parameters[4:]).max()):
+    if highest <= 1e-15 * abs(parameters[4:]).max():
         moments = f"principal moments from {lowest:g} to {highest:g} kg·m^2"
         return f"{body}: expected a positive definite inertia, found {moments}"
     return None

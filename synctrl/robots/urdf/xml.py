@@ -211,6 +211,10 @@ def parse_xml(file: str, data: bytes, notes: Notes | None = None) -> Element:
 
 
 def _utf8(file: str, data: bytes) -> bytes:
+    if b"\0" in data:
+        line = data.count(b"\n", 0, data.index(b"\0")) + 1
+        found = "a zero character, as in UTF-16"
+        raise RobotError(f"expected text in UTF-8, found {found}", file=file, line=line)
     try:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
