@@ -5,19 +5,26 @@ from __future__ import annotations
 import json
 import os
 import re
+from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import meshes
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from refusals import refused
+from urdf_corpus import GOOD, write
 
-from synctrl.errors import RobotError
-from synctrl.robots.urdf import mesh_files
+from synctrl.errors import RobotError, RobotWarning
+from synctrl.robots.urdf import mesh_files, read_urdf
 from synctrl.robots.urdf.document import Document, Geometry, Link, Shape
 from synctrl.robots.urdf.meshes import find_pictures
 from synctrl.robots.urdf.packages import Packages
+from synctrl.robots.urdf.regular import Unusable
 from synctrl.robots.urdf.report import Notes
+from synctrl.show.mesh_files import read_mesh
 
 CASES = Path(__file__).parent / "cases" / "urdf"
 
@@ -186,7 +193,7 @@ def test_a_pointer_of_git_lfs_is_left_out_with_what_to_do(name, file):
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("none.stl", "No such file"),
+        ("none.stl", "no such file"),
         ("x" * 300 + ".stl", "too long"),
         ("a\0.stl", ""),
         (".", "not a regular file"),
@@ -272,6 +279,81 @@ def test_triangles_are_counted_as_trimesh_builds_them(name, tmp_path):
     solid = meshes.ball(tmp_path / name)
     counted = mesh_files.FORMATS[tmp_path.joinpath(name).suffix](tmp_path.joinpath(name).read_bytes())
     assert counted == len(solid.faces)
+
+
+@given(st.data())
+def test_a_mesh_that_was_damaged_is_shown_or_left_out(data):
+    """Bytes are changed at random, or cut out, or put in twice."""
+    name = data.draw(st.sampled_from(sorted(meshes.WRITTEN)))
+    content = bytearray(meshes.written(name))
+    for _ in range(data.draw(st.integers(1, 4))):
+        start = data.draw(st.integers(0, len(content) - 1))
+        end = data.draw(st.integers(start, min(len(content), start + 40)))
+        content[start:end] = data.draw(st.sampled_from([b"", b"9", b"-", bytes(content[start:end]) * 2]))
+    with TemporaryDirectory() as folder:
+        file = Path(folder, name)
+        file.write_bytes(content)
+        with suppress(Unusable):
+            mesh_files.check_mesh(file)
+        with suppress(Unusable):
+            assert read_mesh(file)
+
+
+# -- whole robots ------------------------------------------------------------------------------------------
+
+
+def test_a_robot_is_loaded_without_the_mesh_that_cannot_be_shown_and_says_so(tmp_path):
+    file = write(tmp_path, GOOD)
+    (tmp_path / "meshes" / "fore.stl").write_text("version https://git-lfs.github.com/spec/v1\n")
+    with pytest.warns(
+        RobotWarning, match=r"left out \(1\): line 30: link 'fore', visual: .*Git-LFS"
+    ) as caught:
+        description = read_urdf(file)
+    assert len(caught) == 1
+    assert [shape.filename for shape in description.document.hidden] == ["meshes/fore.stl"]
+    assert len(description.visual.geometryObjects) == 3
+    with refused(RobotError, "link 'fore', visual", file=str(file), line=30):
+        read_urdf(file, strict=True)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "lost"),
+    [
+        ('scale="1 1 1"', 'scale="1 0 1"', "fore"),
+        ('scale="1 1 1"', 'scale="1 a 1"', "fore"),
+        ('filename="meshes/fore.stl" ', "", "fore"),
+        ('<box size="0.4 0.06 0.05"/>', '<box size="0 0 0"/>', "upper"),
+        ('<capsule radius="0.03" length="0.4"/>', '<capsule radius="0" length="0.4"/>', "upper"),
+        ('<sphere radius="0.04"/>', '<sphere radius="-1"/>', "slide"),
+        ('<sphere radius="0.04"/>', '<sphere radius="nan"/>', "slide"),
+        ('<sphere radius="0.04"/>', "", "slide"),
+        ('<sphere radius="0.04"/>', '<sphere radius="0.04"/><sphere radius="0.04"/>', "slide"),
+        ('<sphere radius="0.04"/>', '<cone radius="0.04"/>', "slide"),
+        ('xyz="0 0 0.05" rpy="0 0 0"', 'xyz="0 0 inf"', "base"),
+        ('rgba="0.9 0.5 0.1 1"', 'rgba="255 128 0 1"', "fore"),
+    ],
+)
+def test_a_shape_or_colour_that_is_none_never_costs_the_robot(old, new, lost, tmp_path):
+    assert GOOD.count(old) == 1
+    file = write(tmp_path, GOOD.replace(old, new))
+    with pytest.warns(RobotWarning):
+        description = read_urdf(file)
+    assert {note.kind for note in description.report} == {"left out"}
+    assert all(f"link '{lost}'" in note.where for note in description.report)
+    assert description.model == read_urdf(write(tmp_path / "good", GOOD)).model
+
+
+@pytest.mark.parametrize("depth", ["", "material"])
+def test_a_texture_of_a_material_is_seen_wherever_the_material_stands(depth, tmp_path):
+    picture(tmp_path / "t.png", (255, 0, 0))
+    textured = '<material name="grey"><texture filename="t.png"/></material>'
+    text = (
+        GOOD.replace('<material name="grey"/>', textured)
+        if depth
+        else GOOD.replace('<material name="grey"><color rgba="0.5 0.5 0.5 1"/></material>', textured)
+    )
+    base = read_urdf(write(tmp_path, text)).visual.geometryObjects[0]
+    np.testing.assert_allclose(base.meshColor, [1, 0, 0, 1])
 
 
 # -- textures of the description ---------------------------------------------------------------------------

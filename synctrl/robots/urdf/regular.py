@@ -51,5 +51,7 @@ def _require(mode: int) -> None:
 
 
 def _reason(error: OSError | ValueError) -> str:
+    if isinstance(error, FileNotFoundError):
+        return "there is no such file"
     words = getattr(error, "strerror", None) or str(error)
     return f"it cannot be read: {words}"
