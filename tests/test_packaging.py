@@ -76,6 +76,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 MODULES = {
     "pin": {"pinocchio"},
     "u-msgpack-python": {"umsgpack"},
+    "pillow": {"PIL"},
     "pycollada": {"collada"},
     "pytest-xdist": {"xdist"},
     "dask": {"distributed"},

@@ -47,6 +47,8 @@ def arms_scene(
         color = None if colors is None else colors[i]
         scene.add_robot(result.names[i], robot.model, robot.visual, q, color)
         scene.add_legend(result.names[i], robot_color(i))
+        if robot.document is not None:
+            scene.add_hidden(result.names[i], (mesh.filename or "" for mesh in robot.document.hidden))
     return scene
 
 

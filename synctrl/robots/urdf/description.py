@@ -11,27 +11,23 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import coal
-import numpy as np
 import pinocchio as pin
 
 from ...checks import boolean, instance
 from ...errors import FrameNotFound, RobotError, near
 from .build import build_model, check_model
 from .checks import check_bodies, check_some_mass, check_tree
-from .document import Document, Geometry, Inertial, Link
+from .document import Document, Inertial
 from .inertials import with_inertials
 from .locks import settle_locks
-from .meshes import find_mesh
+from .meshes import build_visual, find_pictures
 from .names import remark_names
-from .packages import Packages, data_folder
+from .packages import Packages
 from .report import NOTHING, Notes, Report, warn_of
 from .sources import read_source
 from .suspicions import suspect
 from .tips import check_tip, default_tip
 from .xml import quoted
-
-DEFAULT_COLOR = (0.9, 0.9, 0.9, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +138,8 @@ def describe(
     document, held = _settled(document, {} if locked is None else locked, tip, notes)
     model = build_model(document)
     check_model(document, model)
-    visual = _build_visual(document, model, _package_dirs(package_dirs), notes)
+    document = find_pictures(document, Packages(document.file, package_dirs), notes)
+    visual = build_visual(document, model)
     tip = _tip(document, model, tip, held, notes)
     report = notes.report(document.source)
     warn_of(report)
@@ -207,56 +204,3 @@ def existing_file(path: str | Path) -> Path:
         f"; in its folder there are: {', '.join(beside[:5])}" if beside else ""
     )
     raise RobotError(f"expected a URDF file, found {kind}{hint}", file=file)
-
-
-def _package_dirs(package_dirs: Iterable[str | Path]) -> tuple[Path, ...]:
-    folders = (package_dirs,) if isinstance(package_dirs, (str, Path)) else package_dirs
-    instance("package_dirs", folders, Iterable, "folders")
-    folders = tuple(folders)
-    for folder in folders:
-        instance("package_dirs", folder, (str, Path), "folders")
-    stock = data_folder()
-    return (*map(Path, folders), *([stock] if stock else []))
-
-
-# -- shapes ------------------------------------------------------------------------------------------------
-
-
-def _build_visual(
-    document: Document, model: pin.Model, package_dirs: tuple[Path, ...], notes: Notes
-) -> pin.GeometryModel:
-    """All shapes for display, each at its place in the frame of its link."""
-    visual = pin.GeometryModel()
-    for link in document.links:
-        frame_id = model.getFrameId(link.name, pin.BODY)
-        frame = model.frames[frame_id]
-        for k, geometry in enumerate(link.visuals):
-            found = _shape(document, link, geometry, package_dirs, notes)
-            if found is None:
-                continue
-            colored, color = geometry.color is not None, np.array(geometry.color or DEFAULT_COLOR)
-            placement = frame.placement * geometry.origin.se3
-            place = (f"{link.name}_{k}", frame.parentJoint, frame_id, placement)
-            visual.addGeometryObject(pin.GeometryObject(*place, *found, colored, color))
-    return visual
-
-
-def _shape(
-    document: Document, link: Link, geometry: Geometry, package_dirs: tuple[Path, ...], notes: Notes
-) -> tuple[coal.CollisionGeometry, str, np.ndarray] | None:
-    """Coal's geometry, and path and scale of a mesh; None where the mesh is missing."""
-    shape = geometry.shape
-    if shape.kind != "mesh":
-        kinds = {"box": coal.Box, "cylinder": coal.Cylinder, "capsule": coal.Capsule, "sphere": coal.Sphere}
-        return kinds[shape.kind](*shape.size), "", np.ones(3)
-    folder = document.file.parent if document.file else Path.cwd()
-    try:
-        file = find_mesh(shape.filename or "", folder, package_dirs)
-    except RobotError as error:
-        notes.absorb(document.error(str(error), link, line=geometry.line))
-        return None
-    if file is None:
-        missing = f"mesh {quoted(shape.filename or '')} is missing and will not be shown"
-        notes.add("left out", link.title, missing, geometry.line)
-        return None
-    return coal.BVHModelOBBRSS(), str(file), np.array(shape.size)

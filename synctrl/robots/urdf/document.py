@@ -97,22 +97,33 @@ class Shape:
     """A geometric primitive or a mesh.
 
     `size` is (x, y, z) of a box, (radius, length) of a cylinder or capsule, (radius,) of a sphere, all in m,
-    and the scale (x, y, z) of a mesh, whose `filename` is as the file names it.
+    and the scale (x, y, z) of a mesh. A mesh has a `filename`, as the description names it, and the `file`
+    that was found, None if it is not shown.
     """
 
     kind: str
     size: Vector
     filename: str | None = None
+    file: Path | None = None
+
+    @property
+    def hidden(self) -> bool:
+        """Whether it is a mesh that cannot be shown."""
+        return self.kind == "mesh" and self.file is None
 
 
 @dataclass(frozen=True)
 class Geometry:
-    """A shape on a link, for display or collision. `color` is red, green, blue, alpha from 0 to 1."""
+    """A shape on a link, for display or collision.
+
+    `color` is red, green, blue, alpha from 0 to 1; `texture` names a picture whose mean is not known yet.
+    """
 
     shape: Shape
     origin: Pose = Pose()
     color: Vector | None = None
     line: int = 0
+    texture: str | None = None
 
 
 @dataclass(frozen=True)
@@ -226,6 +237,12 @@ class Document:
     def moving_joints(self) -> tuple[Joint, ...]:
         """The joints with a degree of freedom, in the order of the document."""
         return tuple(joint for joint in self.joints if joint.moves)
+
+    @property
+    def hidden(self) -> tuple[Shape, ...]:
+        """Meshes that should be seen, and cannot be shown."""
+        shapes = (visual.shape for link in self.links for visual in link.visuals)
+        return tuple(shape for shape in shapes if shape.hidden)
 
     @property
     def root(self) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from ...checks import instance
-from .regular import read_regular
+from .regular import Unusable, read_regular
 
 MANIFEST = "package.xml"
 
@@ -146,7 +146,7 @@ def _manifest_name(folder: Path) -> str | None:
     """What its package.xml calls a folder: the folder's own name if it does not say; None without one."""
     try:
         data = read_regular(folder / MANIFEST, _MANIFEST_BYTES)
-    except OSError:
+    except Unusable:
         return None
     if b"<!DOCTYPE" in data:  # nobody needs entities here
         return folder.name
