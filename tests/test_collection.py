@@ -14,6 +14,7 @@ from synctrl.errors import MissingDependencyError, RobotError, RobotWarning
 from synctrl.robots import collection
 from synctrl.robots.urdf import xacro as xacro_module
 
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 PLANAR = Path(load_robot("planar2r").document.file).read_text(encoding="utf-8")
 
 
@@ -56,7 +57,7 @@ def test_its_meshes_are_found_in_its_repository(modules: Path) -> None:
     mesh = '<mesh filename="package://arm/part.obj"/>'
     text = PLANAR.replace("</link>", f"<visual><geometry>{mesh}</geometry></visual></link>", 1)
     describe(modules, "arm_description", "URDF_PATH", "arm.urdf", text)
-    (modules.parent.parent / "repository" / "arm" / "part.obj").write_text("v 0 0 0\n", encoding="utf-8")
+    (modules.parent.parent / "repository" / "arm" / "part.obj").write_text(TRIANGLE, encoding="utf-8")
     with warnings.catch_warnings():
         warnings.simplefilter("error", RobotWarning)
         load_robot("robot_descriptions:arm_description")

@@ -12,7 +12,7 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from .packages import Packages
-from .regular import read_regular, reason
+from .regular import Unusable, read_regular
 from .report import Notes
 from .xml import Element, parse_xml, quoted, read_bytes
 
@@ -143,8 +143,8 @@ class _Reader:
             element.refuse(expected, f"{quoted(str(path))} outside of the package")
         try:
             return read_regular(file, MAX_MESH_BYTES)
-        except OSError as error:
-            found = f"{quoted(str(path))}: {reason(error)}"
+        except Unusable as error:
+            found = f"{quoted(str(path))}: {error}"
             raise element.error(f"expected {expected}, found {found}") from error
 
 
