@@ -16,6 +16,7 @@ from ..checks import instance
 from ..errors import InputError, ResultError
 from .result_file import read_result, write_result
 from .result_schema import FORMAT, LAYOUT, check_shape, shapes, unit_of
+from .result_units import array_unit, array_units
 
 __all__ = ["FORMAT", "LAYOUT", "Result", "unit_of"]
 
@@ -112,10 +113,16 @@ class Result:
         return [robot["name"] for robot in self.info["robots"]]
 
     def unit(self, array: str) -> str:
-        """Unit of one of the arrays, or of the outputs."""
-        if array in self.outputs:
-            return str(self.info["outputs"][array]["unit"])
-        return unit_of(array, self.info["task_unit"], self.info["weighted_unit"])
+        """Unit of one of the arrays, or of the outputs; all of them, as in `rad, m`, where joints differ."""
+        return array_unit(self.info, array)
+
+    def units(self, array: str) -> tuple[tuple[str, ...], ...]:
+        """Units of the numbers of one of the arrays, or of the outputs, at one instant.
+
+        `units("tau")[0][2]` is that of joint 3 of robot 1: a row for each robot or pair, and a column for
+        each coordinate, or joint that the robot has. Arrays of other axes have one row and one column.
+        """
+        return array_units(self.info, array)
 
     def decimated(self, every: int) -> Self:
         """The first of every so many logged instants, and the last; `info["decimated"]` says how many.
