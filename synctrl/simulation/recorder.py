@@ -12,6 +12,7 @@ import numpy as np
 from ..checks import printable
 from ..control.controller import Signals
 from ..coupling.cell import Cell
+from ..robots.written import write_robot
 from .account import NOTHING, Account, account_of
 from .advance import Sample
 from .clock import Clock
@@ -217,6 +218,7 @@ def _describe_robots(cell: Cell) -> list[dict[str, Any]]:
             "parameters": list(parameters.names),
             "theta": [float(value) for value in parameters.theta],
             "torque_limits": [float(x) if np.isfinite(x) else None for x in limits[: robot.nv]],
+            **write_robot(robot),
         }
         for name, robot, parameters, limits in zip(
             cell.names, cell.robots, cell.parameters, torque_limits(cell), strict=True

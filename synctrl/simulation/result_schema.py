@@ -73,6 +73,9 @@ _ROBOT = entries(
     },
     {
         "model": label,
+        "urdf": text,
+        "tip": label,
+        "file": label,
         "joint_units": rows(label),
         "torque_limits": rows(optional(above(0, or_equal=True))),
     },
