@@ -11,7 +11,7 @@ import numpy as np
 from ..checks import finite_array, instance
 from ..errors import InputError, SimulationError, UnreachableError
 from ..robots.robot import Robot
-from ..tasks.spaces import CartesianSpace, units_of
+from ..tasks.spaces import CartesianSpace
 from .cell import Cell
 
 SAMPLES = 60
@@ -126,9 +126,9 @@ def _descend(space: Missing, robot: Robot, target: np.ndarray, q: np.ndarray) ->
 
 
 def _unreachable(name: str, robot: Robot, t: float, target: np.ndarray, cell: Cell) -> UnreachableError:
-    units = units_of(cell.space, cell.m)
     wanted = ", ".join(
-        f"{label} = {value:.4g} {unit}" for label, value, unit in zip(cell.labels, target, units, strict=True)
+        f"{label} = {value:.4g} {unit}"
+        for label, value, unit in zip(cell.labels, target, cell.units, strict=True)
     )
     return UnreachableError(
         f"{name} ('{robot.name}') cannot reach its desired position at t = {t:g} s: {wanted}; "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,7 @@ from .colors import ColorLike, hex_color, read_color, within_unit
 from .html import frame, page
 from .meshes import MeshLibrary
 from .nodes import Node, bounding_box, label, pack, paint, scene_commands
-from .rotations import TINY, continuous, towards
+from .rotations import TINY, continuous, towards, unit
 from .shapes import Shape
 from .view import fit_camera, view_commands, viewer_axes
 
@@ -168,7 +169,7 @@ class Scene:
 
     def add_hidden(self, name: str, meshes: Iterable[str]) -> None:
         """A line that says which meshes of a robot cannot be shown; none if all can."""
-        files = list(dict.fromkeys(printable(mesh) for mesh in meshes))
+        files = list(dict.fromkeys(printable(mesh.rpartition("/")[2])[:60] for mesh in meshes))
         if files:
             more = f" and {len(files) - 3} more" if len(files) > 3 else ""
             self._remarks.append(f"Not shown of {name}: {', '.join(files[:3])}{more}")
@@ -225,6 +226,13 @@ class Scene:
             )
         return frame(text, round(positive_number("height", height)))
 
+    def _repr_html_(self) -> str:
+        """The scene in a notebook; where it is too large, what to do instead."""
+        try:
+            return self.html()
+        except InputError as error:
+            return f"<p>{escape(str(error))}</p>"
+
     # -- checks and common work ---------------------------------------------------------------------------
 
     def _view(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -256,7 +264,7 @@ class Scene:
     ) -> None:
         node = Node(label(kind, name), scale=scale)
         node.position = self._series(f"{name}: position", position, 3)
-        node.quaternion = _unit(name, self._series(f"{name}: quaternion", quaternion, 4))
+        node.quaternion = unit(name, self._series(f"{name}: quaternion", quaternion, 4))
         node.rgb = self._colors(name, color)
         node.shapes = [solid]
         paint(node, read_color(name, color if node.rgb is None else node.rgb[0]))
@@ -287,10 +295,3 @@ class Scene:
         if isinstance(color, str) or np.ndim(color) != 2:
             return None
         return within_unit(name, self._series(f"{name}: color", color, 3))
-
-
-def _unit(name: str, quaternion: np.ndarray) -> np.ndarray:
-    norms = np.linalg.norm(quaternion, axis=1, keepdims=True)
-    if norms.min() < TINY:
-        raise InputError(f"{name}: quaternion: expected a rotation, found one of length {norms.min():g}")
-    return continuous(quaternion / norms)
