@@ -16,7 +16,7 @@ from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
 from ..coupling.reachability import reach
-from ..robots.robot import load_robot
+from ..robots.catalog import load_robot
 from ..simulation.simulate import Experiment
 from ..tasks.redundancy import Redundancy
 from ..tasks.spaces import CartesianSpace

@@ -15,7 +15,8 @@ from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
 from ..coupling.reachability import reach
-from ..robots.robot import Robot, load_robot
+from ..robots.catalog import load_robot
+from ..robots.robot import Robot
 from ..simulation.simulate import Experiment
 from ..tasks.pose import PoseSpace
 from ..tasks.poses import Attached, AxisRotation, PoseTrajectory

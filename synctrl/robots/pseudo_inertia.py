@@ -46,6 +46,10 @@ def dual(gradient: np.ndarray) -> np.ndarray:
     return (gradient @ _D_ROWS).reshape(*gradient.shape[:-1], 4, 4)
 
 
+#: kg·m^2, that of 1 mg at 1 mm: what is smaller counts as no moment, whatever its sign
+NO_MOMENT = 1e-12
+
+
 def principal_moments(theta: np.ndarray) -> np.ndarray:
     """Moments of inertia of one body about its centre of mass, (3,), ascending, of its parameters, (10,)."""
     m, h = theta[0], theta[1:4]
