@@ -11,11 +11,11 @@ import pytest
 from cells import SMALL_GAINS, small_cell
 from machines import random_robot
 from seams.degrees import Degrees
-from sliders import SCARA, load, pair
+from sliders import SCARA, load, pair, urdf
 from test_animation import ends, node
 
 from synctrl import Cell, Coupling, Experiment, Hold, JointSpace, Member, Result, Robot, load_robot
-from synctrl.errors import InputError
+from synctrl.errors import InputError, RobotWarning
 from synctrl.experiments import mobile_robot
 from synctrl.robots.written import read_robot, write_robot
 from synctrl.show import scene_of
@@ -148,3 +148,20 @@ def test_a_notebook_shows_the_scene_or_says_that_it_is_too_large(star, monkeypat
     assert scene._repr_html_().startswith("<iframe sandbox=")
     monkeypatch.setattr("synctrl.show.scene.NOTEBOOK_LIMIT", 10)
     assert "use write()" in scene._repr_html_() and "<iframe" not in scene._repr_html_()
+
+
+def test_meshes_beside_a_file_of_ones_own_are_found_again_from_elsewhere(tmp_path, monkeypatch):
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.box((0.3, 0.1, 0.1)).export(tmp_path / "box.stl")
+    text = urdf("boxes", SCARA).replace('<box size="0.3 0.06 0.06"/>', '<mesh filename="box.stl"/>')
+    (tmp_path / "boxes.urdf").write_text(text, encoding="utf-8")
+    robot = load_robot(tmp_path / "boxes.urdf")
+    run = pair((robot, robot)).simulate(0.02, dt=2e-3)
+    (tmp_path / "other").mkdir()
+    monkeypatch.chdir(tmp_path / "other")
+    loaded = reloaded(run, tmp_path)
+    assert loaded.info["robots"][0]["file"] == str(tmp_path / "boxes.urdf")
+    assert scene_of(loaded).page() == scene_of(run).page()
+    (tmp_path / "box.stl").unlink()
+    with pytest.warns(RobotWarning, match=r"box\.stl"):
+        assert "Not shown of robot 1: box.stl" in scene_of(loaded).page()
