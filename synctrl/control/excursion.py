@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..coupling.cell import Cell
-from ..coupling.reachability import reach
 from ..errors import InputError
+from ..tasks.inverse_kinematics import reach
 
 #: instants of the path, states around it, and how far these are from it, rad (or m)
 POINTS, AROUND, APART = 21, 60, 0.3

@@ -15,9 +15,9 @@ import numpy as np
 from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
-from ..coupling.reachability import reach
 from ..robots.robot import load_robot
 from ..simulation.simulate import Experiment
+from ..tasks.inverse_kinematics import reach
 from ..tasks.redundancy import Redundancy
 from ..tasks.spaces import CartesianSpace
 from ..tasks.trajectories import Circle

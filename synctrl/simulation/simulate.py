@@ -191,6 +191,7 @@ class Experiment:
         info["plant"], info["saturate"] = plant, bool(self.saturate)
         info["title"] = self.title or self.cell.name
         info["control_period"] = control_period
+        info["start"] = list(self.cell.starts)
         info["disturbances"] = [_describe(d) for d in self.disturbances]
         info["payloads"] = [payload.as_dict() for payload in self.payloads]
         info["events"] = loop.events_within(clock.end - TIE * dt)
