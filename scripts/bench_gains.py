@@ -1,6 +1,6 @@
 """Suggested gains on every arm of the catalogue, in joint, position and pose space, with and without a load.
 
-    python scripts/bench_gains.py [--arms NAME ...] [--naive]
+    python scripts/bench_gains.py [--arms NAME ...] [--naive] [--short]
 
 A run is a success if it is completed, its error after 3 s is below 5 % of the motion, and no torque is larger
 than 3 times the largest of exact computed torque. Prints a row per arm and space, and the sums.
@@ -169,12 +169,12 @@ def exact_torque(what: Cell, load: float) -> float:
     return max(float(np.abs(robot.inverse_dynamics(*state)).max()) for state in zip(*path, strict=True))
 
 
-def bench(arms: list[str], naive: bool, loads: tuple[float, ...], periods: tuple) -> Iterator[tuple]:
-    """(arm, space, n, period, load, outcome) of every run."""
+def bench(arms: list[str], naive: bool, loads: tuple, periods: tuple, sizes: tuple) -> Iterator[tuple]:
+    """(arm, space, n, period, load, outcome) of every run, with pairs and rings of so many robots."""
     for name in arms:
         for space in SPACES:
             what = task(name, space)
-            for n in (2, 3) if what else ():
+            for n in sizes if what else ():
                 one = cell(what, n)
                 for period in periods:
                     gains = NAIVE if naive else Gains.suggest(one, BANDWIDTH, period=period)
@@ -186,10 +186,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--arms", nargs="*", default=[n for n in catalog_names() if n != "wheel"])
     parser.add_argument("--naive", action="store_true", help="the same gains for all arms")
+    parser.add_argument("--short", action="store_true", help="pairs only, in continuous control and at 2 ms")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
     rows = []
-    for row in bench(arguments.arms, arguments.naive, (0.0, LOAD), PERIODS):
+    extent = ((None, 2e-3), (2,)) if arguments.short else (PERIODS, (2, 3))
+    for row in bench(arguments.arms, arguments.naive, (0.0, LOAD), *extent):
         rows.append(row)
         name, space, n, period, load, outcome = row
         words = "good" if outcome.good else "BAD "
