@@ -10,10 +10,11 @@ from .coupling.weights import SmoothWeights
 from .errors import SynctrlError
 from .renamed import serve_old_names
 from .robots.base_parameters import BaseParameters
+from .robots.catalog import load_robot
 from .robots.friction import Friction
 from .robots.friction_parameters import FrictionParameters
 from .robots.parameters import FullParameters, LinearParameters
-from .robots.robot import Robot, load_robot
+from .robots.robot import Robot
 from .simulation.disturbances import Disturbance
 from .simulation.mujoco_model import mujoco_model
 from .simulation.payloads import Payload

@@ -41,6 +41,7 @@ class SynctrlError(Portable, Exception):
         file: the file or folder concerned, or None.
         line: of that file, counted from 1, or None.
         result: a `Result` with what a run had computed until then; None if the error did not stop a run.
+        problem: the message without what it begins with.
     """
 
     subject: str | None = None
@@ -48,6 +49,7 @@ class SynctrlError(Portable, Exception):
     file: str | None = None
     line: int | None = None
     result: Any = None
+    problem: str = ""
 
     def __init__(
         self,
@@ -61,6 +63,7 @@ class SynctrlError(Portable, Exception):
         file = None if file is None else str(file)
         data = {"subject": subject, "found": found, "file": file, "line": line or None}
         vars(self).update({name: value for name, value in data.items() if value is not None})
+        self.problem = message
         super().__init__(self._whole(message))
 
     def _whole(self, message: str) -> str:

@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from ..robots.robot import load_robot
+from ..robots.catalog import load_robot
 from ..simulation.held_joints import HeldJointsPlant, Pid
 from ..simulation.simulate import Experiment
 from .a460_pair import BASES, a460_pair

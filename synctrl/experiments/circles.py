@@ -15,7 +15,7 @@ import numpy as np
 from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
-from ..robots.robot import load_robot
+from ..robots.catalog import load_robot
 from ..simulation.simulate import Experiment
 from ..tasks.inverse_kinematics import reach
 from ..tasks.redundancy import Redundancy

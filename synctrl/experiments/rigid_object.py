@@ -15,8 +15,8 @@ import numpy as np
 from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
 from ..coupling.synchronization import SynchronizationFunction
+from ..robots.catalog import load_robot
 from ..robots.parameters import planar_two_link_parameters, theta_50
-from ..robots.robot import load_robot
 from ..simulation.disturbances import Disturbance
 from ..simulation.simulate import Experiment
 from ..tasks.inverse_kinematics import inverse_kinematics

@@ -15,7 +15,7 @@ from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
 from ..errors import InputError
 from ..renamed import names_elsewhere
-from ..robots.robot import load_robot
+from ..robots.catalog import load_robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from ..tasks.trajectories import Cubic

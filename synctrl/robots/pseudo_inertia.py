@@ -46,6 +46,10 @@ def dual(gradient: np.ndarray) -> np.ndarray:
     return (gradient @ _D_ROWS).reshape(*gradient.shape[:-1], 4, 4)
 
 
+#: kg·m^2, that of 1 mg at 1 mm: what is smaller counts as no moment, whatever its sign
+NO_MOMENT = 1e-12
+
+
 def pullback(theta: np.ndarray) -> np.ndarray:
     """How far inertial parameters can well be from theta, squared: tr(D_k P D_k P), (..., 10 bodies).
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import pinocchio as pin
@@ -12,10 +11,11 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance, per_joint
 from ..errors import FrameNotFound, InputError
-from .catalog import load_description
 from .model_checks import check_inertia, check_joints, check_numbering
 from .per_thread import PerThread
 from .urdf.document import Document, Pose
+from .urdf.inertials import with_bodies
+from .urdf.report import NOTHING, Report
 
 _WORLD_AXES = pin.LOCAL_WORLD_ALIGNED
 _regressor = pin.computeJointTorqueRegressor
@@ -36,6 +36,7 @@ class Robot:
         visual: shapes for display, or None.
         name: what error messages and legends call it.
         document: the URDF that describes it, base and all; None if there is none.
+        report: what was left out, assumed or held when its description was read, and what is suspicious.
 
     Raises:
         FrameNotFound: `tip` is not a frame of the model.
@@ -51,12 +52,14 @@ class Robot:
         visual: pin.GeometryModel | None = None,
         name: str | None = None,
         document: Document | None = None,
+        report: Report = NOTHING,
     ):
         instance("model", model, pin.Model, "a Pinocchio model, for example from load_robot")
         self.model = model
         self.name = name or model.name
         self.visual = visual
         self.document = document
+        self.report = report
         check_joints(self.name, model)
         check_numbering(self.name, model)
         self.tip, self.tip_id = tip, self._frame_id(tip)
@@ -93,11 +96,11 @@ class Robot:
                 frame.placement = base * frame.placement
         document = None if self.document is None else self.document.placed(Pose(tuple(shift), tuple(angles)))
         visual = _moved(self.visual, base)
-        return type(self)(model, self.tip, visual=visual, name=name or self.name, document=document)
+        return self._with(model, visual=visual, name=name or self.name, document=document)
 
     def with_tip(self, tip: str) -> Self:
         """This robot controlled at another frame."""
-        return type(self)(self.model, tip, visual=self.visual, name=self.name, document=self.document)
+        return self._with(self.model, tip)
 
     def with_parameters(self, pi: ArrayLike) -> Self:
         """This robot with other true inertial parameters.
@@ -113,7 +116,9 @@ class Robot:
         for joint, row in enumerate(rows, start=1):
             check_inertia(self.name, self.joint_names[joint - 1], row)
             model.inertias[joint] = pin.Inertia.FromDynamicParameters(np.array(row))
-        return type(self)(model, self.tip, visual=self.visual, name=self.name)
+        rows_by_joint = dict(zip(self.joint_names, rows, strict=True))
+        document = None if self.document is None else with_bodies(self.document, rows_by_joint)
+        return self._with(model, document=document)
 
     def with_armature(self, armature: ArrayLike) -> Self:
         """This robot with rotors that turn with its joints: a diagonal added to M.
@@ -129,7 +134,7 @@ class Robot:
             raise InputError(f"expected at least 0 kg·m^2, found {values.min():g}", subject="armature")
         model = pin.Model(self.model)
         model.armature = values.copy()
-        return type(self)(model, self.tip, visual=self.visual, name=self.name, document=self.document)
+        return self._with(model)
 
     # -- what it is ---------------------------------------------------------------------------------------
 
@@ -257,31 +262,18 @@ class Robot:
             raise FrameNotFound(self.name, frame, [f.name for f in self.model.frames])
         return int(self.model.getFrameId(frame))
 
+    def _with(self, model: pin.Model, tip: str | None = None, **changes: Any) -> Self:
+        """A robot with this model, and with what else it has but for the changes."""
+        make, (_, own) = self.__reduce__()
+        return make(model, own if tip is None else tip, **changes)
+
     def __reduce__(self) -> tuple:
         """Copies and other processes make the scratch memory anew."""
-        parts = partial(type(self), visual=self.visual, name=self.name, document=self.document)
-        return parts, (self.model, self.tip)
+        own = partial(type(self), visual=self.visual, name=self.name)
+        return partial(own, document=self.document, report=self.report), (self.model, self.tip)
 
     def __repr__(self) -> str:
         return f"Robot('{self.name}', {self.nv} joints, tip '{self.tip}')"
-
-
-def load_robot(name_or_path: str | Path, tip: str | None = None) -> Robot:
-    """A robot from the catalogue, or from a URDF file.
-
-    Args:
-        name_or_path: a catalogue name such as "a460", or the path of a URDF file.
-        tip: frame to control in Cartesian space; by default the catalogue's, or the last link's.
-
-    Raises:
-        RobotError: no such file or name, or a description that is refused, with the reason.
-        FrameNotFound: no such frame.
-    """
-    if not isinstance(name_or_path, (str, Path)):
-        raise InputError(f"expected a name or a path, found {type(name_or_path).__name__}", subject="robot")
-    found = load_description(name_or_path)
-    tip = found.tip if tip is None else tip
-    return Robot(found.model, tip, visual=found.visual, name=found.name, document=found.document)
 
 
 def _moved(visual: pin.GeometryModel | None, base: pin.SE3) -> pin.GeometryModel | None:
