@@ -158,7 +158,7 @@ def run(what: Cell, gains: Gains, period: float | None, load: float, engine: str
 
 def _common(motion: np.ndarray, what: Cell) -> np.ndarray:
     """For every coordinate the largest motion of its unit: one that hardly moves is not judged alone."""
-    units = np.array(getattr(what.space, "units", (what.space.unit,) * what.m))
+    units = np.array(what.units)
     return np.array([motion[units == unit].max() for unit in units])
 
 

@@ -139,7 +139,7 @@ def test_every_robot_stands_with_its_desired_path(planar, pair):
 
 
 def test_runs_that_cannot_be_shown_are_refused(planar, pair):
-    with pytest.raises(InputError, match="expected tips along x and y, found joint 1"):
+    with pytest.raises(InputError, match="expected tips along x and y, found joint1"):
         planar_scene(pair)
     with pytest.raises(InputError, match="expected two robots in joint space"):
         payload_pair_scene(planar)

@@ -54,10 +54,10 @@ def cell_with(trajectory, space=None) -> Cell:
 
 
 WRONG: dict[str, tuple[Callable, Callable, str]] = {
-    "sign": (lambda t: -velocity(t), acceleration, "velocity along joint 1"),
+    "sign": (lambda t: -velocity(t), acceleration, "velocity along joint1"),
     "degrees": (velocity, lambda t: np.rad2deg(acceleration(t)), "acceleration along joint"),
-    "one coordinate": (lambda t: velocity(t) * [1, 1.05], acceleration, "velocity along joint 2"),
-    "left out": (velocity, lambda t: np.zeros(2), "acceleration along joint 1"),
+    "one coordinate": (lambda t: velocity(t) * [1, 1.05], acceleration, "velocity along joint2"),
+    "left out": (velocity, lambda t: np.zeros(2), "acceleration along joint1"),
 }
 
 

@@ -15,9 +15,10 @@ from ..errors import InputError, UnreachableError
 from ..robots.friction import Friction
 from ..robots.parameters import Parameters
 from ..robots.robot import Robot
+from ..robots.units import joined
 from ..tasks.inverse_kinematics import start_in
 from ..tasks.padding import padded
-from ..tasks.spaces import JointSpace, Space
+from ..tasks.spaces import JointSpace, Space, units_of
 from ..tasks.trajectories import Motion, Trajectory
 from .coupling import Coupling
 from .desired import desired_motion, desired_weights
@@ -102,7 +103,7 @@ class Cell:
     Attributes:
         members, coupling, space, name: as given.
         robots, names: those of the members.
-        labels: names of the m task coordinates, as the space has them.
+        labels, units: names and units of the m task coordinates, as the space has them.
         task: the space bound to these robots, see `BoundSpace`; it is asked at every instant of a run.
         parameters: what is adapted of every robot, see `Parameters`.
         theta: the true values of these, which the controller does not know, (n, P).
@@ -139,6 +140,7 @@ class Cell:
         check_names(name, self.names)
         check_space(self.space)
         self.labels = self.space.labels(self.robots)
+        self.units = units_of(self.space, self.robots)
         self.task = self.space.bind(self.robots)
         self._check_members()
         self._set_parameters()
@@ -163,10 +165,20 @@ class Cell:
         return max(robot.nv for robot in self.robots)
 
     @property
+    def unit(self) -> str:
+        """Unit of the task coordinates; those of all coordinates where they differ."""
+        return joined(self.units)
+
+    @property
     def weighted_unit(self) -> str:
-        """Unit of c e, and so of the synchronization errors."""
-        unit = self.coupling.unit
-        return {"": self.space.unit, self.space.unit: f"{unit}²"}.get(unit, f"{unit}·{self.space.unit}")
+        """Unit of c e, and so of the synchronization errors; those of all coordinates where they differ."""
+        return joined(self.weighted_units)
+
+    @property
+    def weighted_units(self) -> tuple[str, ...]:
+        """Unit of each of the m coordinates of c e."""
+        c = self.coupling.unit
+        return tuple({"": unit, unit: f"{c}²"}.get(c, f"{c}·{unit}") for unit in self.units)
 
     @property
     def breaks(self) -> tuple[float, ...]:

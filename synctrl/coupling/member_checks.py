@@ -38,7 +38,12 @@ def check_labels(cell: Any) -> None:
     Raises:
         InputError: a name or unit that is not a text of one line, or two coordinates of one name.
     """
-    label("space: unit", cell.space.unit)
+    for unit in cell.units:
+        label("space: unit", unit)
+    if len(cell.units) != cell.m:
+        raise InputError(
+            f"expected one for each of {cell.m} coordinates, found {len(cell.units)}", subject="space: units"
+        )
     label("coupling: name", cell.coupling.name)
     label("coupling: unit", cell.coupling.unit)
     for axis in cell.labels:

@@ -10,7 +10,6 @@ import numpy as np
 from ..checks import finite_array
 from ..errors import InputError, SimulationError, TrajectoryError
 from ..tasks.derivatives import Misfit, difference, find_misfit_in_motion, spread_windows
-from ..tasks.spaces import units_of
 from ..tasks.trajectories import MOTION_PARTS, Motion
 from .cell import Cell
 
@@ -39,7 +38,7 @@ def check_motions(cell: Cell, times: np.ndarray) -> None:
 
 def _check_motion(cell: Cell, robot: int, start: float, stop: float, count: int) -> None:
     windows = spread_windows(start, stop, cell.members[robot].trajectory.breaks, count)
-    groups = _groups(units_of(cell.space, cell.m))
+    groups = _groups(cell.units)
     way = getattr(cell.space, "displacement", difference)
     found = find_misfit_in_motion(lambda t: _motion(cell, robot, t), windows, groups, way)
     if found is not None:
@@ -66,7 +65,7 @@ def _motion(cell: Cell, robot: int, times: np.ndarray) -> Motion:
 
 def _error(cell: Cell, name: str, order: int, misfit: Misfit) -> TrajectoryError:
     label = cell.labels[misfit.coordinate]
-    unit = units_of(cell.space, cell.m)[misfit.coordinate]
+    unit = cell.units[misfit.coordinate]
     per = ("/s", "/s^2")[order - 1]
     function, derivative = MOTION_PARTS[order - 1 : order + 1]
     return TrajectoryError(

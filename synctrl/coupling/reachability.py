@@ -14,7 +14,6 @@ from ..tasks.inverse_kinematics import Missing as Missing
 from ..tasks.inverse_kinematics import find_anywhere
 from ..tasks.inverse_kinematics import inverse_kinematics as inverse_kinematics
 from ..tasks.inverse_kinematics import reach as reach
-from ..tasks.spaces import units_of
 from .cell import Cell
 
 SAMPLES = 60
@@ -50,9 +49,9 @@ def _follow(cell: Cell, i: int, times: np.ndarray) -> None:
 
 
 def _unreachable(name: str, robot: Robot, t: float, target: np.ndarray, cell: Cell) -> UnreachableError:
-    units = units_of(cell.space, cell.m)
     wanted = ", ".join(
-        f"{label} = {value:.4g} {unit}" for label, value, unit in zip(cell.labels, target, units, strict=True)
+        f"{label} = {value:.4g} {unit}"
+        for label, value, unit in zip(cell.labels, target, cell.units, strict=True)
     )
     return UnreachableError(
         f"{name} ('{robot.name}') cannot reach its desired position at t = {t:g} s: {wanted}; "

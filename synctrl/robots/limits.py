@@ -20,14 +20,12 @@ class JointLimits:
         lower, upper: range of the positions, (nv,), rad or m; infinite for joints that turn without end.
         velocity: largest speed, (nv,), rad/s or m/s.
         torque: largest torque, (nv,), N·m or N.
-        turns: which joints turn, (nv,); the others slide.
     """
 
     lower: np.ndarray
     upper: np.ndarray
     velocity: np.ndarray
     torque: np.ndarray
-    turns: np.ndarray
 
 
 def joint_limits(robot: Robot) -> JointLimits:
@@ -38,12 +36,8 @@ def joint_limits(robot: Robot) -> JointLimits:
         if joint.nq == 1:  # a joint that turns without end has two numbers, and no range
             lower[joint.idx_v] = model.lowerPositionLimit[joint.idx_q]
             upper[joint.idx_v] = model.upperPositionLimit[joint.idx_q]
-    limits = lower, upper, np.array(model.velocityLimit), np.array(model.effortLimit)
-    turns = np.array([not joint.shortname().startswith("JointModelP") for joint in model.joints[1:]])
-    lower, upper, velocity, torque = (
-        np.where(np.abs(limit) < UNLIMITED, limit, _infinite(limit)) for limit in limits
-    )
-    return JointLimits(lower, upper, velocity, torque, turns)
+    limits = (lower, upper, np.array(model.velocityLimit), np.array(model.effortLimit))
+    return JointLimits(*(np.where(np.abs(limit) < UNLIMITED, limit, _infinite(limit)) for limit in limits))
 
 
 def _infinite(limit: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from ..checks import finite_array, instance, per_joint
 from ..errors import FrameNotFound, InputError
 from .model_checks import check_inertia, check_joints, check_numbering
 from .per_thread import PerThread
+from .units import joint_units
 from .urdf.document import Document, Pose
 from .urdf.inertials import with_bodies
 from .urdf.report import NOTHING, Report
@@ -24,8 +25,8 @@ _regressor = pin.computeJointTorqueRegressor
 class Robot:
     """A fixed-base robot with nv joints and one tip frame, placed in the world.
 
-    Joint positions q, (nv,), are angles in rad (or m for a sliding joint), also for joints that turn without
-    end, which Pinocchio stores as cosine and sine. Everything Cartesian is in world axes.
+    Joint positions q, (nv,), are angles in rad (or m for a sliding joint, see `joint_units`), also for joints
+    that turn without end, which Pinocchio stores as cosine and sine. Everything Cartesian is in world axes.
 
     The model is never changed after construction, and every thread that uses a Robot has scratch memory of
     its own: threads may share one.
@@ -65,6 +66,7 @@ class Robot:
         self.tip, self.tip_id = tip, self._frame_id(tip)
         self.nv: int = model.nv
         self.joint_names: tuple[str, ...] = tuple(model.names)[1:]
+        self.joint_units: tuple[str, ...] = joint_units(model)
         self.body_count: int = model.njoints - 1
         self._data = PerThread(model.createData)
         self._weightless = pin.Model(model)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -212,6 +213,13 @@ class Scene:
                 f"{NOTEBOOK_LIMIT / 1e6:.0f} MB; use write() and link to the file"
             )
         return frame(text, round(positive_number("height", height)))
+
+    def _repr_html_(self) -> str:
+        """The scene in a notebook; where it is too large, what to do instead."""
+        try:
+            return self.html()
+        except InputError as error:
+            return f"<p>{escape(str(error))}</p>"
 
     # -- checks and common work ---------------------------------------------------------------------------
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..coupling.cell import Cell
 from ..robots.limits import joint_limits
+from ..robots.units import unit_for
 from .damping import spans
 
 if TYPE_CHECKING:
@@ -28,21 +29,22 @@ def limit_report(
     Returns:
         One entry per interval: `robot` and `joint`, counted from 0; `kind`: "position", "velocity" or
         "torque"; `start`, `stop`: its first and last logged instant, s; `limit`: the one that was left; and
-        `reached`: what was farthest outside, in the unit of the kind. A torque is what the controller
-        commands: with saturation the plant got the limit instead.
+        `reached`: what was farthest outside; `unit`: that of both. A torque is what the controller commands:
+        with saturation the plant got the limit instead.
     """
     found = []
     for i, robot in enumerate(cell.robots):
         limits = joint_limits(robot)
         watched = (
-            ("position", q, limits.lower, limits.upper),
-            ("velocity", v, -limits.velocity, limits.velocity),
-            ("torque", tau, -limits.torque, limits.torque),
+            ("position", "rad", q, limits.lower, limits.upper),
+            ("velocity", "rad/s", v, -limits.velocity, limits.velocity),
+            ("torque", "N·m", tau, -limits.torque, limits.torque),
         )
-        for kind, values, lower, upper in watched:
-            for joint in range(robot.nv):
+        for kind, turning, values, lower, upper in watched:
+            for joint, unit in enumerate(robot.joint_units):
+                about = {"robot": i, "joint": joint, "kind": kind, "unit": unit_for(turning, unit)}
                 for entry in _outside(t, values[:, i, joint], lower[joint], upper[joint]):
-                    found.append({"robot": i, "joint": joint, "kind": kind, **entry})
+                    found.append({**about, **entry})
     return sorted(found, key=lambda entry: (entry["start"], entry["robot"], entry["joint"], entry["kind"]))
 
 

@@ -11,6 +11,8 @@ import numpy as np
 
 from ..checks import printable
 from ..control.controller import Signals
+from ..coupling.cell import Cell
+from ..robots.written import write_robot
 from .account import NOTHING, Account, account_of
 from .advance import Sample
 from .clock import Clock
@@ -18,7 +20,8 @@ from .closed_loop import ClosedLoop
 from .damping import DampingLog
 from .limits import limit_report, torque_limits
 from .memory import check_fits
-from .result import LAYOUT, Result, unit_of
+from .result import LAYOUT, Result
+from .result_units import array_unit
 from .saturation import APPLIED, applied_output, saturation_report
 from .state import State
 
@@ -182,25 +185,14 @@ def sizes(loop: ClosedLoop) -> dict[str, int]:
 def describe(loop: ClosedLoop) -> dict[str, Any]:
     """Names, units, gains and options, as plain data."""
     cell, controller = loop.cell, loop.controller
-    return {
+    about = {
         "title": cell.name,
-        "robots": [
-            {
-                "name": name,
-                "model": robot.name,
-                "joints": list(robot.joint_names),
-                "parameters": list(parameters.names),
-                "theta": [float(value) for value in parameters.theta],
-                "torque_limits": [float(x) if np.isfinite(x) else None for x in limits[: robot.nv]],
-            }
-            for name, robot, parameters, limits in zip(
-                cell.names, cell.robots, cell.parameters, torque_limits(cell), strict=True
-            )
-        ],
+        "robots": _describe_robots(cell),
         "axes": list(cell.labels),
-        "task_unit": cell.space.unit,
+        "task_unit": cell.unit,
+        "axis_units": list(cell.units),
         "weighted_unit": cell.weighted_unit,
-        "units": {name: unit_of(name, cell.space.unit, cell.weighted_unit) for name in LAYOUT},
+        "weighted_units": list(cell.weighted_units),
         "coupling": cell.coupling.name,
         "pairs": cell.coupling.edges.tolist(),
         "signs": cell.coupling.signs.tolist(),
@@ -213,6 +205,25 @@ def describe(loop: ClosedLoop) -> dict[str, Any]:
         "k_r_space": controller.k_r_space,
         "versions": versions(),
     }
+    return {**about, "units": {name: array_unit(about, name) for name in LAYOUT}}
+
+
+def _describe_robots(cell: Cell) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": name,
+            "model": robot.name,
+            "joints": list(robot.joint_names),
+            "joint_units": list(robot.joint_units),
+            "parameters": list(parameters.names),
+            "theta": [float(value) for value in parameters.theta],
+            "torque_limits": [float(x) if np.isfinite(x) else None for x in limits[: robot.nv]],
+            **write_robot(robot),
+        }
+        for name, robot, parameters, limits in zip(
+            cell.names, cell.robots, cell.parameters, torque_limits(cell), strict=True
+        )
+    ]
 
 
 def versions() -> dict[str, str]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ResultError
+from ..robots.units import TURNS, unit_for
 from .schema import (
     above,
     boolean,
@@ -31,7 +32,8 @@ FORMATS = ("synctrl result 1", FORMAT)
 #: largest time in a log, s, about 30,000 years: times beyond it are damage
 LATEST = 1e12
 
-#: array -> (dimensions, unit); "task" stands for the unit of the task, "weighted" for that of c e
+#: array -> (dimensions, unit); "task" stands for the unit of the task, "weighted" for that of c e; what has
+#: an axis "joint" has the unit that it has for a joint that turns
 LAYOUT: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
     {
         "t": (("time",), "s"),
@@ -51,9 +53,9 @@ LAYOUT: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
 )
 
 
-def unit_of(array: str, task: str, weighted: str) -> str:
-    """Unit of an array of `LAYOUT`, given those of the task and of c e."""
-    return LAYOUT[array][1].replace("task", task).replace("weighted", weighted)
+def unit_of(array: str, task: str, weighted: str, joint: str = TURNS) -> str:
+    """Unit of an array of `LAYOUT`, given those of the task and of c e, and of the position of the joint."""
+    return unit_for(LAYOUT[array][1].replace("task", task).replace("weighted", weighted), joint)
 
 
 # -- info -------------------------------------------------------------------------------------------------
@@ -69,19 +71,29 @@ _ROBOT = entries(
         "parameters": rows(label),
         "theta": rows(number),
     },
-    {"model": label, "torque_limits": rows(optional(above(0, or_equal=True)))},
+    {
+        "model": label,
+        "urdf": text,
+        "tip": label,
+        "file": label,
+        "joint_units": rows(label),
+        "torque_limits": rows(optional(above(0, or_equal=True))),
+    },
 )
 _WINDOW = {"robot": whole(below="robot"), "start": number}
 _DISTURBANCE = entries({**_WINDOW, "torque": numbers, "stop": number})
 _PAYLOAD = entries({**_WINDOW, "stop": optional(number), "mass": number})
-_LEFT_LIMIT = entries({**_WINDOW, "stop": number, "joint": whole(below="joint"), "kind": label})
+_LEFT_LIMIT = entries(
+    {**_WINDOW, "stop": number, "joint": whole(below="joint"), "kind": label}, {"unit": label}
+)
 _CUT_OFF = entries(
     {
         "robot": whole(below="robot"),
         "joint": whole(below="joint"),
         **{name: above(0, or_equal=True) for name in ("limit", "share", "largest")},
         "theta_hat": rows(above(0, or_equal=True), least=2),
-    }
+    },
+    {"unit": label},
 )
 _STEP = {
     "estimate": above(0, or_equal=True),
@@ -118,6 +130,8 @@ INFO = entries(
     },
     {
         "units": each(label),
+        "axis_units": rows(label, "axis"),
+        "weighted_units": rows(label, "axis"),
         "coupling": label,
         "signs": rows(rows(number), "pair"),
         "outputs": each(entries({"unit": label, "axes": rows(label, least=1)})),
@@ -171,12 +185,13 @@ def _check_robots(robots: list[dict[str, Any]], sizes: Mapping[str, int]) -> Non
         raise ResultError("expected another name for each robot, found one twice", subject="info, robots")
     for k, robot in enumerate(robots):
         found = {name: len(robot[name]) for name in ("joints", "parameters", "theta")}
-        limits = len(robot.get("torque_limits", robot["joints"]))
+        found |= {name: len(robot[name]) for name in ("torque_limits", "joint_units") if name in robot}
         fits = found["joints"] <= sizes["joint"] and found["parameters"] <= sizes["parameter"]
-        if not fits or found["theta"] != found["parameters"] or limits != found["joints"]:
+        per_joint = {found.get(name, found["joints"]) for name in ("torque_limits", "joint_units")}
+        if not fits or found["theta"] != found["parameters"] or per_joint != {found["joints"]}:
             raise ResultError(
-                "expected as many theta as parameters and torque_limits as joints, up to "
-                f"{sizes['parameter']} and {sizes['joint']}, found {found} and {limits} torque_limits",
+                "expected as many theta as parameters, and torque_limits and joint_units as joints, up to "
+                f"{sizes['parameter']} and {sizes['joint']}, found {found}",
                 subject=f"info, robots[{k}]",
             )
 

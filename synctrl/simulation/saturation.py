@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import SaturationWarning, warn
+from ..robots.units import unit_for
 from .plant import Output, Plant
 
 if TYPE_CHECKING:
@@ -27,8 +28,8 @@ def saturation_report(plant: Plant, arrays: Mapping[str, np.ndarray]) -> list[di
         arrays: `tau`, (T, n, nv), N·m, and `theta_hat`, (T, n, P), at the logged instants.
 
     Returns:
-        One entry per joint: `robot` and `joint`, counted from 0; `limit`, N·m; `share` of the logged instants
-        at which the controller asked for more; `largest`, the largest torque that it asked for, N·m; and
+        One entry per joint: `robot` and `joint`, counted from 0; `limit`, in `unit`; `share` of the logged
+        instants at which the controller asked for more; `largest`, the largest torque that it asked for; and
         `theta_hat`, the largest magnitude of the robot's estimates at the start and over the run.
     """
     if not plant.saturate:
@@ -40,6 +41,7 @@ def saturation_report(plant: Plant, arrays: Mapping[str, np.ndarray]) -> list[di
             "robot": int(i),
             "joint": int(joint),
             "limit": float(limits[i, joint]),
+            "unit": unit_for("N·m", plant.cell.robots[i].joint_units[joint]),
             "share": float(share[i, joint]),
             "largest": float(size[:, i, joint].max()),
             "theta_hat": _growth(arrays["theta_hat"][:, i]),
@@ -68,9 +70,9 @@ def warn_of_saturation(result: Result) -> None:
     warn(
         f"{result.info['title']}: torque was cut off at {len(found)} joints, for up to "
         f"{max(entry['share'] for entry in found):.0%} of the time; {result.names[worst['robot']]}, joint "
-        f"{worst['joint'] + 1} asked for {worst['largest']:.3g} N·m of its {worst['limit']:.3g}. Estimates "
-        "and integrals of the synchronization errors went on meanwhile as if it had got it"
-        f"{_learned(found)}. See info['saturation'] and "
+        f"{worst['joint'] + 1} asked for {worst['largest']:.3g} {worst['unit']} of its "
+        f"{worst['limit']:.3g}. Estimates and integrals of the synchronization errors went on meanwhile as "
+        f"if it had got it{_learned(found)}. See info['saturation'] and "
         f"outputs['{APPLIED}']; lower the gains, or ask for a slower motion",
         SaturationWarning,
     )

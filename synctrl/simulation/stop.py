@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import SimulationError
+from ..robots.units import unit_for
 from .closed_loop import ClosedLoop
 from .disturbances import DisturbanceSchedule
 from .rates import HELD, HELD_SPRING, RUNGE_KUTTA, SWING, Rate, loop_rates
@@ -128,6 +129,10 @@ class Stop:
         """A joint in words, or a robot."""
         name = "the cell" if robot is None else self.loop.cell.names[robot]
         return name if joint is None else f"joint {joint + 1} of {name}"
+
+    def unit(self, turning: str, robot: int, joint: int) -> str:
+        """Unit of something of a joint that has the unit `turning` for joints that turn."""
+        return unit_for(turning, self.loop.cell.robots[robot].joint_units[joint])
 
     # -- how fast it wants to move ------------------------------------------------------------------------
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
+from ..analysis.metrics import Band
 from ..errors import SimulationError, SweepError, SynctrlError
 from ..simulation.result import Result
 from .distributions import Value
@@ -51,7 +52,7 @@ class Job(NamedTuple):
 
     base: Setup
     factors: tuple[Factor, ...]
-    bands: Mapping[str, float]
+    bands: Mapping[str, Band]
     keep_every: int | None = None
 
     def __repr__(self) -> str:

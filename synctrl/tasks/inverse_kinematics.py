@@ -12,6 +12,7 @@ from ..checks import finite_array, instance
 from ..errors import InputError, LimitWarning, UnreachableError, warn
 from ..robots.limits import joint_limits
 from ..robots.robot import Robot
+from ..robots.units import TURNS
 from .spaces import CartesianSpace
 
 RESTARTS = 20
@@ -144,7 +145,7 @@ def unwound(robot: Robot, q: np.ndarray, near: np.ndarray) -> np.ndarray:
     least = np.ceil((limits.lower - ON_LIMIT - q) / turn)
     most = np.floor((limits.upper + ON_LIMIT - q) / turn)
     turns = np.clip(np.round((near - q) / turn), least, most)
-    return q + turn * np.where(limits.turns & (least <= most), turns, 0.0)
+    return q + turn * np.where((least <= most) & (np.array(robot.joint_units) == TURNS), turns, 0.0)
 
 
 def _drawn_from(bounds: Range, nv: int) -> tuple[np.ndarray, np.ndarray]:
