@@ -21,6 +21,7 @@ from synctrl import (
     Cell,
     Coupling,
     Experiment,
+    Friction,
     FunctionTrajectory,
     Gains,
     JointSpace,
@@ -137,7 +138,10 @@ def pose_task(robot: Robot) -> Task:
 def cell(what: Task, n: int) -> Cell:
     """n such arms, as a pair or a signed ring, which know 0.7 of their parameters."""
     theta = KNOWN * what.robot.inertial_parameters
-    members = [Member(what.robot, what.path, what.q0, theta_hat0=theta, name=f"arm {i}") for i in range(n)]
+    members = [
+        Member(what.robot, what.path, what.q0, theta_hat0=theta, friction=Friction(), name=f"arm {i}")
+        for i in range(n)
+    ]
     return Cell(members, Coupling.pair() if n == 2 else Coupling.signed_ring(n), what.space)
 
 

@@ -23,7 +23,7 @@ from ..tasks.trajectories import Motion, Trajectory
 from .coupling import Coupling
 from .desired import desired_motion, desired_weights
 from .member_checks import check_friction, check_labels, check_names, check_space, check_trajectory
-from .member_parameters import member_parameters
+from .member_parameters import member_parameters, with_urdf_friction
 from .weights import Weights
 
 
@@ -43,7 +43,9 @@ class Member:
             placed, and of this friction.
         theta_hat0: estimate at t = 0, (P,); by default zeros, which is to know nothing.
         friction: friction of the true plant, which the controller does not know, unless what is adapted are
-            `FrictionParameters`; by default none.
+            `FrictionParameters`; by default none. "urdf" is what the robot's description states, rotors
+            included, in the plant and among what is adapted: `parameters` that are None or a name become
+            `FrictionParameters`. What the description states and nobody asks for, a run warns of.
         name: for legends and messages.
     """
 
@@ -53,8 +55,25 @@ class Member:
     v0: ArrayLike | None = None
     parameters: Parameters | str | None = None
     theta_hat0: ArrayLike | None = None
-    friction: Friction = field(default_factory=Friction)
+    friction: Any = None
     name: str | None = None
+    _friction_from: str = field(default="given", init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.friction is None:
+            self._set(friction=Friction(), _friction_from="nobody")
+        elif isinstance(self.friction, str) and self.friction == "urdf" and isinstance(self.robot, Robot):
+            self._set(friction=self.robot.urdf_friction, _friction_from="urdf")
+            self._set(parameters=with_urdf_friction(self.robot, self.parameters))
+
+    def _set(self, **values: Any) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def friction_from(self) -> str:
+        """Who says what the friction is: "given", "urdf", or "nobody", and then there is none."""
+        return self._friction_from
 
     @property
     def theta(self) -> np.ndarray:

@@ -20,6 +20,7 @@ from ...errors import FrameNotFound, RobotError, near
 from .build import build_model, check_model
 from .checks import check_bodies, check_some_mass, check_tree
 from .document import Document, Geometry, Inertial, Link
+from .frictions import stated_friction
 from .inertials import with_inertials
 from .locks import settle_locks
 from .meshes import data_folder, find_mesh
@@ -139,7 +140,7 @@ def describe(
     check_model(document, model)
     visual = _build_visual(document, model, _package_dirs(package_dirs), notes)
     tip = _tip(document, model, tip, held, notes)
-    report = notes.report(document.source)
+    report = replace(notes.report(document.source), known=tuple(stated_friction(document)))
     warn_of(report)
     name = document.name if document.name.isprintable() else quoted(document.name)
     return Description(name, model, visual, tip, document, tuple(held), report)
