@@ -1,6 +1,6 @@
 """Suggested gains on every arm of the catalogue, in joint, position and pose space, with and without a load.
 
-    python scripts/bench_gains.py [--arms NAME ...] [--naive] [--short]
+    python scripts/bench_gains.py [--arms NAME ...] [--bandwidth OMEGA] [--naive] [--short]
 
 A run is a success if it is completed, its error after 3 s is below 5 % of the motion, and no torque is larger
 than 3 times the largest of exact computed torque. Prints a row per arm and space, and the sums.
@@ -39,7 +39,7 @@ from synctrl.robots.limits import joint_limits
 from synctrl.robots.payload import Load, carrying
 
 #: rad/s; s; s, of the motion there and back; share of the true parameters that is known; kg
-BANDWIDTH, DURATION, RETURN, KNOWN, LOAD = 5.0, 3.0, 4.0, 0.7, 2.0
+BANDWIDTH, DURATION, RETURN, KNOWN, LOAD = 8.0, 3.0, 4.0, 0.7, 2.0
 #: how far the joints go, rad; the tip, as a share of its reach; its orientation, rad
 SWING, SHIFT, TURN = 0.5, 0.1, 0.4
 #: what a success is: error over motion at the end, torque over that of exact computed torque
@@ -173,15 +173,20 @@ def exact_torque(what: Cell, load: float) -> float:
     return max(float(np.abs(robot.inverse_dynamics(*state)).max()) for state in zip(*path, strict=True))
 
 
-def bench(arms: list[str], naive: bool, loads: tuple, periods: tuple, sizes: tuple) -> Iterator[tuple]:
-    """(arm, space, n, period, load, outcome) of every run, with pairs and rings of so many robots."""
+def bench(
+    arms: list[str], bandwidth: float | None, loads: tuple, periods: tuple, sizes: tuple
+) -> Iterator[tuple]:
+    """(arm, space, n, period, load, outcome) of every run, with pairs and rings of so many robots.
+
+    Without a bandwidth all arms have the same gains.
+    """
     for name in arms:
         for space in SPACES:
             what = task(name, space)
             for n in sizes if what else ():
                 one = cell(what, n)
                 for period in periods:
-                    gains = NAIVE if naive else Gains.suggest(one, BANDWIDTH, period=period)
+                    gains = NAIVE if bandwidth is None else Gains.suggest(one, bandwidth, period=period)
                     for load in loads:
                         yield name, space, n, period, load, run(one, gains, period, load)
 
@@ -189,13 +194,15 @@ def bench(arms: list[str], naive: bool, loads: tuple, periods: tuple, sizes: tup
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--arms", nargs="*", default=[n for n in catalog_names() if n != "wheel"])
+    parser.add_argument("--bandwidth", type=float, default=BANDWIDTH, help="rad/s")
     parser.add_argument("--naive", action="store_true", help="the same gains for all arms")
     parser.add_argument("--short", action="store_true", help="pairs only, in continuous control and at 2 ms")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
     rows = []
     extent = ((None, 2e-3), (2,)) if arguments.short else (PERIODS, (2, 3))
-    for row in bench(arguments.arms, arguments.naive, (0.0, LOAD), *extent):
+    bandwidth = None if arguments.naive else arguments.bandwidth
+    for row in bench(arguments.arms, bandwidth, (0.0, LOAD), *extent):
         rows.append(row)
         name, space, n, period, load, outcome = row
         words = "good" if outcome.good else "BAD "

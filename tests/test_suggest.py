@@ -248,6 +248,6 @@ def test_the_bench_can_fail_for_gains_that_suit_no_arm_fail_on_most():
 
 
 def test_the_bench_goes_through_pairs_and_rings():
-    rows = list(bench(["planar2r"], False, (0.0,), (None,), (2, 3)))
+    rows = list(bench(["planar2r"], BANDWIDTH, (0.0,), (None,), (2, 3)))
     assert [(row[1], row[2]) for row in rows] == [(s, n) for s in ("joint", "position") for n in (2, 3)]
     assert all(row[-1].good for row in rows)

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, MissingDependencyError, RobotError, near
+from .collection import PREFIX, described
 from .robot import Robot
 from .urdf.description import Description, read_urdf, urdf_folder
 from .urdf.document import Inertial
-from .urdf.meshes import data_folder
+from .urdf.packages import data_folder
 
 
 @dataclass(frozen=True)
@@ -71,10 +72,11 @@ def load_robot(source: str | Path, tip: str | None = None, **options: Any) -> Ro
     """A robot from the catalogue, or from a file.
 
     Args:
-        source: a catalogue name such as "a460", or the path of a URDF file.
+        source: a catalogue name such as "a460"; the path of a URDF file, a xacro file, or MJCF; or a name of
+            the package robot_descriptions, such as "robot_descriptions:iiwa14_description".
         tip: frame to control in Cartesian space; by default the catalogue's, or the end of the longest arm.
             In a file with several branches the joints that do not move it are held.
-        options: `locked`, `package_dirs`, `inertials` and `strict`, see `load_description`.
+        options: `locked`, `package_dirs`, `inertials`, `strict` and `xacro_args`, see `load_description`.
 
     Raises:
         RobotError: no such file or name, or a description that is refused, with the reason.
@@ -102,28 +104,36 @@ def load_description(
     package_dirs: Iterable[str | Path] = (),
     inertials: Mapping[str, Inertial | Mapping[str, Any]] | None = None,
     strict: bool = False,
+    xacro_args: Mapping[str, object] | None = None,
 ) -> Description:
-    """A robot from the catalogue, or from a URDF file.
+    """A robot from the catalogue, from a file, or from the package robot_descriptions.
 
     Args:
-        source: a name of the catalogue, or the path of a URDF file: a `Path`, or a text with a separator or
-            the ending ".urdf".
+        source: a name of the catalogue; the path of a file: a `Path`, or a text with a separator or the
+            ending ".urdf", ".xml" or ".xacro"; or "robot_descriptions:" and a name of that package, which
+            downloads what it has not got yet.
         tip: name of the tip frame. For a file, joints that do not move it are held.
         locked: positions, in rad or m, of joints that are to be held: they become fixed joints.
         package_dirs: folders in which packages are looked for; for files only.
         inertials: of links, in the place of what the file says, each an `Inertial` or a mapping of "mass",
             "com" and "inertia".
         strict: whether everything that would be a warning is an error.
+        xacro_args: values of the arguments of a xacro file, by name: texts, numbers, truth values.
 
     Raises, warns: as `read_urdf`, and:
         RobotError: an unknown name, with the near ones.
-        MissingDependencyError: example-robot-data is not installed.
+        MissingDependencyError: a package that has the robot, or reads its kind of file, is not installed.
     """
     if not isinstance(source, (str, Path)):
         raise InputError(f"expected a name or a path, found {type(source).__name__}", subject="robot")
-    options = {"inertials": inertials, "strict": strict}
+    folders = (package_dirs,) if isinstance(package_dirs, (str, Path)) else tuple(package_dirs)
+    options: dict[str, Any] = {"inertials": inertials, "strict": strict, "xacro_args": xacro_args}
+    if isinstance(source, str) and source.startswith(PREFIX):
+        place = described(source.removeprefix(PREFIX))
+        source, folders = place.file, (*folders, *place.package_dirs)
+        options["xacro_args"] = place.arguments(xacro_args)
     if isinstance(source, Path) or _looks_like_path(source):
-        return read_urdf(source, package_dirs, tip=tip, locked=locked, **options)
+        return read_urdf(source, folders, tip=tip, locked=locked, **options)
     if source not in CATALOG:
         raise RobotError(
             f"expected a name of the catalogue or a path, found {source!a}"

@@ -12,7 +12,7 @@ from ..checks import LONGEST_LABEL, unprintable
 from ..errors import RobotError
 from .robot import Robot
 from .urdf.description import describe, urdf_folder
-from .urdf.meshes import data_folder
+from .urdf.packages import data_folder
 from .urdf.reader import read_text
 from .urdf.writer import to_xml
 

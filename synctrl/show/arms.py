@@ -66,6 +66,8 @@ def add_arms(
         color = None if colors is None else colors[i]
         scene.add_robot(result.names[i], robot.model, visual, q, color)
         scene.add_legend(result.names[i], robot_color(i))
+        if robot.document is not None:
+            scene.add_hidden(result.names[i], (mesh.filename or "" for mesh in robot.document.hidden))
 
 
 def has_shapes(robot: Robot) -> bool:

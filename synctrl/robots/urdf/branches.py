@@ -93,6 +93,11 @@ class Branches:
         last = [name for name in arm if not self.carried_by(name) & (set(arm) - {name})]
         return tuple(sorted(last, key=lambda name: -len(self.chains[name])))
 
+    @property
+    def longest(self) -> tuple[str, ...]:
+        """The joints of the longest branch that is no finger, from the base outward."""
+        return self.chains[self.ends[0]] if self.ends else ()
+
 
 def _leader(joint: Joint, moving: dict[str, Joint]) -> str:
     """The joint that is followed in the end; where joints follow each other, one of them."""

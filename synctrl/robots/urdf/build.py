@@ -24,12 +24,13 @@ def build_model(document: Document) -> pin.Model:
         RobotError: Pinocchio refuses it all the same.
     """
     taken = {"universe", *(link.name for link in document.links)}
-    links = {"universe": _other("universe", taken)}
     joints = {joint.name: _other(joint.name, taken) for joint in document.joints if joint.name in taken}
-    model = model_from_xml(document.source, dynamics_xml(document.renamed(links, joints)))
+    model = model_from_xml(document.source, dynamics_xml(document.renamed(joints)))
     named = {name: joint for joint, name in joints.items()}
     for k, name in enumerate(list(model.names)):
         model.names[k] = named.get(name, name)
+    rotors = {joint.name: joint.armature for joint in document.moving_joints}
+    model.armature = np.array([rotors[name] for name in list(model.names)[1:]])
     return model
 
 

@@ -11,27 +11,24 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import coal
-import numpy as np
 import pinocchio as pin
 
 from ...checks import boolean, instance
 from ...errors import FrameNotFound, RobotError, near
 from .build import build_model, check_model
 from .checks import check_bodies, check_some_mass, check_tree
-from .document import Document, Geometry, Inertial, Link
+from .document import Document, Inertial
 from .frictions import stated_friction
 from .inertials import with_inertials
 from .locks import settle_locks
-from .meshes import data_folder, find_mesh
+from .meshes import build_visual, find_pictures
 from .names import remark_names
-from .reader import read_document
+from .packages import Packages
 from .report import NOTHING, Notes, Report, warn_of
+from .sources import read_source
 from .suspicions import suspect
 from .tips import check_tip, default_tip
 from .xml import quoted
-
-DEFAULT_COLOR = (0.9, 0.9, 0.9, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +59,7 @@ class Description:
         Raises:
             FrameNotFound: there is none of that name.
         """
+        instance("frame", tip, str, "a name")
         if not self.model.existFrame(tip):
             raise FrameNotFound(self.name, tip, [frame.name for frame in self.model.frames])
         return replace(self, tip=tip)
@@ -82,13 +80,20 @@ class Description:
         return tuple(link.name for link in self.document.links)
 
 
-def read_urdf(path: str | Path, package_dirs: Iterable[str | Path] = (), **options: Any) -> Description:
-    """A robot from a URDF file.
+def read_urdf(
+    path: str | Path,
+    package_dirs: Iterable[str | Path] = (),
+    *,
+    xacro_args: Mapping[str, object] | None = None,
+    **options: Any,
+) -> Description:
+    """A robot from a URDF file, a xacro file or MJCF, see `read_source`.
 
     Args:
         path: the file.
         package_dirs: folders in which packages are looked for when a mesh is `package://name/...`, before
             those of example-robot-data.
+        xacro_args: values of a xacro file's arguments.
         options: `tip`, `locked`, `inertials` and `strict` as in `describe`.
 
     Raises:
@@ -102,7 +107,8 @@ def read_urdf(path: str | Path, package_dirs: Iterable[str | Path] = (), **optio
     """
     file = existing_file(path)
     notes = Notes(file, strict=boolean("strict", options.pop("strict", False)))
-    return describe(read_document(file, notes), package_dirs, notes=notes, **options)
+    document = read_source(file, Packages(file, package_dirs), notes, xacro_args)
+    return describe(document, package_dirs, notes=notes, **options)
 
 
 def describe(
@@ -128,22 +134,33 @@ def describe(
     Raises, warns: as `read_urdf`.
     """
     notes = notes or Notes(document.file)
+    instance("frame", tip, (str, type(None)), "a name")
     document = with_inertials(document, {} if inertials is None else inertials)
-    check_some_mass(document)
-    check_tree(document)
-    document, held = settle_locks(document, {} if locked is None else locked, tip, notes)
-    check_tree(document)
-    check_bodies(document, notes)
-    remark_names(document, notes)
-    suspect(document, notes)
+    document, held = _settled(document, {} if locked is None else locked, tip, notes)
     model = build_model(document)
     check_model(document, model)
-    visual = _build_visual(document, model, _package_dirs(package_dirs), notes)
+    document = find_pictures(document, Packages(document.file, package_dirs), notes)
+    visual = build_visual(document, model)
     tip = _tip(document, model, tip, held, notes)
     report = replace(notes.report(document.source), known=tuple(stated_friction(document)))
     warn_of(report)
     name = document.name if document.name.isprintable() else quoted(document.name)
     return Description(name, model, visual, tip, document, tuple(held), report)
+
+
+def _settled(
+    document: Document, locked: Mapping[str, float], tip: str | None, notes: Notes
+) -> tuple[Document, dict[str, float]]:
+    """The document with its joints held, checked, and the positions of these joints."""
+    check_some_mass(document)
+    check_tree(document)
+    check_tip(document, tip, notes)
+    document, held = settle_locks(document, locked, tip, notes)
+    check_tree(document)
+    check_bodies(document, notes)
+    remark_names(document, notes)
+    suspect(document, notes)
+    return document, held
 
 
 def _tip(
@@ -153,7 +170,6 @@ def _tip(
         return default_tip(document, held, notes)
     if not model.existFrame(tip):
         raise FrameNotFound(document.name, tip, [frame.name for frame in model.frames])
-    check_tip(document, tip, notes)
     return tip
 
 
@@ -189,56 +205,3 @@ def existing_file(path: str | Path) -> Path:
         f"; in its folder there are: {', '.join(beside[:5])}" if beside else ""
     )
     raise RobotError(f"expected a URDF file, found {kind}{hint}", file=file)
-
-
-def _package_dirs(package_dirs: Iterable[str | Path]) -> tuple[Path, ...]:
-    folders = (package_dirs,) if isinstance(package_dirs, (str, Path)) else package_dirs
-    instance("package_dirs", folders, Iterable, "folders")
-    folders = tuple(folders)
-    for folder in folders:
-        instance("package_dirs", folder, (str, Path), "folders")
-    stock = data_folder()
-    return (*map(Path, folders), *([stock] if stock else []))
-
-
-# -- shapes ------------------------------------------------------------------------------------------------
-
-
-def _build_visual(
-    document: Document, model: pin.Model, package_dirs: tuple[Path, ...], notes: Notes
-) -> pin.GeometryModel:
-    """All shapes for display, each at its place in the frame of its link."""
-    visual = pin.GeometryModel()
-    for link in document.links:
-        frame_id = model.getFrameId(link.name, pin.BODY)
-        frame = model.frames[frame_id]
-        for k, geometry in enumerate(link.visuals):
-            found = _shape(document, link, geometry, package_dirs, notes)
-            if found is None:
-                continue
-            colored, color = geometry.color is not None, np.array(geometry.color or DEFAULT_COLOR)
-            placement = frame.placement * geometry.origin.se3
-            place = (f"{link.name}_{k}", frame.parentJoint, frame_id, placement)
-            visual.addGeometryObject(pin.GeometryObject(*place, *found, colored, color))
-    return visual
-
-
-def _shape(
-    document: Document, link: Link, geometry: Geometry, package_dirs: tuple[Path, ...], notes: Notes
-) -> tuple[coal.CollisionGeometry, str, np.ndarray] | None:
-    """Coal's geometry, and path and scale of a mesh; None where the mesh is missing."""
-    shape = geometry.shape
-    if shape.kind != "mesh":
-        kinds = {"box": coal.Box, "cylinder": coal.Cylinder, "capsule": coal.Capsule, "sphere": coal.Sphere}
-        return kinds[shape.kind](*shape.size), "", np.ones(3)
-    folder = document.file.parent if document.file else Path.cwd()
-    try:
-        file = find_mesh(shape.filename or "", folder, package_dirs)
-    except RobotError as error:
-        notes.absorb(document.error(str(error), link, line=geometry.line))
-        return None
-    if file is None:
-        missing = f"mesh {quoted(shape.filename or '')} is missing and will not be shown"
-        notes.add("left out", link.title, missing, geometry.line)
-        return None
-    return coal.BVHModelOBBRSS(), str(file), np.array(shape.size)

@@ -97,22 +97,33 @@ class Shape:
     """A geometric primitive or a mesh.
 
     `size` is (x, y, z) of a box, (radius, length) of a cylinder or capsule, (radius,) of a sphere, all in m,
-    and the scale (x, y, z) of a mesh, whose `filename` is as the file names it.
+    and the scale (x, y, z) of a mesh. A mesh has a `filename`, as the description names it, and the `file`
+    that was found, None if it is not shown.
     """
 
     kind: str
     size: Vector
     filename: str | None = None
+    file: Path | None = None
+
+    @property
+    def hidden(self) -> bool:
+        """Whether it is a mesh that cannot be shown."""
+        return self.kind == "mesh" and self.file is None
 
 
 @dataclass(frozen=True)
 class Geometry:
-    """A shape on a link, for display or collision. `color` is red, green, blue, alpha from 0 to 1."""
+    """A shape on a link, for display or collision.
+
+    `color` is red, green, blue, alpha from 0 to 1; `texture` names a picture whose mean is not known yet.
+    """
 
     shape: Shape
     origin: Pose = Pose()
     color: Vector | None = None
     line: int = 0
+    texture: str | None = None
 
 
 @dataclass(frozen=True)
@@ -161,7 +172,11 @@ class Mimic:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint. `axis` is of unit length; `remarks` are what there is to say about it if it moves."""
+    """A joint.
+
+    `axis` is of unit length; `armature` is the inertia of a rotor that turns along, in kg·m^2 (or kg);
+    `remarks` are what there is to say about it if it moves.
+    """
 
     name: str
     type: str
@@ -172,6 +187,7 @@ class Joint:
     limit: Limit | None = None
     damping: float = 0.0
     friction: float = 0.0
+    armature: float = 0.0
     mimic: Mimic | None = None
     line: int = 0
     remarks: tuple[Note, ...] = ()
@@ -223,6 +239,12 @@ class Document:
         return tuple(joint for joint in self.joints if joint.moves)
 
     @property
+    def hidden(self) -> tuple[Shape, ...]:
+        """Meshes that should be seen, and cannot be shown."""
+        shapes = (visual.shape for link in self.links for visual in link.visuals)
+        return tuple(shape for shape in shapes if shape.hidden)
+
+    @property
     def root(self) -> str:
         """Name of the link that is nobody's child."""
         children = {joint.child for joint in self.joints}
@@ -235,15 +257,10 @@ class Document:
         joint = Joint(f"{name}_mount", "fixed", name, self.root, pose)
         return replace(self, links=(Link(name), *self.links), joints=(joint, *self.joints))
 
-    def renamed(self, links: Mapping[str, str], joints: Mapping[str, str]) -> Self:
-        """The document with other names for some links and joints."""
-
-        def joint(joint: Joint) -> Joint:
-            parent, child = (links.get(end, end) for end in (joint.parent, joint.child))
-            return replace(joint, name=joints.get(joint.name, joint.name), parent=parent, child=child)
-
-        named = (replace(link, name=links.get(link.name, link.name)) for link in self.links)
-        return replace(self, links=tuple(named), joints=tuple(map(joint, self.joints)))
+    def renamed(self, names: Mapping[str, str]) -> Self:
+        """The document with other names for some joints."""
+        joints = (replace(joint, name=names.get(joint.name, joint.name)) for joint in self.joints)
+        return replace(self, joints=tuple(joints))
 
     def error(
         self,

@@ -97,13 +97,13 @@ def _followers(document: Document, held: Mapping[str, float]) -> Found:
     joints, found = {joint.name: joint for joint in document.joints}, Found()
     for joint in document.moving_joints:
         if joint.mimic is not None:
-            reason = f"it follows joint {quoted(joint.mimic.joint)}"
-            found[joint.name] = _followed(document, joint, joints, held, ()), reason
+            lost = "" if joint.mimic.joint in joints else ", which there is not"
+            reason = f"it follows joint {quoted(joint.mimic.joint)}{lost}"
+            found[joint.name] = _followed(joint, joints, held, ()), reason
     return found
 
 
 def _followed(
-    document: Document,
     joint: Joint,
     joints: Mapping[str, Joint],
     held: Mapping[str, float],
@@ -112,10 +112,9 @@ def _followed(
     """Where a joint is, in rad or m, if what it follows is held or rests."""
     if joint.name in held or joint.mimic is None or joint.name in seen:
         return held.get(joint.name, _rest(joint))
-    name, multiplier, offset = joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset
-    if name not in joints:
-        raise document.error(f"expected a joint to mimic, found {quoted(name)}{near(name, joints)}", joint)
-    return offset + multiplier * _followed(document, joints[name], joints, held, (*seen, joint.name))
+    leader = joints.get(joint.mimic.joint)
+    position = 0.0 if leader is None else _followed(leader, joints, held, (*seen, joint.name))
+    return joint.mimic.offset + joint.mimic.multiplier * position
 
 
 def _leaders(document: Document, tip: str | None) -> Found:
@@ -145,7 +144,7 @@ def _beside(document: Document, tip: str | None) -> Found:
 def _massless(document: Document, tip: str | None) -> Found:
     """Fingers and sliding last joints that carry no mass: nothing says how they would move."""
     branches, parameters = Branches(document), body_parameters(document)
-    arm = branches.moving_tip(tip) if tip is not None else branches.chains[branches.ends[0]]
+    arm = branches.moving_tip(tip) if tip is not None else branches.longest
     return {
         name: (_rest(joint), f"link {quoted(joint.child)} and what it carries have no mass")
         for name, joint in branches.moving.items()

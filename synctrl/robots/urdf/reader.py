@@ -12,7 +12,7 @@ from .extensions import EXTENSIONS, LINK_EXTENSIONS, refuse_loops, refuse_xacro
 from .limits import read_limit
 from .origins import read_origin
 from .report import Notes
-from .shapes import read_colors, read_shapes
+from .shapes import Material, read_materials, read_shapes
 from .xml import Element, parse_xml, quoted, read_bytes, shown_tag
 
 JOINT_TYPES = (*MOVING_TYPES, "fixed")
@@ -21,6 +21,7 @@ JOINT_PARTS = (
     *("calibration", "safety_controller"),
 )
 
+WORLD = "universe"
 _NO_AXIS = 1e-6
 _UNIT_AXIS = 1e-3
 
@@ -44,10 +45,10 @@ def read_text(file: Path, data: bytes, notes: Notes | None = None) -> Document:
     refuse_xacro(root)
     refuse_loops(root)
     root.know(("link", "joint", "material", *EXTENSIONS), ("name", "version"))
-    colors = read_colors(root)
+    materials = read_materials(root)
     return Document(
         name=_robot_name(root, file),
-        links=tuple(_link(element, colors) for element in root.all("link")),
+        links=tuple(_link(element, materials) for element in root.all("link")),
         joints=tuple(_joint(element) for element in root.all("joint")),
         file=file,
     )
@@ -63,13 +64,13 @@ def _robot_name(root: Element, file: Path) -> str:
 # -- links -------------------------------------------------------------------------------------------------
 
 
-def _link(element: Element, colors: dict[str, Vector]) -> Link:
+def _link(element: Element, materials: dict[str, Material]) -> Link:
     element.know(("inertial", "visual", "collision", *LINK_EXTENSIONS), ("name", "type"))
     inertial = element.optional("inertial")
     return Link(
-        name=element.name(),
+        name=_link_name(element, "name"),
         inertial=None if inertial is None else _inertial(inertial),
-        visuals=read_shapes(element, "visual", colors),
+        visuals=read_shapes(element, "visual", materials),
         collisions=read_shapes(element, "collision", {}),
         line=element.line,
     )
@@ -120,7 +121,13 @@ def _joint(element: Element) -> Joint:
 def _end(element: Element, role: str) -> str:
     end = element.required(role)
     end.know((), ("link",))
-    return end.name("link")
+    return _link_name(end, "link")
+
+
+def _link_name(element: Element, attribute: str) -> str:
+    """The name of a link; what engines call the world cannot be one."""
+    name = element.name(attribute)
+    return f"{name} (link)" if name == WORLD else name
 
 
 def _moving(element: Element, joint: Joint) -> Joint:

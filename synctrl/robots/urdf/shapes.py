@@ -6,37 +6,34 @@ A shape that cannot be read is left out, with a note of why; so is a colour.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 from ...errors import RobotError, near
 from .document import Geometry, Shape, Vector
-from .meshes import check_filename
 from .origins import read_origin
 from .xml import Element, quoted
 
 SHAPES = ("box", "cylinder", "sphere", "capsule", "mesh")
 
 
-def read_shapes(link: Element, tag: str, colors: dict[str, Vector]) -> tuple[Geometry, ...]:
+def read_shapes(link: Element, tag: str, materials: dict[str, Material]) -> tuple[Geometry, ...]:
     """The shapes of a link that can be read; `tag` is "visual" or "collision"."""
-    return tuple(_readable(link, tag, colors))
+    return tuple(_readable(link, tag, materials))
 
 
-def _readable(link: Element, tag: str, colors: dict[str, Vector]) -> Iterator[Geometry]:
+def _readable(link: Element, tag: str, materials: dict[str, Material]) -> Iterator[Geometry]:
     for element in link.all(tag):
         try:
-            yield _geometry(element, colors)
+            yield _geometry(element, materials)
         except RobotError as error:
             element.notes.absorb(error)
 
 
-def _geometry(element: Element, colors: dict[str, Vector]) -> Geometry:
+def _geometry(element: Element, materials: dict[str, Material]) -> Geometry:
     element.know(("origin", "geometry", "material", "verbose"), ("name",))
-    return Geometry(
-        shape=_shape(element.required("geometry")),
-        origin=read_origin(element),
-        color=_color(element, colors) if element.tag == "visual" else None,
-        line=element.line,
-    )
+    shape, origin = _shape(element.required("geometry")), read_origin(element)
+    material = _material(element, materials) if element.tag == "visual" else Material()
+    return Geometry(shape, origin, material.color, element.line, material.texture)
 
 
 def _shape(geometry: Element) -> Shape:
@@ -63,34 +60,41 @@ def _mesh(mesh: Element) -> Shape:
     scale = mesh.numbers("scale", 3, (1.0, 1.0, 1.0))
     if 0 in scale:
         mesh.refuse("a scale other than 0 in each direction", " ".join(f"{s:g}" for s in scale))
-    return Shape("mesh", scale, check_filename(mesh))
+    return Shape("mesh", scale, mesh.text("filename"))
 
 
 # -- colours -----------------------------------------------------------------------------------------------
 
 
-def read_colors(root: Element) -> dict[str, Vector]:
-    """Colours by the name of their material; those of the robot come before those inside links."""
+class Material(NamedTuple):
+    """Red, green, blue, alpha from 0 to 1, and the file name of a picture; None where there is none."""
+
+    color: Vector | None = None
+    texture: str | None = None
+
+
+def read_materials(root: Element) -> dict[str, Material]:
+    """Materials by name; those of the robot come before those inside links."""
     visuals = [visual for link in root.all("link") for visual in link.all("visual")]
-    colors: dict[str, Vector] = {}
-    for material in [m for parent in (root, *visuals) for m in parent.all("material")]:
-        material.know(("color", "texture"), ("name",))
-        rgba = _stated(material)
-        if rgba is not None:
-            colors.setdefault(material.attributes.get("name", ""), rgba)
-    return colors
+    materials: dict[str, Material] = {}
+    for element in [m for parent in (root, *visuals) for m in parent.all("material")]:
+        element.know(("color", "texture"), ("name",))
+        if (stated := _stated(element)) != Material():
+            materials.setdefault(element.attributes.get("name", ""), stated)
+    return materials
 
 
-def _stated(material: Element) -> Vector | None:
-    """The colour that a material states, if it is one."""
-    color = material.first("color")
-    if color is None:
-        return None
+def _stated(element: Element) -> Material:
+    """What a material states itself, as far as it can be read."""
+    color, texture = element.first("color"), element.first("texture")
     try:
-        return _rgba(color)
+        return Material(
+            None if color is None else _rgba(color),
+            None if texture is None else texture.text("filename"),
+        )
     except RobotError as error:
-        material.notes.absorb(error)
-        return None
+        element.notes.absorb(error)
+        return Material()
 
 
 def _rgba(color: Element) -> Vector:
@@ -101,13 +105,14 @@ def _rgba(color: Element) -> Vector:
     return rgba
 
 
-def _color(element: Element, colors: dict[str, Vector]) -> Vector | None:
-    material = element.first("material")
-    if material is None or material.optional("texture") is not None:
-        return None
-    if material.first("color") is not None:
-        return _stated(material)
-    name = material.attributes.get("name", "")
-    if name not in colors:
-        material.note("left out", f"no colour is known for material {quoted(name)}{near(name[:60], colors)}")
-    return colors.get(name)
+def _material(element: Element, materials: dict[str, Material]) -> Material:
+    """What the material of a visual states, or else the one of its name."""
+    stated = element.first("material")
+    if stated is None:
+        return Material()
+    name = stated.attributes.get("name", "")
+    if stated.all("color") or stated.all("texture") or not name:
+        return _stated(stated)
+    if name not in materials:
+        stated.note("left out", f"no colour is known for material {quoted(name)}{near(name[:60], materials)}")
+    return materials.get(name, Material())

@@ -53,30 +53,27 @@ def suspect(document: Document, notes: Notes) -> None:
 
 
 def _of_link(inertial: Inertial) -> Iterator[str]:
-    mass, moments = inertial.mass, np.linalg.eigvalsh(inertial.matrix)
+    mass, largest = inertial.mass, float(np.linalg.eigvalsh(inertial.matrix)[2])
     distance = math.hypot(*inertial.origin.xyz)
     if fault := triangle_fault(inertial):
         yield f"{fault}; no body has them, and physically consistent adaptation cannot use them"
-    if mass > 0 and distance > FARTHEST_COM:
+    if mass <= 0:
+        return
+    if distance > FARTHEST_COM:
         yield f"the centre of mass is {distance:g} m away: a length in mm?"
-    if mass > 0 and max(moments[2], 0.0) / mass > LARGEST_GYRATION**2:
-        radius = math.sqrt(moments[2] / mass)
+    radius = math.sqrt(max(largest, 0.0) / mass)
+    if radius > LARGEST_GYRATION:
         yield f"{mass:g} kg have a radius of gyration of {radius:g} m: a mass or inertia in other units?"
-    if mass > 0 and moments[2] > 0 and _density(mass, moments) > DENSEST:
+    if 0 < radius < _densest(mass):
         yield (
-            f"{mass:g} kg have the inertia of a body of {1e3 * _size(mass, moments):.2g} mm, too dense for "
-            "any material: a mass in g, or an inertia in other units?"
+            f"{mass:g} kg have a radius of gyration of {1e3 * radius:.2g} mm, too dense for any material: "
+            "a mass in g, or an inertia in other units?"
         )
 
 
-def _size(mass: float, moments: np.ndarray) -> float:
-    """Diameter, m, of the ball with the mass and the largest moment, 2/5 m r^2."""
-    return 2 * math.sqrt(2.5 * moments[2] / mass)
-
-
-def _density(mass: float, moments: np.ndarray) -> float:
-    """Of that ball, kg/m^3; a slender or flat body of that density is larger in one direction at least."""
-    return 6 * mass / (math.pi * _size(mass, moments) ** 3)
+def _densest(mass: float) -> float:
+    """Radius of gyration, m, of the densest ball: any other body of its density has a larger one."""
+    return math.sqrt(0.4) * math.cbrt(3 * mass / (4 * math.pi * DENSEST))
 
 
 def _of_range(joint: Joint) -> str:

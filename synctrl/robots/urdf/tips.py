@@ -64,14 +64,16 @@ def _outermost(document: Document, link: str, held: Collection[str]) -> str:
     return ([name for name in last if _TOOL.search(name)] or last)[-1]
 
 
-def check_tip(document: Document, tip: str, notes: Notes) -> None:
-    """Remark a tip that the user asked for, but that no joint moves, or only a finger."""
+def check_tip(document: Document, tip: str | None, notes: Notes) -> None:
+    """Remark a tip that the user asked for, but that no joint moves, or a finger; nothing is held yet."""
+    if tip not in {link.name for link in document.links} | {joint.name for joint in document.joints}:
+        return
     branches = Branches(document)
-    chain = branches.chain(tip)
+    chain = branches.moving_tip(tip)
     where = f"robot {quoted(document.name)}"
     if not chain:
-        notes.add("suspicious", where, f"the tip {quoted(tip)} is fixed to the base: no joint moves it")
+        notes.add("suspicious", where, f"the tip {quoted(str(tip))} is fixed to the base: no joint moves it")
     elif chain[-1] in branches.fingers:
         notes.add(
-            "suspicious", where, f"the tip {quoted(tip)} is on a finger, which {quoted(chain[-1])} moves"
+            "suspicious", where, f"the tip {quoted(str(tip))} is on a finger, which {quoted(chain[-1])} moves"
         )

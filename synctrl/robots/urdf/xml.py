@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 from xml.parsers import expat
 
+from ...checks import unprintable
 from ...errors import RobotError
 from .report import Notes
 
@@ -27,7 +28,7 @@ MAX_NUMBER = 1e16
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _INFINITE = re.compile(r"[+-]?inf(inity)?", re.IGNORECASE)
-_LONGEST_NAME = 1000
+_LONGEST_NAME = 900
 _MISSPELT = 0.75
 MECHANISM = (
     *("inertial", "mass", "inertia", "origin", "parent", "child", "axis", "mimic", "value", "link", "joint"),
@@ -126,11 +127,11 @@ class Element:
         return self.attributes[attribute]
 
     def name(self, attribute: str = "name") -> str:
-        """An attribute that is the name of something: any text, which is shown `quoted`."""
+        """An attribute that is the name of something: any text, made one line, which is shown `quoted`."""
         text = self.text(attribute)
         if not 1 <= len(text) <= _LONGEST_NAME:
             self.refuse(f"a {attribute} of 1 to {_LONGEST_NAME} characters", f"{len(text)}")
-        return text
+        return "".join(c if unprintable(c) is None else ascii(c)[1:-1] for c in text)
 
     def number(self, attribute: str, default: float | None = None) -> float:
         """An attribute that is one finite number."""
