@@ -43,7 +43,7 @@ class Packages:
         self.here = Path(os.path.abspath(file.parent if file else "."))
         above = (folder for folder in (self.here, *self.here.parents) if _manifest_name(folder))
         self.home = next(above, self.here)
-        self._named = _folders(folders)
+        self._named = named_folders(folders)
 
     def folder(self, name: str) -> Path | None:
         """The folder of the package called `name`, or None.
@@ -104,7 +104,12 @@ def data_folder() -> Path | None:
     return Path(str(found))
 
 
-def _folders(folders: Iterable[str | Path]) -> tuple[Path, ...]:
+def named_folders(folders: Iterable[str | Path]) -> tuple[Path, ...]:
+    """Folders as a user names them, one or several, as absolute paths.
+
+    Raises:
+        InputError: they are no folders' names.
+    """
     given = (folders,) if isinstance(folders, (str, Path)) else folders
     instance("package_dirs", given, Iterable, "folders")
     given = tuple(given)
