@@ -14,12 +14,13 @@ import numpy as np
 import pinocchio as pin
 
 from synctrl import Cell, Coupling, Gains, Hold, Member, Robot, load_robot, simulate
-from synctrl.errors import SynctrlError
+from synctrl.errors import SimulationError, SynctrlError
 from synctrl.robots.urdf.xacro import expand_xacro
 
 MOVING = ("revolute", "continuous", "prismatic")
 LONGEST_CHAIN_OF_WHEELS = 2
 SAMPLES = 5
+MOVED = 1e-3
 MOST_JOINTS = 14
 """More than the joints of two arms are a humanoid, a hand or a train of wheels."""
 
@@ -307,10 +308,13 @@ def _theirs(
 
 
 def loop_difference(robot: Robot, duration: float = 0.1) -> float:
-    """How far two of the robot, held in step for a while, are from each other in the two engines."""
+    """How far the two engines are from each other when two of the robot are brought in step, rad or m."""
     start = np.full(robot.nv, 0.1)
-    cell = Cell([Member(robot, Hold(start + shift)) for shift in (0.0, 0.05)], Coupling.pair())
+    members = [Member(robot, Hold(start), start + shift) for shift in (0.1, -0.2)]
     inertia = np.diag(robot.mass_matrix(start))
     gains = Gains(Lambda=5.0, beta=1.0, K_r=10 * inertia, K_eps=10 * float(inertia.min()), Gamma=0.0)
+    cell = Cell(members, Coupling.pair())
     runs = [simulate(cell, gains, duration, engine=engine) for engine in ("pinocchio", "compiled")]
+    if not abs(runs[0].q[-1] - runs[0].q[0]).max() > MOVED:
+        raise SimulationError("expected robots that move, found that they stand still")
     return float(abs(runs[0].q - runs[1].q).max())
