@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance, per_joint
 from ..errors import FrameNotFound, InputError
+from .friction import Friction
 from .model_checks import check_inertia, check_joints, check_numbering
 from .per_thread import PerThread
 from .units import joint_units
@@ -156,9 +157,20 @@ class Robot:
         return tuple(f"{joint}.{kind}" for joint in self.joint_names for kind in kinds)
 
     @property
+    def joint_frames(self) -> tuple[str, ...]:
+        """Names of the frames of the joints, (nv,): their own, unless a link has the same."""
+        found = {frame.parentJoint: frame.name for frame in self.model.frames if frame.type == pin.JOINT}
+        return tuple(found.get(k, name) for k, name in enumerate(self.joint_names, start=1))
+
+    @property
     def armature(self) -> np.ndarray:
         """Inertia of rotors that the joints turn along, (nv,), kg·m^2."""
         return np.array(self.model.armature)
+
+    @property
+    def urdf_friction(self) -> Friction:
+        """What its description states of friction; it acts where a `Member` asks for it."""
+        return Friction(self.model.damping, self.model.friction)
 
     @property
     def gravity_vector(self) -> np.ndarray:
