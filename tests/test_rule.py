@@ -20,6 +20,7 @@ from synctrl.control.adaptation import Natural
 from synctrl.errors import FrameNotFound, InputError, RobotError, RobotWarning
 from synctrl.robots.limits import joint_limits
 from synctrl.robots.urdf.document import Inertial, Pose
+from synctrl.show import scene_of
 
 INERTIA = '<inertia ixx="{i}" ixy="0" ixz="0" iyy="{i}" iyz="0" izz="{i}"/>'
 BODY = f'<inertial><mass value="{{mass}}"/>{INERTIA}</inertial>'
@@ -249,7 +250,7 @@ def test_a_tip_that_there_is_not_lists_the_frames(tmp_path):
 
 NAMES = [
     *("wx200/arm", "two words", "Gelenk_ä", "../../up", "universe", "<b>bold</b>", 'say "x"', "$\\frac$"),
-    *("a&b", "%s{0}", "x" * 400, " ", "名前", "joint (2)"),
+    *("a&b", "%s{0}", "x" * 400, "名前", "joint (2)"),
 ]
 
 
@@ -294,6 +295,9 @@ def test_a_joint_may_be_named_as_a_link_or_the_world(name, tmp_path):
     assert robot.joint_names == ("ja", name, "jc")
     for q in np.random.default_rng(1).uniform(-1, 1, (3, 3)):
         np.testing.assert_array_equal(robot.mass_matrix(q), same.mass_matrix(q))
+        for frame, other in zip(robot.joint_frames, same.joint_frames, strict=True):
+            place, there = robot.with_tip(frame).tip_position(q), same.with_tip(other).tip_position(q)
+            np.testing.assert_array_equal(place, there)
 
 
 # -- orientations ------------------------------------------------------------------------------------------
@@ -484,3 +488,18 @@ def test_a_robot_keeps_its_report_whatever_becomes_of_it(tmp_path):
         pickle.loads(pickle.dumps(robot)),
     )
     assert robot.report and all(copy.report == robot.report for copy in copies)
+
+
+def test_no_name_becomes_markup_in_a_page_or_a_figure(tmp_path):
+    name = "</script><img src=x onerror=alert(1)> $\\frac$"
+    text = GOOD.replace('"elbow"', f'"{escaped(name)}"').replace('"good"', f'"{escaped(name)}"')
+    robot = loaded(write(tmp_path, text).parent, text)
+    members = [Member(robot, Hold(np.full(3, 0.1)))] * 2
+    run = Experiment(Cell(members, Coupling.pair()), Gains(5.0, 1.0, 5.0, 1.0, 0.1), 0.01)
+    result = run.simulate()
+    assert result.info["robots"][0]["joints"][1] == name
+    page = tmp_path / "scene.html"
+    scene_of(result, run).write(page)
+    assert "<img src=x" not in page.read_text(encoding="utf-8")
+    for figure in result.plot().values():
+        figure.canvas.draw()

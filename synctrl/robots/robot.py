@@ -157,6 +157,12 @@ class Robot:
         return tuple(f"{joint}.{kind}" for joint in self.joint_names for kind in kinds)
 
     @property
+    def joint_frames(self) -> tuple[str, ...]:
+        """Names of the frames of the joints, (nv,): their own, unless a link has the same."""
+        found = {frame.parentJoint: frame.name for frame in self.model.frames if frame.type == pin.JOINT}
+        return tuple(found.get(k, name) for k, name in enumerate(self.joint_names, start=1))
+
+    @property
     def armature(self) -> np.ndarray:
         """Inertia of rotors that the joints turn along, (nv,), kg·m^2."""
         return np.array(self.model.armature)

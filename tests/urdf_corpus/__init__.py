@@ -104,7 +104,7 @@ REFUSED: dict[str, Case] = {
     "link twice": Case('<link name="tool"/>', '<link name="fore"/>', ("link 'fore'", "unique", "in line 25")),
     "link name empty": Case('<link name="tool"/>', '<link name=""/>', ("a name of",)),
     "link name without end": Case(
-        '<link name="tool"/>', f'<link name="{"t" * 50000}"/>', ("1 to 900 characters", "found 5000")
+        '<link name="tool"/>', f'<link name="{"t" * 50000}"/>', ("1 to 900 characters", "of 5000")
     ),
     "link that hangs from nothing": Case(
         '<link name="tool"/>', '<link name="tool"/><link name="lost"/>', ("one root", "'base', 'lost'")

@@ -55,7 +55,7 @@ def read_text(file: Path, data: bytes, notes: Notes | None = None) -> Document:
 
 
 def _robot_name(root: Element, file: Path) -> str:
-    if root.attributes.get("name"):
+    if root.attributes.get("name", "").strip():
         return root.name()
     root.note("assumed", f"the robot has no name; it is called as its file, {quoted(file.stem)}")
     return file.stem

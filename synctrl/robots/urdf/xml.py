@@ -129,8 +129,9 @@ class Element:
     def name(self, attribute: str = "name") -> str:
         """An attribute that is the name of something: any text, made one line, which is shown `quoted`."""
         text = self.text(attribute)
-        if not 1 <= len(text) <= _LONGEST_NAME:
-            self.refuse(f"a {attribute} of 1 to {_LONGEST_NAME} characters", f"{len(text)}")
+        if not text.strip() or len(text) > _LONGEST_NAME:
+            found = f"{quoted(text)} of {len(text)}"
+            self.refuse(f"a {attribute} of 1 to {_LONGEST_NAME} characters, not all blank", found)
         return "".join(c if unprintable(c) is None else ascii(c)[1:-1] for c in text)
 
     def number(self, attribute: str, default: float | None = None) -> float:
