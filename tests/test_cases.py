@@ -24,7 +24,6 @@ SAID = {
     "inertial_without_inertia": ("assumed", "link 'camera'"),
     "limit_degrees": ("suspicious", "joint 'joint1', limit"),
     "limit_no_range": ("assumed", "joint 'joint1', limit"),
-    "mesh_in_package": ("left out", "link 'link1'"),
     "mimic_gripper": ("locked", "joint 'j_f2'"),
     "mimic_gripper_effort_zero": ("locked", "joint 'j_f2'"),
     "parent_mesh": ("left out", "link 'link1'"),
@@ -37,6 +36,11 @@ SAID = {
     "zero_box_visual": ("left out", "link 'base_link', visual"),
     "zero_sphere": ("left out", "link 'link1', collision"),
 }
+#: there is nothing to say about them
+GOOD = (
+    *("good", "mesh_in_package"),
+    *(f"{folder}/urdf/mesh_in_package" for folder in ("demo_description", "Demo_Description_Repo")),
+)
 #: by file: what the refusal is about
 REFUSED = {
     "gazebo_closed_loop": "gazebo, joint",
@@ -57,7 +61,8 @@ def quietly(name: str, **options: object) -> Robot:
 
 
 def test_every_case_is_in_a_table():
-    assert {file.stem for file in FOLDER.glob("*.urdf")} == {"good", *SAID, *REFUSED}
+    found = FOLDER.rglob("*.urdf")
+    assert {file.relative_to(FOLDER).with_suffix("").as_posix() for file in found} == {*GOOD, *SAID, *REFUSED}
 
 
 @pytest.mark.parametrize("name", SAID)
@@ -77,9 +82,12 @@ def test_strictly_a_case_is_refused(name):
         load_robot(case(name), strict=True)
 
 
+@pytest.mark.parametrize("name", GOOD)
 @pytest.mark.filterwarnings("error")
-def test_the_good_one_loads_without_a_word():
-    assert not load_robot(case("good"), strict=True).report
+def test_a_good_one_loads_without_a_word_from_any_folder(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    robot = load_robot(case(name), strict=True)
+    assert not robot.report and robot.visual.ngeoms == ("mesh" in name)
 
 
 @pytest.mark.parametrize("name", REFUSED)

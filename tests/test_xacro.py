@@ -101,6 +101,13 @@ def test_text_that_is_not_ascii_comes_through_whatever_the_locale(
 
 
 @needs_xacro
+def test_every_element_has_a_line_of_its_own_so_that_messages_can_name_it(tmp_path: Path) -> None:
+    macro = '<xacro:macro name="two"><link name="a"/><link name="b"/></xacro:macro><xacro:two/>'
+    lines = [line.strip() for line in expand_xacro(write(tmp_path / "a.xacro", macro)).splitlines()]
+    assert {link("a"), link("b")} <= {*lines}
+
+
+@needs_xacro
 def test_a_fault_deep_inside_is_said_with_its_file_and_macro(tmp_path: Path) -> None:
     macro = '<xacro:macro name="part" params="n"><link name="${missing}"/></xacro:macro>'
     write(tmp_path / "part.xacro", macro + '<xacro:part n="1"/>')
@@ -261,6 +268,13 @@ def test_what_a_file_prints_is_no_answer(tmp_path: Path) -> None:
 
 
 @needs_xacro
+def test_without_a_python_to_start_it_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    with pytest.raises(RobotError, match="expected a process of Python"):
+        expand_xacro(write(tmp_path / "a.xacro", link("a")))
+
+
+@needs_xacro
 def test_a_process_that_dies_is_said(tmp_path: Path) -> None:
     file = write(tmp_path / "a.xacro", expression(f"{GLOBALS}['_exit'](3)"))
     with pytest.raises(RobotError, match="ended without an answer"):
@@ -303,3 +317,17 @@ def test_arguments_for_another_kind_of_file_are_refused() -> None:
     file = load_robot("planar2r").document.file
     with pytest.raises(InputError, match="xacro_args"):
         load_robot(file, xacro_args={"a": 1})
+
+
+CASE = Path(__file__).parent / "cases" / "urdf" / "xacro_file.xacro"
+
+
+@needs_xacro
+def test_a_small_file_of_ours_loads() -> None:
+    assert load_robot(CASE).nv
+
+
+def test_it_is_refused_with_advice_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(xacro_module, "find_spec", lambda name: None)
+    with pytest.raises(MissingDependencyError, match=r"pip install 'synctrl\[xacro\]'"):
+        load_robot(CASE)

@@ -12,7 +12,7 @@ from .collection import PREFIX, described
 from .robot import Robot
 from .urdf.description import Description, read_urdf, urdf_folder
 from .urdf.document import Inertial
-from .urdf.packages import data_folder
+from .urdf.packages import data_folder, named_folders
 
 
 @dataclass(frozen=True)
@@ -126,22 +126,14 @@ def load_description(
     """
     if not isinstance(source, (str, Path)):
         raise InputError(f"expected a name or a path, found {type(source).__name__}", subject="robot")
-    folders = (package_dirs,) if isinstance(package_dirs, (str, Path)) else tuple(package_dirs)
     options: dict[str, Any] = {"inertials": inertials, "strict": strict, "xacro_args": xacro_args}
     if isinstance(source, str) and source.startswith(PREFIX):
         place = described(source.removeprefix(PREFIX))
-        source, folders = place.file, (*folders, *place.package_dirs)
+        source, package_dirs = place.file, (*named_folders(package_dirs), *place.package_dirs)
         options["xacro_args"] = place.arguments(xacro_args)
     if isinstance(source, Path) or _looks_like_path(source):
-        return read_urdf(source, folders, tip=tip, locked=locked, **options)
-    if source not in CATALOG:
-        raise RobotError(
-            f"expected a name of the catalogue or a path, found {source!a}"
-            f"{near(source, CATALOG)}; the catalogue has: {', '.join(CATALOG)}",
-            subject="robot",
-            found=source,
-        )
-    found = _load(source, CATALOG[source], locked or {}, options)
+        return read_urdf(source, package_dirs, tip=tip, locked=locked, **options)
+    found = _load(source, locked or {}, options)
     return found if tip is None else found.with_tip(tip)
 
 
@@ -149,7 +141,16 @@ def _looks_like_path(text: str) -> bool:
     return "/" in text or "\\" in text or text.lower().endswith((".urdf", ".xml", ".xacro"))
 
 
-def _load(name: str, entry: Entry, locked: Mapping[str, float], options: dict[str, Any]) -> Description:
+def _load(name: str, locked: Mapping[str, float], options: dict[str, Any]) -> Description:
+    """A robot of the catalogue; its tip holds nothing."""
+    if name not in CATALOG:
+        raise RobotError(
+            f"expected a name of the catalogue or a path, found {name!a}"
+            f"{near(name, CATALOG)}; the catalogue has: {', '.join(CATALOG)}",
+            subject="robot",
+            found=name,
+        )
+    entry = CATALOG[name]
     file, held = _folder(name, entry) / entry.file, {**dict.fromkeys(entry.locked, 0.0), **locked}
     return replace(read_urdf(file, tip=entry.tip, locked=held, **options), name=name)
 

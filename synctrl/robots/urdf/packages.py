@@ -44,7 +44,7 @@ class Packages:
         """
         self.here = Path(os.path.abspath(file.parent if file else "."))
         self.home = next(filter(_package_name, self._above), self.here)
-        self._named = _folders(folders)
+        self._named = named_folders(folders)
 
     def folder(self, name: str) -> Path | None:
         """The folder of the package called `name`, or None.
@@ -109,7 +109,12 @@ def data_folder() -> Path | None:
     return Path(str(found))
 
 
-def _folders(folders: Iterable[str | Path]) -> tuple[Path, ...]:
+def named_folders(folders: Iterable[str | Path]) -> tuple[Path, ...]:
+    """Folders as a user names them, one or several, as absolute paths.
+
+    Raises:
+        InputError: they are no folders' names.
+    """
     given = (folders,) if isinstance(folders, (str, Path)) else folders
     instance("package_dirs", given, Iterable, "folders")
     given = tuple(given)

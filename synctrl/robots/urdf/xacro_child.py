@@ -132,7 +132,7 @@ def _refuse(what: str, value: Any) -> NoReturn:
 
 
 def _expanded(xacro: Any, file: str, args: dict[str, str]) -> str:
-    text = xacro.process_file(file, mappings=args).documentElement.toxml()
+    text = xacro.process_file(file, mappings=args).documentElement.toprettyxml(indent="  ")
     if len(text) > MAX_TEXT:
         raise ValueError(f"expected at most {MAX_TEXT / 1e6:g} MB of URDF, found {len(text) / 1e6:.0f} MB")
     return str(text)
@@ -144,7 +144,8 @@ def _reason(xacro: Any, error: BaseException) -> str:
     while getattr(cause, "exc", None) is not None:
         cause = cause.exc
     kind = "" if str(cause) else type(cause).__name__
-    words = " ".join([kind, *str(error).split()]).strip()
+    told = cause if str(error).startswith("<class") else error  # xacro repeats what the cause says
+    words = " ".join([kind, *str(told).split()]).strip()
     files = [str(file) for file in xacro.filestack or [] if file]
     macros = [macro.body.getAttribute("name") for macro in xacro.macrostack or []]
     where = [f"in {files[-1]}"] if len(files) > 1 else []
