@@ -5,7 +5,6 @@ from .control.discrete import DiscreteController
 from .control.gains import Gains
 from .coupling.cell import Cell, Member
 from .coupling.coupling import Coupling
-from .coupling.reachability import inverse_kinematics
 from .coupling.synchronization import SynchronizationFunction
 from .coupling.weights import SmoothWeights
 from .errors import SynctrlError
@@ -21,6 +20,7 @@ from .simulation.mujoco_model import mujoco_model
 from .simulation.payloads import Payload
 from .simulation.result import Result
 from .simulation.simulate import Experiment, simulate
+from .tasks.inverse_kinematics import inverse_kinematics
 from .tasks.pose import PoseSpace
 from .tasks.poses import Attached, AxisRotation, FunctionOrientation, PoseTrajectory
 from .tasks.redundancy import Damping, Redundancy

@@ -182,6 +182,14 @@ class RunInterrupted(Portable, KeyboardInterrupt):
         super().__init__(message)
 
 
+class GainWarning(UserWarning):
+    """Gains that cannot do what was asked of them, or that ask for more than a robot has."""
+
+
+class LimitWarning(UserWarning):
+    """Joint positions outside the range that a robot's description states."""
+
+
 class SaturationWarning(UserWarning):
     """Torque was cut off at its limits, while the controller adapted and integrated as if it were not."""
 

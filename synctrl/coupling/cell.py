@@ -11,18 +11,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance
-from ..errors import InputError
+from ..errors import InputError, UnreachableError
 from ..robots.friction import Friction
 from ..robots.parameters import Parameters
 from ..robots.robot import Robot
 from ..robots.units import joined
+from ..tasks.inverse_kinematics import start_in
 from ..tasks.padding import padded
 from ..tasks.spaces import JointSpace, Space, units_of
 from ..tasks.trajectories import Motion, Trajectory
 from .coupling import Coupling
 from .desired import desired_motion, desired_weights
 from .member_checks import check_friction, check_labels, check_names, check_space, check_trajectory
-from .member_parameters import member_parameters
+from .member_parameters import member_parameters, with_urdf_friction
 from .weights import Weights
 
 
@@ -33,15 +34,18 @@ class Member:
     Args:
         robot: the robot, placed in the world.
         trajectory: its desired motion in the cell's space.
-        q0: joint positions at t = 0, (nv,), rad; by default on the path, in a space that says where that is,
-            as joint space does.
+        q0: joint positions at t = 0, (nv,), rad; by default on the path: in joint space that is said by the
+            path itself, in others found by inverse kinematics, within the robot's limits and close to the
+            space's posture if it has one.
         v0: joint velocities at t = 0, (nv,), rad/s; by default at rest.
         parameters: what is adapted, or its name: "full", all inertial parameters, by default; "base", the
             fewest that give the same torques. Their true values have to be those of this robot, as it is
             placed, and of this friction.
         theta_hat0: estimate at t = 0, (P,); by default zeros, which is to know nothing.
         friction: friction of the true plant, which the controller does not know, unless what is adapted are
-            `FrictionParameters`; by default none.
+            `FrictionParameters`; by default none. "urdf" is what the robot's description states, rotors
+            included, in the plant and among what is adapted: `parameters` that are None or a name become
+            `FrictionParameters`. What the description states and nobody asks for, a run warns of.
         name: for legends and messages.
     """
 
@@ -51,8 +55,25 @@ class Member:
     v0: ArrayLike | None = None
     parameters: Parameters | str | None = None
     theta_hat0: ArrayLike | None = None
-    friction: Friction = field(default_factory=Friction)
+    friction: Any = None
     name: str | None = None
+    _friction_from: str = field(default="given", init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.friction is None:
+            self._set(friction=Friction(), _friction_from="nobody")
+        elif isinstance(self.friction, str) and self.friction == "urdf" and isinstance(self.robot, Robot):
+            self._set(friction=self.robot.urdf_friction, _friction_from="urdf")
+            self._set(parameters=with_urdf_friction(self.robot, self.parameters))
+
+    def _set(self, **values: Any) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def friction_from(self) -> str:
+        """Who says what the friction is: "given", "urdf", or "nobody", and then there is none."""
+        return self._friction_from
 
     @property
     def theta(self) -> np.ndarray:
@@ -106,10 +127,15 @@ class Cell:
         parameters: what is adapted of every robot, see `Parameters`.
         theta: the true values of these, which the controller does not know, (n, P).
         q0, v0, theta_hat0: where the robots and the estimates start, (n, nv), (n, nv) and (n, P).
+        starts: where q0 comes from, a word for each robot: "given", "path" or "inverse kinematics".
 
     Raises:
         InputError: sizes that do not fit together; the message names the member.
         CouplingError: a coupling for another number of robots.
+        UnreachableError: no joint positions for the start of a path.
+
+    Warns:
+        LimitWarning: a robot that nobody told where to start has to do so beyond the limits of its joints.
     """
 
     def __init__(
@@ -220,21 +246,34 @@ class Cell:
 
     def _set_initial_state(self) -> None:
         q0, v0, theta_hat0 = [], [], []
-        for name, member, parameters in zip(self.names, self.members, self.parameters, strict=True):
+        starts = [self._start(i) for i in range(self.n)]
+        self.starts = tuple(word for word, _ in starts)
+        rows = zip(self.names, self.members, self.parameters, starts, strict=True)
+        for name, member, parameters, (_, start) in rows:
             nv = member.robot.nv
-            q0.append(finite_array(f"{name}, q0", self._start(name, member), (nv,)))
+            q0.append(finite_array(f"{name}, q0", start, (nv,)))
             v0.append(finite_array(f"{name}, v0", np.zeros(nv) if member.v0 is None else member.v0, (nv,)))
             size = len(parameters.theta)
             guess = np.zeros(size) if member.theta_hat0 is None else member.theta_hat0
             theta_hat0.append(finite_array(f"{name}, theta_hat0", guess, (size,)))
         self.q0, self.v0, self.theta_hat0 = padded(q0), padded(v0), padded(theta_hat0)
 
-    def _start(self, name: str, member: Member) -> ArrayLike:
+    def _start(self, i: int) -> tuple[str, ArrayLike]:
+        """Where q0 of a robot comes from, and q0."""
+        member, robot = self.members[i], self.robots[i]
         if member.q0 is not None:
-            return member.q0
+            return "given", member.q0
+        x = member.trajectory(0.0).x
         if hasattr(self.space, "start"):
-            return self.space.start(member.robot, member.trajectory(0.0).x)
-        raise InputError("expected joint positions to start from, found none", subject=f"{name}, q0")
+            return "path", self.space.start(robot, x)
+        if hasattr(self.space, "miss"):
+            preferred = getattr(self.space, "redundancy", None)
+            posture = None if preferred is None else preferred.of(self.robots, i)
+            try:
+                return "inverse kinematics", start_in(robot, x, self.space, posture)  # type: ignore[arg-type]
+            except UnreachableError as error:
+                raise UnreachableError(f"{error}", subject=f"{self.names[i]}, trajectory") from None
+        raise InputError("expected joint positions to start from, found none", subject=f"{self.names[i]}, q0")
 
     def _check_members(self) -> None:
         for name, member in zip(self.names, self.members, strict=True):

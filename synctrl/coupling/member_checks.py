@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..checks import finite_array, instance, label, per_joint
-from ..errors import InputError
+from ..errors import InputError, RobotWarning, warn
 from ..robots.friction import Friction
 from ..robots.robot import Robot
 from ..tasks.trajectories import MOTION_PARTS
@@ -109,6 +109,26 @@ def check_friction(name: str, friction: Any, robot: Robot) -> None:
     Raises:
         InputError: no Friction, or coefficients for another number of joints.
     """
-    instance(f"{name}, friction", friction, Friction, "a Friction")
+    instance(f"{name}, friction", friction, Friction, "a Friction, or 'urdf'")
     for part in ("viscous", "coulomb"):
         per_joint(f"{name}, friction, {part}", getattr(friction, part), robot.nv)
+
+
+def warn_of_unasked_friction(cell: Any) -> None:
+    """Say which robots have friction that nobody has asked for, and that does not act.
+
+    Warns:
+        RobotWarning: a description states friction, and its member says neither that it acts nor another one.
+    """
+    stated = {
+        name: member.robot.urdf_friction
+        for name, member in zip(cell.names, cell.members, strict=True)
+        if member.friction_from == "nobody"
+    }
+    rubbing = [name for name, friction in stated.items() if friction.viscous.any() or friction.coulomb.any()]
+    if rubbing:
+        warn(
+            f"{cell.name}: the descriptions of {', '.join(rubbing)} state friction, which does not act; give "
+            "Member(..., friction='urdf') to let it, or friction=Friction() to leave it out",
+            RobotWarning,
+        )

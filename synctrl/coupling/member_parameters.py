@@ -14,7 +14,7 @@ import numpy as np
 
 from ..checks import finite_array
 from ..errors import InputError, warn
-from ..robots.base_parameters import parameters_of
+from ..robots.base_parameters import KINDS, parameters_of
 from ..robots.friction import Friction
 from ..robots.friction_parameters import FrictionParameters
 from ..robots.parameters import FullParameters, LinearParameters, Parameters
@@ -56,6 +56,14 @@ def member_parameters(name: str, robot: Robot, friction: Friction, given: Any) -
     _check_truth(name, parameters, robot, friction)
     _check_map(name, parameters, robot)
     return parameters
+
+
+def with_urdf_friction(robot: Robot, given: Any) -> Any:
+    """Parameters with friction, and rotors if there are any, in the place of none or of a known name."""
+    if not (given is None or (isinstance(given, str) and given in KINDS)):
+        return given
+    base = parameters_of("full" if given is None else given, robot)
+    return FrictionParameters(robot, base=base, armature=bool(robot.armature.any()))
 
 
 def _with_friction(name: str, friction: Friction, given: Any) -> Any:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance, per_joint
 from ..errors import FrameNotFound, InputError
+from .friction import Friction
 from .model_checks import check_inertia, check_joints, check_numbering
 from .per_thread import PerThread
 from .units import joint_units
@@ -159,6 +160,11 @@ class Robot:
     def armature(self) -> np.ndarray:
         """Inertia of rotors that the joints turn along, (nv,), kg·m^2."""
         return np.array(self.model.armature)
+
+    @property
+    def urdf_friction(self) -> Friction:
+        """What its description states of friction; it acts where a `Member` asks for it."""
+        return Friction(self.model.damping, self.model.friction)
 
     @property
     def gravity_vector(self) -> np.ndarray:

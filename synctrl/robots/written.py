@@ -74,8 +74,9 @@ def read_robot(
     """
     if "urdf" not in about:
         raise RobotError("its description was not kept", subject=f"robot '{name}'")
-    file = Path(about.get("file", Path.cwd() / f"{name}.urdf"))
-    found = describe(read_text(file, about["urdf"].encode()), package_dirs)
+    file = Path(about["file"]) if "file" in about else None
+    document = read_text(file or Path(f"{name}.urdf"), about["urdf"].encode())
+    found = describe(replace(document, file=file), package_dirs)
     robot = Robot(
         found.model, about.get("tip", found.tip), visual=found.visual, name=name, document=found.document
     )

@@ -23,7 +23,9 @@ from .skeleton import reach
 from .style import DESIRED, robot_color
 
 #: as shares of the reach of the arms: a tip, a desired path, and bars without and with the largest error
-BALL, LINE, THIN, THICK = 0.022, 0.006, 0.006, 0.02
+BALL, LINE, THIN, THICK = 0.032, 0.006, 0.006, 0.02
+#: colour of the bar where there is no other
+ONE_PAIR = "#a3acb7"
 #: reach that is assumed where arms have none, such as wheels, m
 NO_REACH = 0.3
 #: a tip that moves less is drawn without a path, m
@@ -135,8 +137,9 @@ def _add_bars(
     size = np.linalg.norm(result.sync_error, axis=2)
     limit = float(size.max()) or 1.0 if limit is None else positive_number("limit", limit)
     share = np.clip(size[frames] / limit, 0, 1)
-    names = row_names(result, "sync_error")
-    marks = zip(result.info["pairs"], pair_colors(result), pair_symbols(result), names, strict=True)
+    names, colors = row_names(result, "sync_error"), pair_colors(result)
+    colors = colors if len(colors) > 1 else [ONE_PAIR]
+    marks = zip(result.info["pairs"], colors, pair_symbols(result), names, strict=True)
     for k, (robots, color, symbol, name) in enumerate(marks):
         calm = np.array(read_color(symbol, color)[:3])
         shade = calm + share[:, k, None] * (ALARM - calm)
@@ -144,7 +147,7 @@ def _add_bars(
         for end in robots[1:] if len(robots) == 2 else robots:
             start = tips[:, robots[0]] if len(robots) == 2 else tips[:, robots].mean(axis=1)
             scene.add_segment(f"{symbol}, to {result.names[end]}", start, tips[:, end], radius, shade)
-        scene.add_legend(f"{symbol}, {name.partition(': ')[2]}", color)
+        scene.add_legend(f"{symbol}: {name.partition(': ')[2]}", color)
 
 
 def _caption(robots: Sequence[Robot], result: Result, has_paths: bool) -> list[str]:

@@ -21,7 +21,7 @@ body { margin: 0; overflow: hidden; font-family: system-ui, sans-serif; }
 #words h1 { margin: 0 0 4px; font-size: 17px; font-weight: 600; }
 #words p { margin: 0 0 3px; font-size: 13px; line-height: 1.35; }
 #words i { display: inline-block; width: 10px; height: 10px; margin: 0 5px 0 0; border-radius: 2px; }
-#words span { margin-right: 14px; }
+#words span { display: inline-block; margin-right: 14px; }
 #failure { color: #a40000; font-weight: 600; }
 """
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
+from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -146,10 +148,11 @@ def shortened(text: str, room: float, size: float) -> str:
     """The text, or as much of it as there is room for, in points, with an ellipsis."""
     if text_width(text, size) <= room:
         return text
-    kept = next((k for k in range(len(text) - 1, 0, -1) if text_width(f"{text[:k]}…", size) <= room), 1)
-    return f"{text[:kept].rstrip(chr(92))}…"
+    fits = bisect_right(range(len(text)), room, key=lambda k: text_width(f"{text[:k]}…", size))
+    return f"{text[: max(fits - 1, 1)].rstrip(chr(92))}…"
 
 
+@lru_cache(maxsize=4096)
 def text_width(text: str, size: float) -> float:
     """How wide words are in a size, both in points."""
     from matplotlib.font_manager import FontProperties

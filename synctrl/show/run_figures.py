@@ -72,7 +72,7 @@ def torques(result: Result, *, width: float = WIDTH) -> Figure:
 
 
 def estimates(result: Result, *, width: float = WIDTH) -> Figure:
-    """Estimates that move most, a panel for each robot, with their true values dashed.
+    """Estimates that move most, a panel for each robot, with true values dashed that are not far off.
 
     Args:
         result: the run.
@@ -91,7 +91,8 @@ def estimates(result: Result, *, width: float = WIDTH) -> Figure:
         count = len(robot["parameters"])
         title = f"{result.names[i]}, {len(moved)} of {count} estimates" if count else result.names[i]
         names, true = ([robot[key][k] for k in moved] for key in ("parameters", "theta"))
-        curves.append(Curves(title, "SI units", theta_hat[:, moved], names, [(value,) for value in true]))
+        levels = _within_reach(theta_hat[:, moved], true)
+        curves.append(Curves(title, "SI units", theta_hat[:, moved], names, levels))
     return _figure(result, curves, width)
 
 
@@ -167,6 +168,12 @@ def _look(k: int) -> tuple[str, LineStyle]:
 
 def _limited(name: str, limit: float | None) -> str:
     return name if limit is None else f"{name}, ±{limit:g}"
+
+
+def _within_reach(values: np.ndarray, levels: Sequence[float]) -> list[tuple[float, ...]]:
+    """Levels that are no farther from all values, (T, k), than these are apart."""
+    low, high = values.min(initial=0.0), values.max(initial=0.0)
+    return [(level,) if 2 * low - high <= level <= 2 * high - low else () for level in levels]
 
 
 def _near(tau: np.ndarray, limit: float | None) -> tuple[float, ...]:

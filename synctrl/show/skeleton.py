@@ -14,7 +14,7 @@ from .colors import ColorLike, read_color
 from .rotations import towards
 
 #: radius of a link and of a joint, and half the length of a rod that slides, as shares of the robot's reach
-LINK, JOINT, ROD = 0.03, 0.045, 0.25
+LINK, JOINT, ROD = 0.03, 0.045, 0.4
 #: what a robot of no extent is drawn as large as, m
 SMALLEST = 0.2
 

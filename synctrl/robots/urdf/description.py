@@ -18,6 +18,7 @@ from ...errors import FrameNotFound, RobotError, near
 from .build import build_model, check_model
 from .checks import check_bodies, check_some_mass, check_tree
 from .document import Document, Inertial
+from .frictions import stated_friction
 from .inertials import with_inertials
 from .locks import settle_locks
 from .meshes import build_visual, find_pictures
@@ -141,7 +142,7 @@ def describe(
     document = find_pictures(document, Packages(document.file, package_dirs), notes)
     visual = build_visual(document, model)
     tip = _tip(document, model, tip, held, notes)
-    report = notes.report(document.source)
+    report = replace(notes.report(document.source), known=tuple(stated_friction(document)))
     warn_of(report)
     name = document.name if document.name.isprintable() else quoted(document.name)
     return Description(name, model, visual, tip, document, tuple(held), report)

@@ -37,10 +37,15 @@ class Note:
 
 @dataclass(frozen=True)
 class Report(Sequence[Note]):
-    """All notes about one robot, in the order of its description. `source` is what messages call it."""
+    """All notes about one robot, in the order of its description.
+
+    `source` is what messages call it. `known` is what is no oddity, and good to know: it is shown with the
+    rest, but neither counts nor warns.
+    """
 
     notes: tuple[Note, ...] = ()
     source: str = ""
+    known: tuple[Note, ...] = ()
 
     def of_kind(self, kind: str) -> tuple[Note, ...]:
         """The notes of one kind."""
@@ -55,7 +60,7 @@ class Report(Sequence[Note]):
         return "\n".join([f"{self.source}:", *lines, "  all of it: print(robot.report)"])
 
     def __str__(self) -> str:
-        lines = [f"  {note.kind}: {note}" for note in self.notes]
+        lines = [f"  {note.kind}: {note}" for note in (*self.notes, *self.known)]
         return "\n".join([f"{self.source}:", *lines]) if lines else self.summary()
 
     def __len__(self) -> int:
