@@ -10,16 +10,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
 
-import numpy as np
 import pinocchio as pin
+from survey_dynamics import differences, followers_in, loop_difference
 
-from synctrl import Cell, Coupling, Gains, Hold, Member, Robot, load_robot, simulate
+from synctrl import Robot, load_robot
 from synctrl.errors import SynctrlError
 from synctrl.robots.urdf.xacro import expand_xacro
 
 MOVING = ("revolute", "continuous", "prismatic")
 LONGEST_CHAIN_OF_WHEELS = 2
-SAMPLES = 5
 MOST_JOINTS = 14
 """More than the joints of two arms are a humanoid, a hand or a train of wheels."""
 
@@ -230,7 +229,7 @@ LIBRARIES = {"Pinocchio": _pinocchio, "yourdfpy": _yourdfpy, "MuJoCo": _mujoco}
 
 def _compare(robot: Robot, text: str, row: Row) -> None:
     try:
-        row.errors = differences(robot, pin.buildModelFromXML(text))
+        row.errors = differences(robot, pin.buildModelFromXML(text), followers_in(text))
     except ValueError as error:
         row.errors = {"not compared": math.nan}
         row.others["Pinocchio"] = row.others["Pinocchio"] or str(error)
@@ -244,73 +243,3 @@ def _run(task: Task, tip: str, row: Row) -> None:
             row.loop = loop_difference(task.load(tip))
         except SynctrlError as error:
             row.stopped = str(error)
-
-
-def differences(robot: Robot, model: pin.Model) -> dict[str, float]:
-    """Largest relative differences of a robot from Pinocchio's own model of its file.
-
-    Joints that the robot does not have are held there, too, at 0 or as near to it as they can go.
-    """
-    model = _reduced(robot, model)
-    rng, order = np.random.default_rng(0), _order(robot, model)
-    worst = dict.fromkeys(("M", "C", "g", "regressor"), 0.0)
-    for _ in range(SAMPLES):
-        q, v, v_ref, a_ref = rng.uniform(-1, 1, (4, robot.nv))
-        ours = (
-            robot.mass_matrix(q),
-            robot.coriolis_matrix(q, v),
-            robot.gravity(q),
-            robot.regressor(q, v, v_ref, a_ref),
-        )
-        theirs = _theirs(model, order, q, v, v_ref, a_ref)
-        for name, a, b in zip(worst, ours, theirs, strict=True):
-            worst[name] = max(worst[name], float(abs(a - b).max() / max(abs(b).max(), 1e-9)))
-    return worst
-
-
-def _order(robot: Robot, model: pin.Model) -> np.ndarray:
-    """Where each joint of the robot is in the velocities of a model."""
-    return np.array([model.joints[model.getJointId(name)].idx_v for name in robot.joint_names])
-
-
-def _reduced(robot: Robot, model: pin.Model) -> pin.Model:
-    held = [k for k, name in enumerate(model.names) if k and name not in robot.joint_names]
-    q = pin.neutral(model)
-    for k in held:
-        at = slice(joint.idx_q, joint.idx_q + 1) if (joint := model.joints[k]).nq == 1 else slice(0)
-        q[at] = np.clip(0, model.lowerPositionLimit[at], model.upperPositionLimit[at])
-    return pin.buildReducedModel(model, held, q)
-
-
-def _theirs(
-    model: pin.Model, order: np.ndarray, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray
-) -> tuple[np.ndarray, ...]:
-    """M, C, g and the Slotine-Li regressor by Pinocchio alone, in the robot's order of joints."""
-
-    def sorted_in(vector: np.ndarray) -> np.ndarray:
-        there = np.zeros(model.nv)
-        there[order] = vector
-        return there
-
-    data, weightless = model.createData(), pin.Model(model)
-    weightless.gravity.setZero()
-    q, v, v_ref, a_ref = map(sorted_in, (q, v, v_ref, a_ref))
-    q = pin.integrate(model, pin.neutral(model), q)
-    M = pin.crba(model, data, q).copy()
-    C = pin.computeCoriolisMatrix(model, data, q, v).copy()
-    g = pin.computeGeneralizedGravity(model, data, q).copy()
-    Y = pin.computeJointTorqueRegressor(model, data, q, (v + v_ref) / 2, a_ref).copy()
-    Y -= pin.computeJointTorqueRegressor(weightless, weightless.createData(), q, (v - v_ref) / 2, 0 * v)
-    columns = np.concatenate([np.arange(10 * k, 10 * k + 10) for k in order])
-    grid = np.ix_(order, order)
-    return M[grid], C[grid], g[order], np.atleast_2d(Y)[order][:, columns]
-
-
-def loop_difference(robot: Robot, duration: float = 0.1) -> float:
-    """How far two of the robot, held in step for a while, are from each other in the two engines."""
-    start = np.full(robot.nv, 0.1)
-    cell = Cell([Member(robot, Hold(start + shift)) for shift in (0.0, 0.05)], Coupling.pair())
-    inertia = np.diag(robot.mass_matrix(start))
-    gains = Gains(Lambda=5.0, beta=1.0, K_r=10 * inertia, K_eps=10 * float(inertia.min()), Gamma=0.0)
-    runs = [simulate(cell, gains, duration, engine=engine) for engine in ("pinocchio", "compiled")]
-    return float(abs(runs[0].q - runs[1].q).max())

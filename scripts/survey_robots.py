@@ -40,14 +40,18 @@ def main(arguments: Sequence[str] | None = None) -> list[Row]:
         with ThreadPoolExecutor(options.workers) as pool:
             tasks = [task for file in files for task in _tasks(file, collection)]
             rows[collection] = list(pool.map(partial(_apart, compare=options.compare), tasks))
-        print(f"{collection.name}: {len(files)} files", flush=True)
-    text = table(rows)
-    print(text)
-    if options.out:
-        options.out.write_text(text, encoding="utf-8")
-        everything = {str(c.name): [asdict(row) for row in found] for c, found in rows.items()}
-        options.out.with_suffix(".json").write_text(json.dumps(everything, indent=1), encoding="utf-8")
+        print(f"{collection.name}: {len(tasks)} files", flush=True)
+        if options.out:
+            _write(options.out, rows)
+    print(table(rows))
     return [row for found in rows.values() for row in found]
+
+
+def _write(out: Path, rows: dict[Path, list[Row]]) -> None:
+    """The table, and every row beside it."""
+    out.write_text(table(rows), encoding="utf-8")
+    everything = {collection.name: [asdict(row) for row in found] for collection, found in rows.items()}
+    out.with_suffix(".json").write_text(json.dumps(everything, indent=1), encoding="utf-8")
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:

@@ -16,6 +16,7 @@ from synctrl.robots.urdf.xacro import find_spec
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "scripts"))
+survey_dynamics = pytest.importorskip("survey_dynamics")
 survey_one = pytest.importorskip("survey_one")
 survey_robots = pytest.importorskip("survey_robots")
 pytest.importorskip("mujoco", reason="MuJoCo is an extra: pip install 'synctrl[mujoco]'")
@@ -89,9 +90,9 @@ def test_dynamics_are_compared_with_plain_pinocchio_and_both_engines_run(tmp_pat
 
 
 def test_a_difference_from_plain_pinocchio_is_found() -> None:
-    robot, other = load_robot("planar2r"), survey_one.pin.buildModelFromXML(PLANAR)
+    robot, other = load_robot("planar2r"), survey_dynamics.pin.buildModelFromXML(PLANAR)
     other.inertias[2].mass *= 1.001
-    errors = survey_one.differences(robot, other)
+    errors = survey_dynamics.differences(robot, other)
     assert errors["M"] > 1e-5
     assert errors["C"] > 1e-5
     assert errors["regressor"] < 1e-12

@@ -268,6 +268,13 @@ def test_what_a_file_prints_is_no_answer(tmp_path: Path) -> None:
 
 
 @needs_xacro
+def test_without_a_python_to_start_it_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    with pytest.raises(RobotError, match="expected a process of Python"):
+        expand_xacro(write(tmp_path / "a.xacro", link("a")))
+
+
+@needs_xacro
 def test_a_process_that_dies_is_said(tmp_path: Path) -> None:
     file = write(tmp_path / "a.xacro", expression(f"{GLOBALS}['_exit'](3)"))
     with pytest.raises(RobotError, match="ended without an answer"):

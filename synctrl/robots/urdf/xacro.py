@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -22,6 +23,8 @@ SUFFIX = ".xacro"
 TIME_LIMIT = 30.0
 """Time in s that a file may take; large robots take about one."""
 
+_NEEDED = ("SYSTEMROOT",)
+"""Variables of the environment without which Python does not start (on Windows)."""
 _LONGEST_LINE = 6 * xacro_child.MAX_TEXT + 1000
 """Characters of an answer: JSON writes one of the text as up to six."""
 
@@ -124,7 +127,15 @@ def _child(file: Path) -> Iterator[tuple[IO[str], IO[str]]]:
     """
     command = [sys.executable, "-I", "-S", "-X", "utf8", xacro_child.__file__]
     pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
-    child = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=nothing, env={}, encoding="utf-8")
+    given = {name: os.environ[name] for name in _NEEDED if name in os.environ}
+    try:
+        child = subprocess.Popen(
+            command, stdin=pipe, stdout=pipe, stderr=nothing, env=given, encoding="utf-8"
+        )
+    except OSError as error:
+        raise RobotError(
+            f"expected a process of Python that expands it, found: {error}", file=file
+        ) from error
     late = Event()
 
     def stop() -> None:
