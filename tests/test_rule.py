@@ -427,6 +427,25 @@ def test_moments_of_next_to_nothing_are_none_whatever_their_sign(tmp_path):
     np.testing.assert_allclose(again.mass_matrix(np.ones(3)), robot.mass_matrix(np.ones(3)), rtol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("inertial", "said"),
+    [
+        (f'<mass value="0"/>{INERTIA.format(i=0.02)}', "assumed"),
+        ('<mass value="0.5"/>', "assumed"),
+        (f'<mass value="0"/>{INERTIA.format(i=0)}', None),
+        (INERTIA.format(i=0.02), "left out"),
+        ("", "left out"),
+    ],
+)
+def test_an_inertial_that_lacks_something_costs_nothing_on_a_fixed_link(inertial, said, tmp_path):
+    part = f'<link name="d"><inertial>{inertial}</inertial></link>'
+    mount = '<joint name="jd" type="fixed"><parent link="c"/><child link="d"/><origin xyz="0 0.1 0"/></joint>'
+    robot = loaded(tmp_path, robot_text(ARM + part + mount))
+    assert [note.kind for note in robot.report] == ([said] if said else [])
+    if said != "left out":
+        same_as_pinocchio(robot, tmp_path / "robot.urdf")
+
+
 def test_physically_consistent_adaptation_says_that_it_cannot_use_what_no_body_has(tmp_path):
     robot = loaded(tmp_path, robot_text(ARM.replace('ixx="0.01"', 'ixx="0.03"', 1)))
     assert "physically consistent" in str(robot.report)
