@@ -41,6 +41,22 @@ def test_a_package_is_found_beside_a_description_and_beside_its_package(tmp_path
     assert Packages(home / "a.urdf").folder("meshes_of_arm") == other
 
 
+@pytest.mark.parametrize("kept", ["urdf", "robots"])
+def test_a_folder_with_descriptions_and_meshes_is_a_package_of_its_name(kept, tmp_path):
+    for folder in (kept, "meshes"):
+        (tmp_path / "arm" / folder).mkdir(parents=True)
+    packages = Packages(tmp_path / "arm" / kept / "old" / "a.urdf")
+    assert packages.folder("arm") == packages.home == tmp_path / "arm"
+    assert packages.allows(tmp_path / "arm" / "meshes" / "a.stl") and not packages.allows(tmp_path / "a.stl")
+    (tmp_path / "arm" / "meshes").rmdir()
+    alone = Packages(tmp_path / "arm" / kept / "old" / "a.urdf")
+    assert alone.folder("arm") is None and alone.home == tmp_path / "arm" / kept / "old"
+
+
+def test_a_description_may_call_its_own_folder_a_package(tmp_path):
+    assert Packages(tmp_path / "arm" / "a.urdf").folder("arm") == tmp_path / "arm"
+
+
 def test_a_folder_beside_a_package_is_none_without_a_package_xml(tmp_path):
     home = package(tmp_path / "a", "arm")
     (tmp_path / "private").mkdir()

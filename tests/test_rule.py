@@ -211,8 +211,15 @@ def test_the_longest_branch_bears_the_tip(tmp_path):
 
 def test_fingers_of_a_hand_that_was_asked_for_are_held(tmp_path):
     fingers = link("x") + joint("jx", "c", "x") + link("y") + joint("jy", "c", "y")
-    robot = loaded(tmp_path, robot_text(ARM + fingers), tip="c")
-    assert held(robot) == {"jx", "jy"}
+    for tip in ("c", "a"):
+        robot = loaded(tmp_path, robot_text(ARM + fingers), tip=tip)
+        assert held(robot) == {"jx", "jy"} and robot.joint_names == ("ja", "jb", "jc")
+
+
+def test_of_a_torso_that_carries_two_arms_as_the_tip_the_arms_are_held(tmp_path):
+    arms = chain("l1 l2 l3", "torso") + chain("r1 r2 r3", "torso")
+    robot = loaded(tmp_path, robot_text(chain("torso") + arms), tip="torso")
+    assert robot.joint_names == ("jtorso",)
 
 
 def test_an_arm_is_not_cut_behind_its_tip(tmp_path):

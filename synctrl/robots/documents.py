@@ -23,6 +23,7 @@ from .urdf.checks import check_bodies, check_tree, inertial_fault
 from .urdf.description import Description
 from .urdf.document import Document, Geometry, Inertial, Joint, Limit, Link, Pose, Shape, upper_triangle
 from .urdf.locks import lock_joints
+from .urdf.meshes import SCHEMES
 from .urdf.names import is_plain
 from .urdf.suspicions import triangle_fault
 from .urdf.writer import to_xml
@@ -204,7 +205,7 @@ def _check_meshes(document: Document, file: Path) -> None:
     for link in document.links:
         for geometry in (*link.visuals, *link.collisions):
             filename = geometry.shape.filename
-            if filename is not None and not filename.startswith("package://"):
+            if filename is not None and not filename.startswith(("/", *SCHEMES)):
                 folders = f"into its folder {document.file.parent}, found {file.resolve().parent}"
                 raise document.error(
                     f"mesh '{filename}': expected to write {folders}", link, line=geometry.line

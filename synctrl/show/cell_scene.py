@@ -65,8 +65,7 @@ def scene_of(
     frames = frame_indices(result, fps)
     scene = titled_scene(result, fps, "")
     add_arms(scene, result, robots, frames)
-    tips = tip_positions(robots, result.q[frames])
-    scale = _scale(robots)
+    tips, scale = tip_positions(robots, result.q[frames]), _scale(robots)
     for i, name in enumerate(result.names):
         scene.add_sphere(f"tip of {name}", BALL * scale, tips[:, i], robot_color(i))
     desired = _desired_tips(result, robots, frames, tips)

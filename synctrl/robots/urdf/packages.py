@@ -1,6 +1,7 @@
 """Packages of robot descriptions: where they are, and which folders a description may read.
 
 A package is a folder with a package.xml, and is called what that file says, whatever the folder's name is.
+Where that file is missing, a folder with `meshes` beside `urdf` or `robots` is a package of its own name.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from ...checks import instance
 from .regular import Unusable, read_regular
 
 MANIFEST = "package.xml"
+DESCRIPTIONS, MESHES = ("urdf", "robots"), "meshes"
 
 _MANIFEST_BYTES = 1_000_000
 _DEPTH = 3
@@ -41,8 +43,7 @@ class Packages:
             InputError: `folders` are no folders' names.
         """
         self.here = Path(os.path.abspath(file.parent if file else "."))
-        above = (folder for folder in (self.here, *self.here.parents) if _manifest_name(folder))
-        self.home = next(above, self.here)
+        self.home = next(filter(_package_name, self._above), self.here)
         self._named = named_folders(folders)
 
     def folder(self, name: str) -> Path | None:
@@ -54,8 +55,12 @@ class Packages:
         """
         if not _is_plain(name):
             return None
-        above = (folder for folder in (self.here, *self.here.parents) if _manifest_name(folder) == name)
+        above = (folder for folder in self._above if _package_name(folder) == name)
         return next(above, None) or self._others.get(name) or _first_folder(self._installed, name)
+
+    @property
+    def _above(self) -> tuple[Path, ...]:
+        return self.here, *self.here.parents
 
     @cached_property
     def roots(self) -> tuple[Path, ...]:
@@ -77,15 +82,15 @@ class Packages:
         holders = (*self._named, *_search_path("ROS_PACKAGE_PATH"))
         below = (folder for holder in holders for folder in (holder, *_below(holder, _DEPTH)))
         found: dict[str, Path] = {}
-        for folder in (*_below(self.here, 1), *self._siblings, *below):
-            found.setdefault(_manifest_name(folder) or folder.name, folder)
+        for folder in (self.here, *_below(self.here, 1), *self._siblings, *below):
+            found.setdefault(_package_name(folder) or folder.name, folder)
         return found
 
     @cached_property
     def _siblings(self) -> tuple[Path, ...]:
         """Packages beside that of the description."""
-        beside = _below(self.home.parent, 1) if _manifest_name(self.home) else ()
-        return tuple(folder for folder in beside if _manifest_name(folder))
+        beside = _below(self.home.parent, 1) if _package_name(self.home) else ()
+        return tuple(filter(_package_name, beside))
 
     @cached_property
     def _installed(self) -> tuple[Path, ...]:
@@ -129,6 +134,11 @@ def _is_plain(name: str) -> bool:
     return name not in ("", ".", "..") and not set(name) & {"/", "\\", "\0"}
 
 
+def _is_laid_out(folder: Path) -> bool:
+    """Whether a folder looks like a package: descriptions and meshes side by side."""
+    return os.path.isdir(folder / MESHES) and any(os.path.isdir(folder / name) for name in DESCRIPTIONS)
+
+
 def _first_folder(holders: Iterable[Path], name: str) -> Path | None:
     return next((holder / name for holder in holders if os.path.isdir(holder / name)), None)
 
@@ -143,16 +153,16 @@ def _below(folder: Path, depth: int) -> Iterator[Path]:
         if child.name.startswith("."):
             continue
         yield child
-        if depth > 1 and not _manifest_name(child):
+        if depth > 1 and not _package_name(child):
             yield from _below(child, depth - 1)
 
 
-def _manifest_name(folder: Path) -> str | None:
-    """What its package.xml calls a folder: the folder's own name if it does not say; None without one."""
+def _package_name(folder: Path) -> str | None:
+    """What a package is called: as its package.xml says, or else as its folder; None if it is no package."""
     try:
         data = read_regular(folder / MANIFEST, _MANIFEST_BYTES)
     except Unusable:
-        return None
+        return folder.name if _is_laid_out(folder) else None
     if b"<!DOCTYPE" in data:  # nobody needs entities here
         return folder.name
     try:
