@@ -41,6 +41,7 @@ class SynctrlError(Portable, Exception):
         file: the file or folder concerned, or None.
         line: of that file, counted from 1, or None.
         result: a `Result` with what a run had computed until then; None if the error did not stop a run.
+        problem: the message without what it begins with.
     """
 
     subject: str | None = None
@@ -48,6 +49,7 @@ class SynctrlError(Portable, Exception):
     file: str | None = None
     line: int | None = None
     result: Any = None
+    problem: str = ""
 
     def __init__(
         self,
@@ -61,6 +63,7 @@ class SynctrlError(Portable, Exception):
         file = None if file is None else str(file)
         data = {"subject": subject, "found": found, "file": file, "line": line or None}
         vars(self).update({name: value for name, value in data.items() if value is not None})
+        self.problem = message
         super().__init__(self._whole(message))
 
     def about(self, subject: str | None = None, **data: Any) -> Self:
@@ -105,9 +108,10 @@ class FrameNotFound(RobotError):
 
     def __init__(self, robot: str, frame: str, available: Iterable[str]):
         self.robot, self.frame, self.available = robot, frame, tuple(available)
+        there = (name if name.isprintable() else ascii(name) for name in self.available)
         super().__init__(
             f"robot '{robot}' has no frame '{frame}'{near(frame, self.available)}; "
-            f"its frames are: {', '.join(self.available)}"
+            f"its frames are: {', '.join(there)}"
         )
 
 
@@ -182,6 +186,14 @@ class RunInterrupted(Portable, KeyboardInterrupt):
     def __init__(self, message: str, *, time: float | None = None, result: Any = None):
         self.time, self.result = time, result
         super().__init__(message)
+
+
+class GainWarning(UserWarning):
+    """Gains that cannot do what was asked of them, or that ask for more than a robot has."""
+
+
+class LimitWarning(UserWarning):
+    """Joint positions outside the range that a robot's description states."""
 
 
 class SaturationWarning(UserWarning):

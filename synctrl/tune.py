@@ -24,7 +24,7 @@ from .sweep.distributions import LogUniform, Uniform
 from .sweep.evaluation import Evaluation, Evaluator, progress_bar
 from .sweep.factors import Factor, gain
 from .sweep.journal import Journal
-from .sweep.measures import MEASURES, warn_of
+from .sweep.measures import MEASURES, torque_unit, warn_of
 from .sweep.rows import COMPLETED, Generations, columns
 from .sweep.sweep import Study, StudyOptions
 from .sweep.worker import Task
@@ -83,7 +83,7 @@ def tune(
         search: ranges of gains by name, `{"beta": LogUniform(1, 1000)}`, or factors of a sweep; each with
             `Uniform` or `LogUniform` values.
         minimize: one of the measures of a sweep's table.
-        torque_limit: largest |tau| allowed on any joint, N·m.
+        torque_limit: largest |tau| allowed on any joint, N·m, and N of joints that slide.
         generations: how often the population is renewed.
         population: runs per generation, at least 5.
         folder: write every run there, and read runs made there before instead of making them again.
@@ -171,10 +171,11 @@ class _Search:
         """
         best = min(self.history, key=self.cost)
         if self.cost(best) >= 1:
+            unit = torque_unit(self.study.base.experiment.cell)
             torque = min((x for row in self.history if (x := row["peak_torque"]) is not None), default=None)
-            least = "all runs stopped" if torque is None else f"the smallest peak torque was {torque:.4g} N·m"
+            least = f"the smallest peak torque was {torque:.4g} {unit}" if torque else "all runs stopped"
             raise SweepError(
-                f"none of {len(self.history)} runs stayed within a torque of {self.limit:g} N·m to its "
+                f"none of {len(self.history)} runs stayed within a torque of {self.limit:g} {unit} to its "
                 f"end and has a {self.minimize}; {least}; search other ranges, or allow more torque",
                 subject="search" if torque is None else "torque_limit" if torque > self.limit else "minimize",
                 found=torque,

@@ -38,6 +38,7 @@ from synctrl.paper.paper_sections import metrics_tables
 from synctrl.paper.plant_sections import identification_section
 from synctrl.paper.report import Section, Text, Verdicts, write_page
 from synctrl.paper.theory import baseline_section, certificate_section, draw_certificate
+from synctrl.show import scene_of
 from synctrl.show.animation import planar_scene
 from synctrl.show.layout import cell_layout
 from synctrl.show.lyapunov_plots import lyapunov_figure
@@ -177,6 +178,8 @@ def saved(name: str, folder: Path) -> None:
     assert sync_errors(loaded).axes
     lyapunov(loaded, experiment(name))
     planar_scene(loaded, experiment(name)).page()
+    assert scene_of(loaded).page() == scene_of(run(name)).page()
+    assert [*loaded.plot("torque", "path", "estimates", width=3.5)] == ["torque", "path", "estimates"]
 
 
 def written(name: str, folder: Path) -> None:

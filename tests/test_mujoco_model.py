@@ -210,8 +210,9 @@ def test_arrays_of_another_kind_are_refused_and_nothing_is_written(bad):
 def test_a_cell_that_mujoco_cannot_have_is_refused():
     arm = load_robot("a460")
     other = arm.with_parameters(1.1 * arm.inertial_parameters)
+    bare = Robot(arm.model, arm.tip, name=arm.name)
     with refused(InputError, "plant='mujoco', robot 'a460'"):
-        mujoco_model(holding(other))
+        mujoco_model(holding(bare))
     changed = Robot(other.model, other.tip, document=arm.document)
     with refused(InputError, "plant='mujoco', robot 'a460'"):
         mujoco_model(holding(changed))

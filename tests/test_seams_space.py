@@ -237,8 +237,9 @@ def test_a_space_says_which_velocities_fit_its_positions():
 
 
 def test_units_of_coordinates_are_those_of_the_space_or_one_each():
-    assert units_of(Degrees(), 2) == ("deg", "deg")
-    assert units_of(PoseSpace(), 6) == ("m", "m", "m", "rad", "rad", "rad")
+    robots = (load_robot("planar2r"),)
+    assert units_of(Degrees(), robots) == ("deg", "deg")
+    assert units_of(PoseSpace(), robots) == ("m", "m", "m", "rad", "rad", "rad")
 
 
 @pytest.mark.parametrize("labels", [("a", "a"), ("a", ""), ("a", "b\nc"), ("a", 5)])

@@ -10,6 +10,7 @@ from refusals import refused
 
 from synctrl import CartesianSpace, Cell, Coupling, Hold, JointSpace, Member, load_robot
 from synctrl.errors import InputError
+from synctrl.tasks.spaces import units_of
 
 AXES = ["x", "z", "xy", "yx", "zx", "xyz", "zxy"]
 
@@ -112,7 +113,9 @@ def test_measurements_survive_the_next_one():
 def test_coordinates_have_names_and_units():
     arm = load_robot("a460")
     assert CartesianSpace("zx").labels([arm]) == ("z", "x") and CartesianSpace().unit == "m"
-    assert JointSpace().labels([arm]) == ("joint 1", "joint 2", "joint 3") and JointSpace().unit == "rad"
+    assert JointSpace().labels([arm]) == arm.joint_names == ("joint1", "joint2", "joint3")
+    assert JointSpace().labels([rod_arm((1, 1), (1, 1)), load_robot("asr_twodof")]) == ("joint 1", "joint 2")
+    assert JointSpace().unit == "rad" and units_of(JointSpace(), [arm]) == ("rad",) * 3
 
 
 @pytest.mark.parametrize("axes", ["", "xw", "xx", "XY", 3, None, ["x", "y"]])

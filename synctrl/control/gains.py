@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array, finite_number
+from ..coupling.cell import Cell
 from ..errors import InputError
 from ..tasks.algebra import padded
+from .suggest import suggested
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +52,46 @@ class Gains:
                 bound = "above 0" if positive else "of at least 0"
                 raise InputError(f"expected entries {bound}, found {low:g}", subject=name, found=float(low))
             object.__setattr__(self, name, gain)
+
+    @classmethod
+    def suggest(
+        cls,
+        cell: Cell,
+        bandwidth: float,
+        *,
+        period: float | None = None,
+        payload: float | None = None,
+        dt: float = 1e-3,
+        duration: float = 5.0,
+    ) -> Self:
+        """Gains for a cell, for damping that acts in joint space, from its robots' inertia along their paths.
+
+        Lambda = min(omega, top/4) and beta = min(Lambda/lambda_2, top/(4 lambda_n)), with the smallest
+        nonzero and the largest eigenvalue of S^T S and the largest rate, top = 0.97/dt or 1.2/period. K_r is
+        the larger of 8 omega M_jj and (0.3 |g_j| + |g_load,j|)/(0.1 rad Lambda), cut at light joints so that
+        all modes of M^-1 K_r stay below top - Lambda - beta lambda_n. K_eps is a quarter of the largest with
+        K_r - d_max/(4 Lambda) J^T c^T K_eps c J > 0, d_max = max (S^T S)_ii. Gamma = gamma tr(D_k P D_k P),
+        see `Gradient.pullback`, as large as Y Gamma Y^T <= (K_r^-1/(2 omega) + K_r^-1 M K_r^-1/6)^-1 allows.
+
+        Args:
+            cell: the robots and their task; its robots' parameters are taken for what is known of them.
+            bandwidth: omega, how fast errors should go away, rad/s.
+            period: of sampled control, s; None for continuous control.
+            payload: mass that the tips may carry without being told of, kg; by default 2 kg, or a fifth of
+                the arm's mass if that is less.
+            dt: step of RK4 with which continuous control is simulated, s.
+            duration: what of the desired motions is looked at, s.
+
+        Raises:
+            InputError: a number that is not positive, or parameters or a space of a user's own that do not
+                say what is needed.
+            UnreachableError: a path that a robot cannot reach.
+
+        Warns:
+            GainWarning: a mode that stays slower than the bandwidth, or a start so far off the path that the
+                first torque is beyond the limits.
+        """
+        return cls(**suggested(cell, bandwidth, period, payload, dt, duration))
 
     def independent(self) -> Self:
         """The same controller without synchronization, beta = K_eps = 0.

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from ..checks import finite_array, instance, label, offers, per_joint
-from ..errors import InputError, warn
-from ..robots.base_parameters import parameters_of
+from ..errors import InputError, RobotWarning, warn
+from ..robots.base_parameters import KINDS, parameters_of
 from ..robots.friction import Friction
 from ..robots.friction_parameters import FrictionParameters
 from ..robots.parameters import FullParameters, LinearParameters, Parameters
@@ -51,7 +51,12 @@ def check_labels(cell: Any) -> None:
     Raises:
         InputError: a name or unit that is not a text of one line, or two coordinates of one name.
     """
-    label("space: unit", cell.space.unit)
+    for unit in cell.units:
+        label("space: unit", unit)
+    if len(cell.units) != cell.m:
+        raise InputError(
+            f"expected one for each of {cell.m} coordinates, found {len(cell.units)}", subject="space: units"
+        )
     label("coupling: name", cell.coupling.name)
     label("coupling: unit", cell.coupling.unit)
     for axis in cell.labels:
@@ -93,7 +98,7 @@ def check_friction(name: str, friction: Any, robot: Robot) -> None:
     Raises:
         InputError: no Friction, or coefficients for another number of joints.
     """
-    instance(f"{name}, friction", friction, Friction, "a Friction")
+    instance(f"{name}, friction", friction, Friction, "a Friction, or 'urdf'")
     for part in ("viscous", "coulomb"):
         per_joint(f"{name}, friction, {part}", getattr(friction, part), robot.nv)
 
@@ -123,6 +128,14 @@ def member_parameters(name: str, robot: Robot, friction: Friction, given: Any) -
     _check_truth(where, parameters, robot, friction)
     _check_map(where, parameters, robot)
     return parameters
+
+
+def with_urdf_friction(robot: Robot, given: Any) -> Any:
+    """Parameters with friction, and rotors if there are any, in the place of none or of a known name."""
+    if not (given is None or (isinstance(given, str) and given in KINDS)):
+        return given
+    base = parameters_of("full" if given is None else given, robot)
+    return FrictionParameters(robot, base=base, armature=bool(robot.armature.any()))
 
 
 def _with_friction(name: str, friction: Friction, given: Any) -> Any:
@@ -213,3 +226,23 @@ def _difference(found: np.ndarray, expected: np.ndarray) -> tuple[float, float]:
     off = np.abs(found - expected).max(axis=0)
     allowed = np.maximum(OF_JOINT * sizes, OF_ROBOT * sizes.max())
     return float((off / np.maximum(allowed, np.finfo(float).tiny)).max()), float(off.max())
+
+
+def warn_of_unasked_friction(cell: Any) -> None:
+    """Say which robots have friction that nobody has asked for, and that does not act.
+
+    Warns:
+        RobotWarning: a description states friction, and its member says neither that it acts nor another one.
+    """
+    stated = {
+        name: member.robot.urdf_friction
+        for name, member in zip(cell.names, cell.members, strict=True)
+        if member.friction_from == "nobody"
+    }
+    rubbing = [name for name, friction in stated.items() if friction.viscous.any() or friction.coulomb.any()]
+    if rubbing:
+        warn(
+            f"{cell.name}: the descriptions of {', '.join(rubbing)} state friction, which does not act; give "
+            "Member(..., friction='urdf') to let it, or friction=Friction() to leave it out",
+            RobotWarning,
+        )

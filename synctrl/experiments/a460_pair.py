@@ -19,9 +19,10 @@ from ..checks import boolean
 from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
+from ..robots.catalog import load_robot
 from ..robots.friction import Friction
 from ..robots.friction_parameters import FrictionParameters
-from ..robots.robot import Robot, load_robot
+from ..robots.robot import Robot
 from ..simulation.held_joints import HeldJointsPlant, Pid
 from ..simulation.simulate import Experiment
 from ..tasks.spaces import JointSpace

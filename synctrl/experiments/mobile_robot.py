@@ -25,8 +25,9 @@ from numpy.typing import ArrayLike
 from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
 from ..coupling.synchronization import SynchronizationFunction
+from ..robots.catalog import load_robot
 from ..robots.parameters import LinearParameters
-from ..robots.robot import Robot, load_robot
+from ..robots.robot import Robot
 from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
 from ..tasks.spaces import JointSpace

@@ -16,9 +16,10 @@ import numpy as np
 from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
-from ..coupling.reachability import reach
-from ..robots.robot import load_robot
+from ..robots.catalog import load_robot
+from ..robots.friction import Friction
 from ..simulation.simulate import Experiment
+from ..tasks.inverse_kinematics import reach
 from ..tasks.redundancy import Redundancy
 from ..tasks.spaces import CartesianSpace
 from ..tasks.trajectories import Circle
@@ -113,5 +114,6 @@ def _member(station: Station, bearing: float, offset: np.ndarray) -> Member:
         circle,
         reach(robot, circle(0.0).x + offset, np.array(station.posture)),
         theta_hat0=KNOWN * robot.inertial_parameters,
+        friction=Friction(),
         name=station.name,
     )

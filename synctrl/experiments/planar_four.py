@@ -16,8 +16,9 @@ from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
 from ..errors import InputError
+from ..robots.catalog import load_robot
 from ..robots.parameters import planar_two_link_parameters, theta_50
-from ..robots.robot import Robot, load_robot
+from ..robots.robot import Robot
 from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
 from ..tasks.spaces import CartesianSpace

@@ -14,12 +14,12 @@ import numpy as np
 
 from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
-from ..coupling.reachability import inverse_kinematics
 from ..coupling.synchronization import SynchronizationFunction
+from ..robots.catalog import load_robot
 from ..robots.parameters import planar_two_link_parameters, theta_50
-from ..robots.robot import load_robot
 from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
+from ..tasks.inverse_kinematics import inverse_kinematics
 from ..tasks.spaces import CartesianSpace
 from ..tasks.trajectories import Circle
 from .parts import ControllerParts, ready_experiment

@@ -14,9 +14,10 @@ import numpy as np
 from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
-from ..coupling.reachability import reach
-from ..robots.robot import Robot, load_robot
+from ..robots.catalog import load_robot
+from ..robots.robot import Robot
 from ..simulation.simulate import Experiment
+from ..tasks.inverse_kinematics import reach
 from ..tasks.pose import PoseSpace
 from ..tasks.poses import Attached, AxisRotation, PoseTrajectory
 from ..tasks.rotations import exp

@@ -96,7 +96,7 @@ def compare(experiment: Experiment, scaled: Sequence[str] = ("Lambda",), **optio
         bench.trial("independent, Λ + β for Λ", independent.replace(Lambda=gains.Lambda + gains.beta)),
         bench.trial(matched, match.gains),
     )
-    units = experiment.cell.space.unit, experiment.cell.weighted_unit
+    units = experiment.cell.unit, experiment.cell.weighted_unit
     duration = float(options.get("duration") or experiment.duration)
     return Comparison(
         experiment.title or experiment.cell.name, duration, trials, ablation(bench), match, units

@@ -18,7 +18,8 @@ from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
 from ..errors import InputError
 from ..renamed import names_elsewhere
-from ..robots.robot import load_robot
+from ..robots.catalog import load_robot
+from ..robots.friction import Friction
 from ..show.legends import plain
 from ..show.panels import power_of_ten
 from ..show.plots import new_figure, style
@@ -54,7 +55,8 @@ def joint_pair(name: str) -> Experiment:
         robot = load_robot(name).placed((0.3 * i, 1.0, -0.2), (0.3, -0.4 * i, 0.5 + i))
         start = np.linspace(-0.7, 0.9, robot.nv) + 0.2 * i
         path = Cubic(start, start + np.linspace(0.5, -0.4, robot.nv), MOTION_TIME)
-        members.append(Member(robot, path, theta_hat0=KNOWN * robot.inertial_parameters))
+        theta_hat0 = KNOWN * robot.inertial_parameters
+        members.append(Member(robot, path, theta_hat0=theta_hat0, friction=Friction()))
     cell = Cell(members, Coupling.pair(), name=f"two {name}")
     return Experiment(cell, GAINS, DURATION, title=f"two {name} in joint space")
 

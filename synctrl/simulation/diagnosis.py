@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import NonFiniteError, OrientationError, SimulationError, SingularJacobianError
+from ..robots.units import joined, unit_for
 from .closed_loop import ClosedLoop
 from .schedules import DisturbanceSchedule
 from .stop import Excess, Push, Stop
@@ -31,7 +32,8 @@ NEARLY = 100.0
 #: causes that no closed loop has a hand in
 DESIRED = ("motion", "weights")
 
-UNITS = {"Lambda": " 1/s", "beta": " 1/s", "K_r": " N·m·s/rad", "K_eps": "", "Gamma": ""}
+DAMPING = "N·m·s/rad"
+UNITS = {"Lambda": " 1/s", "beta": " 1/s", "K_eps": "", "Gamma": ""}
 AWAY = "move the path away from the border of the workspace, or start in another configuration"
 #: what configurations do, by the kind of the error
 BY_KIND: dict[type[SimulationError], tuple[str, str]] = {
@@ -98,7 +100,7 @@ def find_cause(stop: Stop) -> Cause:
     """What is to blame: a push or a start that no step follows, the path, a gain, the step, the period."""
     push = stop.push()
     if push is not None and push.acceleration > ABSURD:
-        return _pushed(push)
+        return _pushed(stop, push)
     if (start := _fast_start(stop)) is not None:
         return start
     if stop.calm and (met := BY_KIND.get(type(stop.error))) is not None:
@@ -110,12 +112,14 @@ def find_cause(stop: Stop) -> Cause:
     if stop.conditions.max() > NEARLY:
         return _nearly_singular(stop)
     if push is not None and push.acceleration > STRONG:
-        return _pushed(push)
+        return _pushed(stop, push)
     return _strong_start(stop) or _unclear(stop)
 
 
-def _pushed(push: Push) -> Cause:
-    words = f"a push of {push.torque:g} N·m accelerates it by {push.acceleration:.2g} rad/s²; make it smaller"
+def _pushed(stop: Stop, push: Push) -> Cause:
+    torque, rate = (stop.unit(unit, push.robot, push.joint) for unit in ("N·m", "rad/s²"))
+    gained = f"accelerates it by {push.acceleration:.2g} {rate}"
+    words = f"a push of {push.torque:g} {torque} {gained}; make it smaller"
     return Cause("disturbance", words, push.robot, push.joint)
 
 
@@ -124,7 +128,8 @@ def _fast_start(stop: Stop) -> Cause | None:
     if not v0.max() > FASTEST_START:
         return None
     robot, joint = (int(k) for k in np.unravel_index(v0.argmax(), v0.shape))
-    return Cause("start", f"it starts with {v0.max():.3g} rad/s, which no step follows", robot, joint)
+    speed = f"{v0.max():.3g} {stop.unit('rad/s', robot, joint)}"
+    return Cause("start", f"it starts with {speed}, which no step follows", robot, joint)
 
 
 def _strong_start(stop: Stop) -> Cause | None:
@@ -184,5 +189,6 @@ def _gain(stop: Stop, gain: str, robot: int, joint: int) -> str:
     if values is None:  # an adaptation of another kind
         return "its adaptation"
     if gain == "K_r" and controller.k_r_space == "joint":
-        return f"K_r = {values[robot, joint]:g}{UNITS[gain]}"
-    return f"{gain} = {(values[robot] if values.ndim == 2 else values).max():g}{UNITS[gain]}"
+        return f"K_r = {values[robot, joint]:g} {stop.unit(DAMPING, robot, joint)}"
+    units = {**UNITS, "K_r": f" {joined(unit_for(DAMPING, unit) for unit in stop.loop.cell.units)}"}
+    return f"{gain} = {(values[robot] if values.ndim == 2 else values).max():g}{units[gain]}"

@@ -15,6 +15,7 @@ from ..coupling.cell import Cell
 from ..errors import SaturationWarning, warn
 from ..renamed import names_elsewhere
 from ..robots.limits import joint_limits
+from ..robots.units import unit_for
 from ..tasks.redundancy import velocity_lost
 from .plant import Output, Plant
 
@@ -49,21 +50,22 @@ def limit_report(
     Returns:
         One entry per interval: `robot` and `joint`, counted from 0; `kind`: "position", "velocity" or
         "torque"; `start`, `stop`: its first and last logged instant, s; `limit`: the one that was left; and
-        `reached`: what was farthest outside, in the unit of the kind. A torque is what the controller
-        commands: with saturation the plant got the limit instead.
+        `reached`: what was farthest outside; `unit`: that of both. A torque is what the controller commands:
+        with saturation the plant got the limit instead.
     """
     found = []
     for i, robot in enumerate(cell.robots):
         limits = joint_limits(robot)
         watched = (
-            ("position", q, limits.lower, limits.upper),
-            ("velocity", v, -limits.velocity, limits.velocity),
-            ("torque", tau, -limits.torque, limits.torque),
+            ("position", "rad", q, limits.lower, limits.upper),
+            ("velocity", "rad/s", v, -limits.velocity, limits.velocity),
+            ("torque", "N·m", tau, -limits.torque, limits.torque),
         )
-        for kind, values, lower, upper in watched:
-            for joint in range(robot.nv):
+        for kind, turning, values, lower, upper in watched:
+            for joint, unit in enumerate(robot.joint_units):
+                about = {"robot": i, "joint": joint, "kind": kind, "unit": unit_for(turning, unit)}
                 for entry in _outside(t, values[:, i, joint], lower[joint], upper[joint]):
-                    found.append({"robot": i, "joint": joint, "kind": kind, **entry})
+                    found.append({**about, **entry})
     return sorted(found, key=lambda entry: (entry["start"], entry["robot"], entry["joint"], entry["kind"]))
 
 
@@ -90,8 +92,8 @@ def saturation_report(plant: Plant, arrays: Mapping[str, np.ndarray]) -> list[di
         arrays: `tau`, (T, n, nv), N·m, and `theta_hat`, (T, n, P), at the logged instants.
 
     Returns:
-        One entry per joint: `robot` and `joint`, counted from 0; `limit`, N·m; `share` of the logged instants
-        at which the controller asked for more; `largest`, the largest torque that it asked for, N·m; and
+        One entry per joint: `robot` and `joint`, counted from 0; `limit`, in `unit`; `share` of the logged
+        instants at which the controller asked for more; `largest`, the largest torque that it asked for; and
         `theta_hat`, the largest magnitude of the robot's estimates at the start and over the run.
     """
     if not plant.saturate or not len(arrays["tau"]):
@@ -103,6 +105,7 @@ def saturation_report(plant: Plant, arrays: Mapping[str, np.ndarray]) -> list[di
             "robot": int(i),
             "joint": int(joint),
             "limit": float(limits[i, joint]),
+            "unit": unit_for("N·m", plant.cell.robots[i].joint_units[joint]),
             "share": float(share[i, joint]),
             "largest": float(size[:, i, joint].max()),
             "theta_hat": [float(part.max()) for part in (estimates[0, i], estimates[:, i])],
@@ -141,9 +144,9 @@ def warn_of_saturation(result: Result) -> None:
     warn(
         f"{result.info['title']}: torque was cut off at {len(found)} joints, for up to "
         f"{max(entry['share'] for entry in found):.0%} of the time; {result.names[worst['robot']]}, joint "
-        f"{worst['joint'] + 1} asked for {worst['largest']:.3g} N·m of its {worst['limit']:.3g}. Estimates "
-        "and integrals of the synchronization errors went on meanwhile as if it had got it"
-        f"{_learned(found)}. See info['saturation'] and "
+        f"{worst['joint'] + 1} asked for {worst['largest']:.3g} {worst['unit']} of its "
+        f"{worst['limit']:.3g}. Estimates and integrals of the synchronization errors went on meanwhile as "
+        f"if it had got it{_learned(found)}. See info['saturation'] and "
         f"outputs['{APPLIED}']; lower the gains, or ask for a slower motion",
         SaturationWarning,
     )

@@ -15,15 +15,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..checks import printable
+from ..coupling.cell import Cell
 from ..errors import InputError
 from ..robots.limits import joint_limits
+from ..robots.written import write_robot
 from .advance import Sample
 from .clock import Clock
 from .closed_loop import ClosedLoop, State
 from .limits import APPLIED, DampingLog, applied_output, limit_report, saturation_report
 from .memory import check_fits
 from .plant import Output
-from .result import LAYOUT, Result, unit_of
+from .result import LAYOUT, Result
+from .result_units import array_unit
 
 
 class Account(NamedTuple):
@@ -193,23 +196,14 @@ def sizes(loop: ClosedLoop) -> dict[str, int]:
 def describe(loop: ClosedLoop) -> dict[str, Any]:
     """Names, units, gains and options, as plain data."""
     cell, controller = loop.cell, loop.controller
-    return {
+    about = {
         "title": cell.name,
-        "robots": [
-            {
-                "name": name,
-                "model": robot.name,
-                "joints": list(robot.joint_names),
-                "parameters": list(parameters.names),
-                "theta": [float(value) for value in parameters.theta],
-                "torque_limits": [float(x) if np.isfinite(x) else None for x in joint_limits(robot).torque],
-            }
-            for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True)
-        ],
+        "robots": _describe_robots(cell),
         "axes": list(cell.labels),
-        "task_unit": cell.space.unit,
+        "task_unit": cell.unit,
+        "axis_units": list(cell.units),
         "weighted_unit": cell.weighted_unit,
-        "units": {name: unit_of(name, cell.space.unit, cell.weighted_unit) for name in LAYOUT},
+        "weighted_units": list(cell.weighted_units),
         "coupling": cell.coupling.name,
         "pairs": cell.coupling.edges.tolist(),
         "signs": cell.coupling.signs.tolist(),
@@ -222,6 +216,23 @@ def describe(loop: ClosedLoop) -> dict[str, Any]:
         "k_r_space": controller.k_r_space,
         "versions": versions(),
     }
+    return {**about, "units": {name: array_unit(about, name) for name in LAYOUT}}
+
+
+def _describe_robots(cell: Cell) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": name,
+            "model": robot.name,
+            "joints": list(robot.joint_names),
+            "joint_units": list(robot.joint_units),
+            "parameters": list(parameters.names),
+            "theta": [float(value) for value in parameters.theta],
+            "torque_limits": [float(x) if np.isfinite(x) else None for x in joint_limits(robot).torque],
+            **write_robot(robot),
+        }
+        for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True)
+    ]
 
 
 def versions() -> dict[str, str]:

@@ -16,7 +16,9 @@ import numpy as np
 from ..checks import count, instance
 from ..errors import InputError, ResultError
 from .result_file import LAYOUT, check_shape, read_result, shapes, unit_of, write_result
+from .result_units import array_unit, array_units
 from .schema import FORMAT
+from .views import GALLERY, found
 
 __all__ = ["FORMAT", "LAYOUT", "Result", "unit_of"]
 
@@ -112,10 +114,32 @@ class Result:
         return [robot["name"] for robot in self.info["robots"]]
 
     def unit(self, array: str) -> str:
-        """Unit of one of the arrays, or of the outputs."""
-        if array in self.outputs:
-            return str(self.info["outputs"][array]["unit"])
-        return unit_of(array, self.info["task_unit"], self.info["weighted_unit"])
+        """Unit of one of the arrays, or of the outputs; all of them, as in `rad, m`, where joints differ."""
+        return array_unit(self.info, array)
+
+    def units(self, array: str) -> tuple[tuple[str, ...], ...]:
+        """Units of the numbers of one of the arrays, or of the outputs, at one instant.
+
+        `units("tau")[0][2]` is that of joint 3 of robot 1: a row for each robot or pair, and a column for
+        each coordinate, or joint that the robot has. Arrays of other axes have one row and one column.
+        """
+        return array_units(self.info, array)
+
+    def plot(self, *names: str, width: float = 6.4) -> Any:
+        """Figures by name, which a notebook shows: errors, torques with limits, paths and estimates.
+
+        Args:
+            names: "tracking_error", "sync_error", "torque", "path", "estimates"; by default all of them.
+            width: of each figure, inches; at least 3.
+
+        Returns:
+            A dictionary of matplotlib figures, a `Gallery`: `.save(folder)` writes them, `.missing` says what
+            this result does not have.
+
+        Raises:
+            InputError: an unknown name, or nothing that can be drawn.
+        """
+        return found(*GALLERY)(self, *names, width=width)
 
     def decimated(self, every: int) -> Self:
         """The first of every so many logged instants, and the last; `info["decimated"]` says how many.

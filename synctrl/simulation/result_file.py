@@ -24,6 +24,7 @@ import numpy as np
 
 from ..errors import ResultError
 from ..files import whole_file
+from ..robots.units import TURNS, unit_for
 from .schema import check_info, read_json
 
 #: what reading a file that is no archive, or a damaged one, may raise
@@ -40,7 +41,8 @@ _HEADER = re.compile(
 #: largest time in a log, s, about 30,000 years: times beyond it are damage
 LATEST = 1e12
 
-#: array -> (dimensions, unit); "task" stands for the unit of the task, "weighted" for that of c e
+#: array -> (dimensions, unit); "task" stands for the unit of the task, "weighted" for that of c e; what has
+#: an axis "joint" has the unit that it has for a joint that turns
 LAYOUT: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
     {
         "t": (("time",), "s"),
@@ -60,9 +62,9 @@ LAYOUT: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
 )
 
 
-def unit_of(array: str, task: str, weighted: str) -> str:
-    """Unit of an array of `LAYOUT`, given those of the task and of c e."""
-    return LAYOUT[array][1].replace("task", task).replace("weighted", weighted)
+def unit_of(array: str, task: str, weighted: str, joint: str = TURNS) -> str:
+    """Unit of an array of `LAYOUT`, given those of the task and of c e, and of the position of the joint."""
+    return unit_for(LAYOUT[array][1].replace("task", task).replace("weighted", weighted), joint)
 
 
 def write_result(path: Path, info: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:

@@ -184,19 +184,25 @@ _ROBOT = entries(
         "parameters": rows(label),
         "theta": rows(number),
     },
-    {"model": label, "torque_limits": rows(optional(not_negative))},
+    {
+        **dict.fromkeys(("model", "tip", "file"), label),
+        "urdf": text,
+        "joint_units": rows(label),
+        "torque_limits": rows(optional(not_negative)),
+    },
 )
 _JOINT = {"robot": whole(below="robot"), "joint": whole(below="joint")}
 _WINDOW = {"robot": whole(below="robot"), "start": number}
 _DISTURBANCE = entries({**_WINDOW, "torque": numbers, "stop": number})
 _PAYLOAD = entries({**_WINDOW, "stop": optional(number), "mass": number})
-_LEFT_LIMIT = entries({**_WINDOW, **_JOINT, "stop": number, "kind": label})
+_LEFT_LIMIT = entries({**_WINDOW, **_JOINT, "stop": number, "kind": label}, {"unit": label})
 _CUT_OFF = entries(
     {
         **_JOINT,
         **dict.fromkeys(("limit", "share", "largest"), not_negative),
         "theta_hat": rows(not_negative, least=2),
-    }
+    },
+    {"unit": label},
 )
 _STEP = {"estimate": not_negative, **_JOINT, "time": number, "advised_step": optional(positive)}
 #: a step that was looked at, and what is said where none was
@@ -226,6 +232,7 @@ INFO = entries(
     },
     {
         "units": each(label),
+        **dict.fromkeys(("axis_units", "weighted_units"), rows(label, "axis")),
         "coupling": label,
         "signs": rows(rows(number), "pair"),
         "outputs": each(entries({"unit": label, "axes": rows(label, least=1)})),
@@ -273,11 +280,12 @@ def _check_robots(robots: list[dict[str, Any]], sizes: Mapping[str, int]) -> Non
         raise ResultError("expected another name for each robot, found one twice", subject="info, robots")
     for k, robot in enumerate(robots):
         found = {name: len(robot[name]) for name in ("joints", "parameters", "theta")}
-        limits = len(robot.get("torque_limits", robot["joints"]))
+        found |= {name: len(robot[name]) for name in ("torque_limits", "joint_units") if name in robot}
         fits = found["joints"] <= sizes["joint"] and found["parameters"] <= sizes["parameter"]
-        if not fits or found["theta"] != found["parameters"] or limits != found["joints"]:
+        per_joint = {found.get(name, found["joints"]) for name in ("torque_limits", "joint_units")}
+        if not fits or found["theta"] != found["parameters"] or per_joint != {found["joints"]}:
             raise ResultError(
-                "expected as many theta as parameters and torque_limits as joints, up to "
-                f"{sizes['parameter']} and {sizes['joint']}, found {found} and {limits} torque_limits",
+                "expected as many theta as parameters, and torque_limits and joint_units as joints, up to "
+                f"{sizes['parameter']} and {sizes['joint']}, found {found}",
                 subject=f"info, robots[{k}]",
             )

@@ -30,6 +30,7 @@ from ..control.gains import Gains
 from ..control.laws import Law
 from ..control.network import Network
 from ..coupling.cell import Cell
+from ..coupling.member_checks import warn_of_unasked_friction
 from ..errors import InputError
 from ..renamed import names_elsewhere
 from .clock import TIE, make_clock, multiple
@@ -141,6 +142,7 @@ class Experiment:
 
         Warns:
             SaturationWarning, StepWarning: torque was cut off; the step of "rk4" was too long.
+        RobotWarning: a robot's description states friction, and nobody says whether it acts.
         """
         run = self.plan(duration, dt, control_period, plant, log_dt)
         return _carry_out(run, integrator, engine, (rtol, atol), progress)
@@ -190,6 +192,8 @@ class Experiment:
         info["plant"], info["saturate"] = plant, bool(self.saturate)
         info["title"] = self.title or self.cell.name
         info["control_period"] = control_period
+        info["start"] = list(self.cell.starts)
+        info["friction"] = [member.friction_from for member in self.cell.members]
         info["disturbances"] = [_describe(d) for d in self.disturbances]
         info["payloads"] = [payload.as_dict() for payload in self.payloads]
         events = [float(t) for t in np.sort(loop.events) if 0 <= t < clock.end - TIE * dt]
@@ -251,6 +255,7 @@ def _carry_out(
     elif (reason := by.refuses(run)) is not None:
         raise InputError(reason, subject="engine")
     run.check()
+    warn_of_unasked_friction(run.experiment.cell)
     result = run_adaptive(run, integrator, rtol, atol, progress) if adaptive else by.run(run, progress)
     warn_of_step(result.info["step_error"], result.names, run.info["dt"])
     warn_of_saturation(result)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import SimulationError
+from ..robots.units import unit_for
 from .closed_loop import ClosedLoop
 from .rates import HELD, HELD_SPRING, RUNGE_KUTTA, SWING, Rate, loop_rates
 from .schedules import DisturbanceSchedule
@@ -123,6 +124,10 @@ class Stop:
         speed = np.nan_to_num(np.abs(self.speed_after[list(robots)]), nan=np.inf)
         k, joint = np.unravel_index(np.argmax(speed >= 0.999 * speed.max()), speed.shape)
         return robots[int(k)], int(joint)
+
+    def unit(self, turning: str, robot: int, joint: int) -> str:
+        """Unit of something of a joint that has the unit `turning` for joints that turn."""
+        return unit_for(turning, self.loop.cell.robots[robot].joint_units[joint])
 
     # -- how fast it wants to move ------------------------------------------------------------------------
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.metrics import ERRORS
-from ..checks import count, instance, non_negative_number, positive_number
+from ..analysis.metrics import ERRORS, Band, checked_band
+from ..checks import count, instance, positive_number
 from ..errors import InputError, ResultError
 from ..files import read_regular
 from ..simulation.recorder import describe
@@ -111,7 +111,7 @@ def row_format(about: Mapping[str, Any]) -> Format:
     return Format(expected, draws, duration, measures)
 
 
-def checked_bands(bands: Any) -> dict[str, float]:
+def checked_bands(bands: Any) -> dict[str, Band]:
     """Settling bands by kind of error.
 
     Raises:
@@ -119,7 +119,7 @@ def checked_bands(bands: Any) -> dict[str, float]:
     """
     if not isinstance(bands, Mapping) or set(bands) != set(ERRORS):
         raise InputError(f"expected numbers for {' and '.join(ERRORS)}, found {bands!r}", subject="bands")
-    return {kind: non_negative_number(f"bands, {kind}", bands[kind]) for kind in ERRORS}
+    return {kind: checked_band(f"bands, {kind}", bands[kind]) for kind in ERRORS}
 
 
 def difference(there: Any, here: Any, where: str = "") -> str:

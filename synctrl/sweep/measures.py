@@ -12,6 +12,7 @@ from ..analysis.metrics import (
     DEFINITIONS,
     ERRORS,
     SETTLING_FRACTION,
+    Band,
     Metrics,
     finite_or_none,
     metrics,
@@ -19,6 +20,7 @@ from ..analysis.metrics import (
 from ..analysis.metrics import squared as squared_unit
 from ..coupling.cell import Cell
 from ..errors import SaturationWarning, StepWarning, warn
+from ..robots.units import joined, unit_for
 from ..simulation.result import Result
 from ..simulation.step_error import LIMIT
 
@@ -69,18 +71,24 @@ MEASURES = (*(f"{_SHORT[kind]}_{name}" for kind in ERRORS for name in _OVER_ALL)
 
 def definitions(cell: Cell) -> dict[str, Measure]:
     """What each measure means, with the units of a cell."""
-    units = {"tracking_error": cell.space.unit, "sync_error": cell.weighted_unit}
+    units = {"tracking_error": cell.unit, "sync_error": cell.weighted_unit}
     found = {}
     for kind, unit in units.items():
-        special = {"ise": f"{squared_unit(unit)}·s", "settling_time": "s"}
+        square = joined(f"{squared_unit(each)}·s" for each in unit.split(", "))
+        special = {"ise": square, "settling_time": "s"}
         for name, (how, _) in _OVER_ALL.items():
             text = f"{DEFINITIONS[name].split(';')[0]}; {how.format(rows=_ROWS[kind])}"
             found[f"{_SHORT[kind]}_{name}"] = Measure(text, special.get(name, unit))
     text = f"{DEFINITIONS['peak_torque']}; the largest over all robots and joints"
-    return {**found, "peak_torque": Measure(text, "N·m"), **TRUST}
+    return {**found, "peak_torque": Measure(text, torque_unit(cell)), **TRUST}
 
 
-def measures(result: Result, bands: Mapping[str, float]) -> list[float | None]:
+def torque_unit(cell: Cell) -> str:
+    """Unit of the torques of a cell; `N·m, N` where some joints turn and others slide."""
+    return joined(unit_for("N·m", unit) for robot in cell.robots for unit in robot.joint_units)
+
+
+def measures(result: Result, bands: Mapping[str, Band]) -> list[float | None]:
     """The measures of a run, in the order of `MEASURES`; None where there is no finite number.
 
     Args:

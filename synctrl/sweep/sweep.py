@@ -7,7 +7,9 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
-from ..analysis.metrics import settling_bands
+import numpy as np
+
+from ..analysis.metrics import Band, settling_bands
 from ..checks import choice, count, index, instance, positive_number
 from ..errors import InputError, SimulationError
 from ..simulation.recorder import versions
@@ -31,7 +33,7 @@ class StudyOptions(TypedDict, total=False):
     dt: float
     engine: str
     control_period: float | None
-    bands: Mapping[str, float] | None
+    bands: Mapping[str, Band] | None
 
 
 class Study:
@@ -62,7 +64,7 @@ class Study:
         dt: float = 1e-3,
         engine: str = "compiled",
         control_period: float | None = None,
-        bands: Mapping[str, float] | None = None,
+        bands: Mapping[str, Band] | None = None,
     ):
         instance("base", base, Experiment, "an Experiment")
         duration = base.duration if duration is None else positive_number("duration", duration)
@@ -94,7 +96,7 @@ class Study:
             "engine": setup.engine,
             "control_period": setup.control_period,
             "base": describe_base(setup),
-            "settling_bands": dict(job.bands),
+            "settling_bands": {kind: np.asarray(band).tolist() for kind, band in job.bands.items()},
             "columns": job.columns,
             "measures": {name: measured[name]._asdict() for name in MEASURES},
             "versions": versions(),
@@ -105,7 +107,7 @@ class Study:
         return f"Study of {self.base!r}, seed {self.seed}{factors}"
 
     @cached_property
-    def _found_bands(self) -> dict[str, float]:
+    def _found_bands(self) -> dict[str, Band]:
         if self._bands is not None:
             return self._bands
         setup = self.base

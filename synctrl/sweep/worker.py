@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
+from ..analysis.metrics import Band
 from ..checks import choice
 from ..errors import SimulationError, SweepError, SynctrlError
 from ..simulation.engines import Run, find_engine
@@ -52,7 +53,7 @@ class Job(NamedTuple):
 
     base: Setup
     factors: tuple[Factor, ...]
-    bands: Mapping[str, float]
+    bands: Mapping[str, Band]
     keep_every: int | None = None
 
     def __repr__(self) -> str:

@@ -56,6 +56,10 @@ class Redundancy:
     def __post_init__(self) -> None:
         non_negative_number("redundancy, gain", self.gain)
 
+    def of(self, robots: Sequence[Robot], i: int) -> np.ndarray | None:
+        """The posture of one of the robots, (nv,), or None if there is none."""
+        return None if self.posture is None else _rows("posture", self.posture, robots, 0.0)[i]
+
     def spread(self, robots: Sequence[Robot]) -> Posture:
         """W^-1, posture and its gain, each (n, nv): rows padded with zeros for joints a robot does not have.
 

@@ -58,7 +58,8 @@ class Space(Protocol):
     The coordinates have different names, each a word of one line. Beside what is below, a space may offer any
     of the following, and is asked for it where it does; what it does not offer is not looked at.
 
-    - `units`: unit of each of the m coordinates, where they differ.
+    - `units`: unit of each of the m coordinates, where they differ; or, where they depend on the robots, a
+      method that gives them for these, as `labels` does.
     - `miss(robot, target, q) -> error, Jacobian`: by how much a robot at q misses a target, (m,), and J,
       (m, nv), with e' = -J v. With it a run begins only if joint positions exist for what is desired.
     - `start(robot, x) -> q`: joint positions, (nv,), of a robot that begins at x, (m,), and has no `q0`.
@@ -77,9 +78,12 @@ class Space(Protocol):
         """This space for certain robots."""
 
 
-def units_of(space: Space, m: int) -> tuple[str, ...]:
-    """Unit of each of the m coordinates of a space."""
-    return tuple(getattr(space, "units", (space.unit,) * m))
+def units_of(space: Space, robots: Sequence[Robot]) -> tuple[str, ...]:
+    """Unit of each of the m coordinates that a space has for these robots."""
+    units = getattr(space, "units", None)
+    if units is None:
+        return (space.unit,) * len(space.labels(robots))
+    return tuple(units(robots) if callable(units) else units)
 
 
 class JointSpace:
@@ -88,8 +92,14 @@ class JointSpace:
     unit = "rad"
 
     def labels(self, robots: Sequence[Robot]) -> tuple[str, ...]:
-        """`joint 1`, `joint 2`, ..."""
-        return tuple(f"joint {k}" for k in range(1, robots[0].nv + 1))
+        """Names of the joints, if all robots call them the same; else `joint 1`, `joint 2`, ..."""
+        names = {robot.joint_names for robot in robots}
+        return names.pop() if len(names) == 1 else tuple(f"joint {k}" for k in range(1, robots[0].nv + 1))
+
+    def units(self, robots: Sequence[Robot]) -> tuple[str, ...]:
+        """Units of the joints; `rad or m` where one robot turns and another one slides."""
+        of = (robot.joint_units for robot in robots)
+        return tuple(" or ".join(dict.fromkeys(units)) for units in zip(*of, strict=False))
 
     def bind(self, robots: Sequence[Robot]) -> BoundJointSpace:
         """Joint space of these robots.

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...checks import instance, non_negative_number
 from ...coupling.cell import Cell
 from ...errors import InputError
+from ...robots.pseudo_inertia import pullback
+from ...robots.robot import Robot
 from ..gains import RaggedGain, read_gain, spread_rows
 from .protocol import Adaptation, Seen
 
@@ -32,6 +35,23 @@ class Gradient:
         self.Gamma = read_gain("Gamma", Gamma)
         if self.Gamma.size and self.Gamma.min() < 0:
             raise InputError(f"expected entries of at least 0, found {self.Gamma.min():g}", subject="Gamma")
+
+    @classmethod
+    def pullback(cls, robot: Robot, gamma: float) -> Self:
+        """Rates that fit all inertial parameters of a robot: Gamma_k = gamma tr(D_k P D_k P), see `pullback`.
+
+        P are the pseudo-inertias of the robot's bodies, so a rate is large where a parameter may change by
+        much, and a change of units changes nothing.
+
+        Args:
+            robot: its true parameters, or what is known of them, say which size they have.
+            gamma: rate, 1/(N·m), not below 0.
+
+        Raises:
+            InputError: no robot, or a rate below 0.
+        """
+        instance("robot", robot, Robot, "a Robot, for example from load_robot")
+        return cls(non_negative_number("gamma", gamma) * pullback(robot.inertial_parameters))
 
     def bind(self, cell: Cell) -> BoundGradient:
         """This adaptation for a cell.
