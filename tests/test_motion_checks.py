@@ -55,12 +55,12 @@ def cell_with(trajectory, space=None) -> Cell:
 
 
 WRONG: dict[str, tuple[Callable, Callable, dict]] = {
-    "sign": (lambda t: -velocity(t), acceleration, {"derivative": "velocity", "coordinate": "joint 1"}),
+    "sign": (lambda t: -velocity(t), acceleration, {"derivative": "velocity", "coordinate": "joint1"}),
     "degrees": (velocity, lambda t: np.rad2deg(acceleration(t)), {"derivative": "acceleration"}),
     "one coordinate": (
-        lambda t: velocity(t) * [1, 1.05], acceleration, {"derivative": "velocity", "coordinate": "joint 2"},
+        lambda t: velocity(t) * [1, 1.05], acceleration, {"derivative": "velocity", "coordinate": "joint2"},
     ),
-    "left out": (velocity, lambda t: np.zeros(2), {"derivative": "acceleration", "coordinate": "joint 1"}),
+    "left out": (velocity, lambda t: np.zeros(2), {"derivative": "acceleration", "coordinate": "joint1"}),
 }  # fmt: skip
 
 
