@@ -53,7 +53,7 @@ clean:
 	find . -path "./$(VENV)*" -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)/.installed-core: WHAT := .[mujoco]
-$(VENV)/.installed-test: WHAT := .[test,notebooks,compiled,mujoco,sweep]
+$(VENV)/.installed-test: WHAT := .[test,notebooks,compiled,mujoco,sweep,xacro]
 $(VENV)/.installed-dev:  WHAT := .[dev]
 $(LOWEST)/.installed-lowest: WHAT := .[test,compiled,mujoco,sweep]
 

@@ -5,21 +5,21 @@ from .control.discrete import DiscreteController
 from .control.gains import Gains
 from .coupling.cell import Cell, Member
 from .coupling.coupling import Coupling
-from .coupling.reachability import inverse_kinematics
 from .coupling.synchronization import SynchronizationFunction
 from .coupling.weights import SmoothWeights
 from .errors import SynctrlError
 from .renamed import serve_old_names
 from .robots.base_parameters import BaseParameters
+from .robots.catalog import load_robot
 from .robots.friction import Friction
 from .robots.friction_parameters import FrictionParameters
 from .robots.parameters import FullParameters, LinearParameters
-from .robots.robot import Robot, load_robot
-from .simulation.disturbances import Disturbance
-from .simulation.mujoco_model import mujoco_model
-from .simulation.payloads import Payload
+from .robots.robot import Robot
+from .simulation.mujoco import mujoco_model
 from .simulation.result import Result
+from .simulation.schedules import Disturbance, Payload
 from .simulation.simulate import Experiment, simulate
+from .tasks.inverse_kinematics import inverse_kinematics
 from .tasks.pose import PoseSpace
 from .tasks.poses import Attached, AxisRotation, FunctionOrientation, PoseTrajectory
 from .tasks.redundancy import Damping, Redundancy

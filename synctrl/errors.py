@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import Any, Self
 
 
 class Portable(BaseException):
@@ -41,6 +41,7 @@ class SynctrlError(Portable, Exception):
         file: the file or folder concerned, or None.
         line: of that file, counted from 1, or None.
         result: a `Result` with what a run had computed until then; None if the error did not stop a run.
+        problem: the message without what it begins with.
     """
 
     subject: str | None = None
@@ -48,6 +49,7 @@ class SynctrlError(Portable, Exception):
     file: str | None = None
     line: int | None = None
     result: Any = None
+    problem: str = ""
 
     def __init__(
         self,
@@ -61,7 +63,13 @@ class SynctrlError(Portable, Exception):
         file = None if file is None else str(file)
         data = {"subject": subject, "found": found, "file": file, "line": line or None}
         vars(self).update({name: value for name, value in data.items() if value is not None})
+        self.problem = message
         super().__init__(self._whole(message))
+
+    def about(self, subject: str | None = None, **data: Any) -> Self:
+        """This error with more data, for one whose message says in words of its own what it is about."""
+        vars(self).update(subject=subject, **data)
+        return self
 
     def _whole(self, message: str) -> str:
         """The message with what it begins with."""
@@ -100,9 +108,10 @@ class FrameNotFound(RobotError):
 
     def __init__(self, robot: str, frame: str, available: Iterable[str]):
         self.robot, self.frame, self.available = robot, frame, tuple(available)
+        there = (name if name.isprintable() else ascii(name) for name in self.available)
         super().__init__(
             f"robot '{robot}' has no frame '{frame}'{near(frame, self.available)}; "
-            f"its frames are: {', '.join(self.available)}"
+            f"its frames are: {', '.join(there)}"
         )
 
 
@@ -179,6 +188,14 @@ class RunInterrupted(Portable, KeyboardInterrupt):
         super().__init__(message)
 
 
+class GainWarning(UserWarning):
+    """Gains that cannot do what was asked of them, or that ask for more than a robot has."""
+
+
+class LimitWarning(UserWarning):
+    """Joint positions outside the range that a robot's description states."""
+
+
 class SaturationWarning(UserWarning):
     """Torque was cut off at its limits, while the controller adapted and integrated as if it were not."""
 
@@ -231,9 +248,7 @@ def failed(what: str, t: float, error: Exception, robot: int | None = None) -> S
         robot: index of the robot concerned, counted from 0, or None.
     """
     message = f"{what} failed at t = {t:g} s with {type(error).__name__}: {error}"
-    stop = SimulationError(message, time=t, robot=robot)
-    stop.subject = what
-    return stop
+    return SimulationError(message, time=t, robot=robot).about(what)
 
 
 def _remade(kind: type[BaseException], args: tuple) -> BaseException:

@@ -7,20 +7,20 @@ from collections.abc import Callable
 from typing import Any
 
 from synctrl.analysis.certify import certify
-from synctrl.analysis.convergence import convergence
+from synctrl.analysis.convergence import convergence, identify
 from synctrl.analysis.gain_condition import gain_condition
-from synctrl.analysis.identification import identify
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.analysis.metrics import as_data, metrics, row_names, settling_bands
 from synctrl.errors import SynctrlError
-from synctrl.paper.judge import compare_runs
-from synctrl.paper.judge_section import differences
-from synctrl.paper.step_section import step_section
+from synctrl.paper.judge import compare_runs, differences
+from synctrl.paper.plant_sections import step_section
+from synctrl.show import scene_of
 from synctrl.show.animation import payload_pair_scene, planar_scene
 from synctrl.show.layout import cell_layout
 from synctrl.show.lyapunov_plots import lyapunov_figure
 from synctrl.show.plots import common_limits, joint_trajectories, sync_errors, tracking_errors
 from synctrl.show.real_cells import error_colors, formation_scene, payload_scene
+from synctrl.show.run_figures import estimates, paths, torques
 from synctrl.show.vehicle import vehicle_animation
 
 FIGURES: dict[str, Callable[[Any, Any], Any]] = {
@@ -30,6 +30,9 @@ FIGURES: dict[str, Callable[[Any, Any], Any]] = {
     "sync_errors, limits": lambda r, e: sync_errors(r, common_limits("tracking_error", r)),
     "cell_layout": cell_layout,
     "differences": lambda r, e: differences([compare_runs(r, r)]),
+    "torques": lambda r, e: torques(r),
+    "paths": lambda r, e: paths(r),
+    "estimates": lambda r, e: estimates(r),
     "lyapunov_figure": lambda r, e: lyapunov_figure(lyapunov(r, e)),
 }
 SCENES: dict[str, Callable[[Any, Any], Any]] = {
@@ -37,6 +40,7 @@ SCENES: dict[str, Callable[[Any, Any], Any]] = {
     "payload_pair_scene": payload_pair_scene,
     "formation_scene": lambda r, e: formation_scene(r),
     "payload_scene": lambda r, e: payload_scene(r, (0.1, 0.1, 0.1)),
+    "scene_of": scene_of,
     "vehicle_animation": lambda r, e: vehicle_animation(r, 0.1, 0.5),
 }
 OTHERS: dict[str, Callable[[Any, Any], Any]] = {

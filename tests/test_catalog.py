@@ -13,7 +13,7 @@ from refusals import refused
 from synctrl.errors import InputError, MissingDependencyError, RobotError, RobotWarning
 from synctrl.robots.catalog import CATALOG, catalog_names, load_description
 from synctrl.robots.urdf import Description, urdf_folder
-from synctrl.robots.urdf.meshes import data_folder
+from synctrl.robots.urdf.packages import data_folder
 
 JOINTS = {
     "planar2r": 2, "a460": 3, "a460_full": 6,

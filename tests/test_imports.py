@@ -42,6 +42,7 @@ ROOMS = (
 ONLY_INSIDE_FUNCTIONS = {
     *("matplotlib", "meshcat", "scipy", "networkx", "trimesh", "yourdfpy"),
     *("casadi", "mujoco", "joblib", "dask", "distributed", "pandas", "optuna"),
+    *("xacro", "yaml", "robot_descriptions"),
 }
 
 # Libraries that belong to some rooms alone.

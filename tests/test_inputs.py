@@ -209,8 +209,8 @@ def test_a_wrong_initial_state_is_named_with_its_robot(name, value):
         (lambda: pair(Member(ARM, GOOD, name="a"), Member(ARM, GOOD, name="a")), "found 'a' twice"),
         (lambda: pair(Member(ARM, GOOD, name="robot 2"), Member(ARM, GOOD)), "found 'robot 2' twice"),
         (
-            lambda: Cell([Member(ARM, GOOD)] * 2, Coupling.pair(), CartesianSpace("xy")),
-            "robot 1, q0: expected joint positions to start from",
+            lambda: Cell([Member(ARM, Hold([9.0, 0.0]))] * 2, Coupling.pair(), CartesianSpace("xy")),
+            "robot 1, trajectory: 'planar2r' cannot reach",
         ),
     ],
 )

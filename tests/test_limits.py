@@ -90,9 +90,10 @@ def test_an_interval_says_which_limit_and_what_was_reached() -> None:
     q[1:4, 1, 0] = (-0.3, -0.5, -0.25)
     q[3:, 0, 1] = 1.0
     still = np.zeros_like(q)
+    position = {"kind": "position", "unit": "rad"}
     assert limit_report(cell, t, q, still, still) == [
-        {"robot": 1, "joint": 0, "kind": "position", "start": 1, "stop": 3, "limit": -0.2, "reached": -0.5},
-        {"robot": 0, "joint": 1, "kind": "position", "start": 3, "stop": 4, "limit": 0.9, "reached": 1.0},
+        {**position, "robot": 1, "joint": 0, "start": 1, "stop": 3, "limit": -0.2, "reached": -0.5},
+        {**position, "robot": 0, "joint": 1, "start": 3, "stop": 4, "limit": 0.9, "reached": 1.0},
     ]
 
 

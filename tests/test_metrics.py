@@ -54,7 +54,7 @@ def test_runs_that_are_compared_share_their_band(run):
 
 def test_metrics_as_data_are_finite_and_named(run):
     data = json.loads(json.dumps(as_data(run, metrics(run)), allow_nan=False))
-    joint = data["sync_error"]["values"]["1: robot 1, robot 2"]["joint 2"]
+    joint = data["sync_error"]["values"]["1: robot 1, robot 2"]["joint2"]
     assert joint["peak"] == np.abs(run.sync_error[:, 0, 1]).max()
     assert data["sync_error"]["units"] == {
         "peak": "rad", "rms": "rad", "ise": "rad²·s", "settling_time": "s", "final": "rad"

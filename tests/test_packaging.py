@@ -76,10 +76,12 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 MODULES = {
     "pin": {"pinocchio"},
     "u-msgpack-python": {"umsgpack"},
+    "pillow": {"PIL"},
     "pycollada": {"collada"},
     "pytest-xdist": {"xdist"},
     "dask": {"distributed"},
     "drake": {"pydrake"},
+    "PyYAML": {"yaml"},
 }
 #: asked for although nothing imports them, and why
 UNIMPORTED = {
@@ -126,7 +128,7 @@ def imported(*folders: str) -> set[str]:
 
 
 def test_every_library_that_the_package_imports_is_asked_for():
-    assert imported("synctrl") <= set.union(*map(modules_of, asked("compiled", "mujoco", "sweep")))
+    assert imported("synctrl") <= set.union(*map(modules_of, asked("compiled", "mujoco", "sweep", "xacro")))
 
 
 @pytest.mark.parametrize(
@@ -136,6 +138,7 @@ def test_every_library_that_the_package_imports_is_asked_for():
         ("compiled", ["synctrl"]),
         ("mujoco", ["synctrl"]),
         ("sweep", ["synctrl"]),
+        ("xacro", ["synctrl"]),
         ("benchmark", ["synctrl", "scripts"]),
         ("notebooks", ["notebooks", "tests"]),
         ("test", ["tests"]),
@@ -158,5 +161,5 @@ def test_the_lowest_versions_are_those_of_the_lower_bounds():
 def test_the_versions_of_every_library_that_is_asked_for_are_written_down():
     text = (ROOT / "constraints.txt").read_text()
     names = {line.partition("==")[0].lower() for line in text.splitlines()}
-    needed = asked("compiled", "mujoco", "sweep", "test", "notebooks", "dev")
+    needed = asked("compiled", "mujoco", "sweep", "xacro", "test", "notebooks", "dev")
     assert {name_of(requirement).lower() for requirement in needed} <= names

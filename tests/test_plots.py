@@ -69,7 +69,7 @@ def test_a_disturbance_is_shaded_while_it_acts(disturbed):
 
 def test_angles_are_in_degrees_with_actual_solid_and_desired_dash_dot(pair):
     panels = joint_trajectories(pair, 1).axes
-    assert [panel.get_ylabel() for panel in panels] == [f"joint {k}, deg" for k in (1, 2, 3)]
+    assert [panel.get_ylabel() for panel in panels] == [f"joint{k}, deg" for k in (1, 2, 3)]
     for joint, panel in enumerate(panels):
         actual, desired = lines(panel)
         assert (actual.get_linestyle(), desired.get_linestyle()) == ("-", "-.")

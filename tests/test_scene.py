@@ -24,7 +24,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from synctrl.errors import InputError, RobotError
+from synctrl.errors import InputError, RobotError, RobotWarning
 from synctrl.show import scene as scene_module
 from synctrl.show import shapes, view
 from synctrl.show.rotations import continuous, towards
@@ -289,24 +289,27 @@ def test_one_colour_for_a_robot_replaces_those_of_its_shapes() -> None:
     assert material["transparent"]
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "said"),
-    [
-        ("entity.dae", "<!DOCTYPE x [<!ENTITY y 'z'>]><COLLADA/>", "it defines XML entities"),
-        ("broken.dae", "<COLLADA", "DaeMalformed|Error"),
-        ("empty.obj", "", "no triangles|Error"),
-        ("noise.stl", "?", "Error"),
-        ("format.xyz", "", "unknown format .xyz; expected one of .dae|unknown format"),
-    ],
-)
-def test_a_mesh_that_cannot_be_read_is_refused_by_name(
-    tmp_path: Path, name: str, text: str, said: str
-) -> None:
-    (tmp_path / name).write_text(text, encoding="utf-8")
+def test_a_mesh_that_cannot_be_read_is_left_out_and_the_page_says_so(tmp_path: Path) -> None:
+    (tmp_path / "broken <b>.dae").write_text("<COLLADA", encoding="utf-8")
     model, visual = planar()
-    visual.geometryObjects[0].meshPath = str(tmp_path / name)
-    with pytest.raises(RobotError, match=rf"visual 'base_0': mesh .*{name} cannot be read .*({said})"):
-        Scene().add_robot("robot", model, visual, pin.neutral(model))
+    for solid in visual.geometryObjects:
+        solid.meshPath = str(tmp_path / "broken <b>.dae")
+    scene = Scene()
+    with pytest.warns(RobotWarning, match=r"mesh .*broken <b>.dae is not shown: .*COLLADA") as caught:
+        scene.add_robot("arm", model, visual, pin.neutral(model))
+    assert len(caught) == 1
+    assert not Drawn(scene).meshes(0)
+    assert "Not shown of arm: broken &lt;b&gt;.dae</p>" in scene.page()
+
+
+def test_a_page_says_which_meshes_are_missing_but_not_all_of_many() -> None:
+    scene = Scene()
+    scene.add_hidden("arm", [])
+    assert "Not shown" not in scene.page()
+    scene.add_hidden("arm", ["a.stl", "a.stl", HOSTILE, "c.stl", "d.stl", "e.stl"])
+    page = scene.page()
+    assert Elements(page).text.count("Not shown of arm: a.stl") == 1
+    assert "and 2 more" in page and "<img" not in page and "d.stl" not in page
 
 
 def test_a_mesh_built_in_memory_is_drawn() -> None:

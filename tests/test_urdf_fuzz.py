@@ -1,4 +1,4 @@
-"""Mutations of good descriptions: a mechanism that passes its own checks, or a `RobotError`."""
+"""Mutations of good descriptions: refused with a `RobotError`, or taken with the dynamics of the file."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import pinocchio as pin
 import pytest
 from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
+from plain import positions_held, read_by_pinocchio, same_dynamics, with_joints_held
 from urdf_corpus import GOOD, write
 
 from synctrl.errors import RobotError, RobotWarning
@@ -28,7 +29,7 @@ WORDS = (
     "1 2", "nan 0 0", "universe", "base", "upper", "fore", "link1", "joint1", "shoulder", "fixed", "floating",
     "planar", "revolute", "continuous", "prismatic", "spherical", "../x.stl",
     "package://a/b.stl", "/etc/passwd",
-    "<", "&", "\"'>", "\n", "é", "a" * 1000,
+    "<", "&", "\"'>", "\n", "nobody", "0.5 0.5 0.5 0.5", "é", "a" * 1000,
 )  # fmt: skip
 TAGS = (
     "link",
@@ -42,6 +43,9 @@ TAGS = (
     "visual",
     "mimic",
     "mesh",
+    "gazebo",
+    "loop_joint",
+    "xacro:macro",
     "x",
 )
 
@@ -80,8 +84,21 @@ def check(result: Description | RobotError) -> None:
         acceleration = pin.aba(model, data, q, v, tau)
         for values in (tau, regressor, acceleration):
             assert np.isfinite(values).all()
+    judged_by_pinocchio(result)
     for shape in result.visual.geometryObjects:
         assert np.isfinite(shape.placement.homogeneous).all() and np.isfinite(shape.meshScale).all()
+
+
+def judged_by_pinocchio(result: Description) -> None:
+    """What Pinocchio alone reads without complaint has the same dynamics here, held joints fixed in both."""
+    model, complaint = read_by_pinocchio(result.path)
+    positions = positions_held(result)
+    if model is None or complaint or not set(positions) <= set(model.names):
+        event("not judged by Pinocchio")
+        return
+    event("judged by Pinocchio")
+    if list(result.model.names)[1:] == [name for name in list(model.names)[1:] if name not in positions]:
+        same_dynamics(result.model, with_joints_held(model, positions) if positions else model, 1e-5)
 
 
 numbers = st.floats(allow_nan=True, allow_infinity=True).map(repr)

@@ -11,11 +11,12 @@ from test_step_error import rubbing
 
 import synctrl
 from synctrl import Cell, Coupling, Cubic, Experiment, Member, load_robot
-from synctrl.errors import CouplingWarning, SaturationWarning, StepWarning
+from synctrl.errors import CouplingWarning, RobotWarning, SaturationWarning, StepWarning
 from synctrl.robots.friction import Friction
 from synctrl.robots.friction_parameters import FrictionParameters
 
 ARM = load_robot("planar2r")
+ODD = Path(__file__).parent / "cases" / "urdf" / "effort_zero.urdf"
 PATH = Cubic([0, 0], [1, 1], 1.0)
 
 
@@ -35,6 +36,7 @@ CALLS = {
     "simulate": (StepWarning, lambda: simulate(rubbing(5.0))),
     "Experiment.simulate": (StepWarning, lambda: rubbing(5.0).simulate(dt=1e-3)),
     "a run that saturates": (SaturationWarning, lambda: pair(way=60.0).simulate()),
+    "load_robot": (RobotWarning, lambda: load_robot(ODD)),
     "Coupling": (CouplingWarning, lambda: Coupling(2, [(0, 1), (0, 1)], [(1, -1)] * 2, np.ones(2))),
     "Coupling.from_graph": (CouplingWarning, lambda: Coupling.from_graph([(0, 1), (1, 0)])),
     "Coupling.ring": (CouplingWarning, lambda: Coupling.ring(3)),

@@ -10,19 +10,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..checks import instance, non_negative_number
+from ..checks import finite_array, instance, non_negative_number
 from ..errors import InputError
 from ..files import reported, write_whole
+from ..robots.units import joined
 from ..simulation.result import Result
 
 FORMAT = "synctrl metrics 1"
 ERRORS = ("tracking_error", "sync_error")
 #: width of the settling band, as a share of the largest error it is made from
 SETTLING_FRACTION = 0.05
+#: one for all coordinates, or one for each
+Band: TypeAlias = float | np.ndarray
 
 DEFINITIONS: Mapping[str, str] = MappingProxyType(
     {
@@ -32,7 +35,7 @@ DEFINITIONS: Mapping[str, str] = MappingProxyType(
         "settling_time": "first logged instant from which the absolute value stays within the settling band "
         "until the end of the run; null if it is outside at the end",
         "settling_band": f"{SETTLING_FRACTION:.0%} of the largest absolute value over all robots (or pairs) "
-        "and axes; runs that are compared share the band of the largest among them",
+        "and axes of one unit; runs that are compared share the band of the largest among them",
         "final": "value at the last instant, with its sign",
         "peak_torque": "largest absolute torque of the controller",
     }
@@ -49,7 +52,7 @@ class ErrorMetrics:
         ise: integral of e^2.
         settling_time: s; infinite where the error is outside the band at the end.
         final: e at the end.
-        band: settling band, in the unit of e.
+        band: settling band, in the unit of e; (m,) where coordinates have different units.
     """
 
     peak: np.ndarray
@@ -57,19 +60,19 @@ class ErrorMetrics:
     ise: np.ndarray
     settling_time: np.ndarray
     final: np.ndarray
-    band: float
+    band: Band
 
 
 @dataclass(frozen=True, eq=False)
 class Metrics:
-    """Metrics of one run; `peak_torque` is (n, nv), N·m."""
+    """Metrics of one run; `peak_torque` is (n, nv), N·m, or N of joints that slide."""
 
     tracking_error: ErrorMetrics
     sync_error: ErrorMetrics
     peak_torque: np.ndarray
 
 
-def metrics(result: Result, bands: Mapping[str, float] | None = None) -> Metrics:
+def metrics(result: Result, bands: Mapping[str, Band] | None = None) -> Metrics:
     """Metrics of a run.
 
     Args:
@@ -85,12 +88,12 @@ def metrics(result: Result, bands: Mapping[str, float] | None = None) -> Metrics
     return Metrics(tracking, sync, np.abs(result.tau).max(axis=0))
 
 
-def error_metrics(t: np.ndarray, e: np.ndarray, band: float) -> ErrorMetrics:
-    """Metrics of an error e, (T, ...), at the instants t, (T,), s."""
+def error_metrics(t: np.ndarray, e: np.ndarray, band: Band) -> ErrorMetrics:
+    """Metrics of an error e, (T, ...), at the instants t, (T,), s; the band is one or fits the last axis."""
     ise = integral_of_square(t, e)
     span = t[-1] - t[0]
     rms = np.sqrt(ise / span) if span > 0 else np.abs(e[-1])
-    band = non_negative_number("settling band", band)
+    band = checked_band("settling band", band)
     return ErrorMetrics(np.abs(e).max(axis=0), rms, ise, settling_time(t, e, band), e[-1].copy(), band)
 
 
@@ -99,7 +102,7 @@ def integral_of_square(t: np.ndarray, e: np.ndarray) -> np.ndarray:
     return np.trapezoid(np.square(e), t, axis=0)
 
 
-def settling_time(t: np.ndarray, e: np.ndarray, band: float) -> np.ndarray:
+def settling_time(t: np.ndarray, e: np.ndarray, band: Band) -> np.ndarray:
     """First instant from which |e| <= band until the end, (...), s; infinite if the last value is outside."""
     outside = np.abs(e) > band
     settled_from = len(t) - np.argmax(outside[::-1], axis=0)  # one after the last instant outside
@@ -107,10 +110,11 @@ def settling_time(t: np.ndarray, e: np.ndarray, band: float) -> np.ndarray:
     return np.where(outside.any(axis=0), times, t[0])
 
 
-def settling_bands(*results: Result, fraction: float = SETTLING_FRACTION) -> dict[str, float]:
+def settling_bands(*results: Result, fraction: float = SETTLING_FRACTION) -> dict[str, Band]:
     """Settling bands that runs to be compared share: a fraction of the largest error among them.
 
-    A band of each run's own would call the run with the larger error the sooner settled.
+    A band of each run's own would call the run with the larger error the sooner settled. Where coordinates
+    have different units, each has a band from those of its own unit.
 
     Raises:
         InputError: no run, or one without instants.
@@ -123,7 +127,27 @@ def settling_bands(*results: Result, fraction: float = SETTLING_FRACTION) -> dic
             raise InputError(
                 "expected at least one logged instant, found none", subject=f"run '{result.info['title']}'"
             )
-    return {kind: fraction * max(float(np.abs(getattr(r, kind)).max()) for r in results) for kind in ERRORS}
+    return {kind: fraction * _largest(kind, results) for kind in ERRORS}
+
+
+def checked_band(name: str, band: Any) -> Band:
+    """A settling band, or one for each coordinate.
+
+    Raises:
+        InputError: a band that is negative or not finite.
+    """
+    if np.ndim(band) == 0:
+        return non_negative_number(name, band)
+    return np.array([non_negative_number(name, value) for value in finite_array(name, band, (None,))])
+
+
+def _largest(kind: str, results: Sequence[Result]) -> Band:
+    """Largest errors: one for coordinates of one unit, else one per coordinate, (m,)."""
+    units = results[0].units(kind)[0]
+    if len({*units}) == 1:
+        return max(float(np.abs(getattr(r, kind)).max()) for r in results)
+    each = np.max([np.abs(getattr(r, kind)).max(axis=(0, 1)) for r in results], axis=0)
+    return np.array([each[[other == unit for other in units]].max() for unit in units])
 
 
 # -- metrics as plain data --------------------------------------------------------------------------------
@@ -152,30 +176,44 @@ def as_data(result: Result, computed: Metrics) -> dict[str, Any]:
     data["duration_unit"] = "s"
     for kind in ERRORS:
         data[kind] = _error_data(result, kind, getattr(computed, kind))
-    data["peak_torque"] = {"unit": result.unit("tau"), "values": _torque_data(result, computed)}
+    data["peak_torque"] = {
+        "unit": result.unit("tau"),
+        "units": _by_joint(result, result.units("tau")),
+        "values": _by_joint(result, computed.peak_torque.tolist()),
+    }
     data["gains"], data["versions"] = info["gains"], info["versions"]
     data["step_error"] = info.get("step_error")
     return data
 
 
 def _error_data(result: Result, kind: str, computed: ErrorMetrics) -> dict[str, Any]:
-    unit = result.unit(kind)
-    names = ("peak", "rms", "ise", "settling_time", "final")
+    axes, names = result.info["axes"], ("peak", "rms", "ise", "settling_time", "final")
     values = {
         row: {
             axis: {name: finite_or_none(getattr(computed, name)[k, a]) for name in names}
-            for a, axis in enumerate(result.info["axes"])
+            for a, axis in enumerate(axes)
         }
         for k, row in enumerate(row_names(result, kind))
     }
-    units = {"peak": unit, "rms": unit, "ise": f"{squared(unit)}·s", "settling_time": "s", "final": unit}
-    return {"units": units, "settling_band": computed.band, "settling_band_unit": unit, "values": values}
-
-
-def _torque_data(result: Result, computed: Metrics) -> dict[str, dict[str, float]]:
     return {
-        robot["name"]: {joint: float(value) for joint, value in zip(robot["joints"], row, strict=False)}
-        for robot, row in zip(result.info["robots"], computed.peak_torque, strict=True)
+        "units": _units(result.unit(kind)),
+        "units_by_axis": {a: _units(unit) for a, unit in zip(axes, result.units(kind)[0], strict=True)},
+        "settling_band": np.asarray(computed.band).tolist(),
+        "settling_band_unit": result.unit(kind),
+        "values": values,
+    }
+
+
+def _units(unit: str) -> dict[str, str]:
+    """Units of the metrics of an error in a unit, or in several: `rad, m`."""
+    ise = joined(f"{squared(each)}·s" for each in unit.split(", "))
+    return {"peak": unit, "rms": unit, "ise": ise, "settling_time": "s", "final": unit}
+
+
+def _by_joint(result: Result, rows: Sequence[Sequence[Any]]) -> dict[str, dict[str, Any]]:
+    return {
+        robot["name"]: dict(zip(robot["joints"], row, strict=False))
+        for robot, row in zip(result.info["robots"], rows, strict=True)
     }
 
 

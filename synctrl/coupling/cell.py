@@ -10,19 +10,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, instance
-from ..errors import InputError
+from ..checks import finite_array, instance, offers
+from ..errors import InputError, UnreachableError
 from ..robots.friction import Friction
 from ..robots.parameters import Parameters
 from ..robots.robot import Robot
-from ..tasks.padding import padded
-from ..tasks.spaces import JointSpace, Space
+from ..robots.units import joined
+from ..tasks.algebra import padded
+from ..tasks.inverse_kinematics import start_in
+from ..tasks.spaces import JointSpace, Space, units_of
 from ..tasks.trajectories import Motion, Trajectory
 from .coupling import Coupling
 from .desired import desired_motion, desired_weights
-from .member_checks import check_friction, check_labels, check_names, check_space, check_trajectory
-from .member_parameters import member_parameters
-from .weights import Weights
+from .member_checks import (
+    check_friction,
+    check_labels,
+    check_names,
+    check_trajectory,
+    member_parameters,
+    with_urdf_friction,
+)
+from .weights import StillWeights, Weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,15 +40,18 @@ class Member:
     Args:
         robot: the robot, placed in the world.
         trajectory: its desired motion in the cell's space.
-        q0: joint positions at t = 0, (nv,), rad; by default on the path, in a space that says where that is,
-            as joint space does.
+        q0: joint positions at t = 0, (nv,), rad; by default on the path: in joint space that is said by the
+            path itself, in others found by inverse kinematics, within the robot's limits and close to the
+            space's posture if it has one.
         v0: joint velocities at t = 0, (nv,), rad/s; by default at rest.
         parameters: what is adapted, or its name: "full", all inertial parameters, by default; "base", the
             fewest that give the same torques. Their true values have to be those of this robot, as it is
             placed, and of this friction.
         theta_hat0: estimate at t = 0, (P,); by default zeros, which is to know nothing.
         friction: friction of the true plant, which the controller does not know, unless what is adapted are
-            `FrictionParameters`; by default none.
+            `FrictionParameters`; by default none. "urdf" is what the robot's description states, rotors
+            included, in the plant and among what is adapted: `parameters` that are None or a name become
+            `FrictionParameters`. What the description states and nobody asks for, a run warns of.
         name: for legends and messages.
     """
 
@@ -50,8 +61,25 @@ class Member:
     v0: ArrayLike | None = None
     parameters: Parameters | str | None = None
     theta_hat0: ArrayLike | None = None
-    friction: Friction = field(default_factory=Friction)
+    friction: Any = None
     name: str | None = None
+    _friction_from: str = field(default="given", init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.friction is None:
+            self._set(friction=Friction(), _friction_from="nobody")
+        elif isinstance(self.friction, str) and self.friction == "urdf" and isinstance(self.robot, Robot):
+            self._set(friction=self.robot.urdf_friction, _friction_from="urdf")
+            self._set(parameters=with_urdf_friction(self.robot, self.parameters))
+
+    def _set(self, **values: Any) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def friction_from(self) -> str:
+        """Who says what the friction is: "given", "urdf", or "nobody", and then there is none."""
+        return self._friction_from
 
     @property
     def theta(self) -> np.ndarray:
@@ -100,15 +128,20 @@ class Cell:
     Attributes:
         members, coupling, space, name: as given.
         robots, names: those of the members.
-        labels: names of the m task coordinates, as the space has them.
+        labels, units: names and units of the m task coordinates, as the space has them.
         task: the space bound to these robots, see `BoundSpace`; it is asked at every instant of a run.
         parameters: what is adapted of every robot, see `Parameters`.
         theta: the true values of these, which the controller does not know, (n, P).
         q0, v0, theta_hat0: where the robots and the estimates start, (n, nv), (n, nv) and (n, P).
+        starts: where q0 comes from, a word for each robot: "given", "path" or "inverse kinematics".
 
     Raises:
         InputError: sizes that do not fit together; the message names the member.
         CouplingError: a coupling for another number of robots.
+        UnreachableError: no joint positions for the start of a path.
+
+    Warns:
+        LimitWarning: a robot that nobody told where to start has to do so beyond the limits of its joints.
     """
 
     def __init__(
@@ -130,12 +163,11 @@ class Cell:
         self.robots = tuple(member.robot for member in self.members)
         self.names = tuple(m.name or f"robot {i}" for i, m in enumerate(self.members, start=1))
         check_names(name, self.names)
-        check_space(self.space)
+        offers("space", self.space, ("labels", "unit", "bind"), "a space, for example CartesianSpace('xy')")
         self.labels = self.space.labels(self.robots)
+        self.units = units_of(self.space, self.robots)
         self.task = self.space.bind(self.robots)
-        self._check_members()
-        self._set_parameters()
-        self._set_initial_state()
+        self._read_members()
         check_labels(self)
 
     # -- sizes --------------------------------------------------------------------------------------------
@@ -156,10 +188,20 @@ class Cell:
         return max(robot.nv for robot in self.robots)
 
     @property
+    def unit(self) -> str:
+        """Unit of the task coordinates; those of all coordinates where they differ."""
+        return joined(self.units)
+
+    @property
     def weighted_unit(self) -> str:
-        """Unit of c e, and so of the synchronization errors."""
-        unit = self.coupling.unit
-        return {"": self.space.unit, self.space.unit: f"{unit}²"}.get(unit, f"{unit}·{self.space.unit}")
+        """Unit of c e, and so of the synchronization errors; those of all coordinates where they differ."""
+        return joined(self.weighted_units)
+
+    @property
+    def weighted_units(self) -> tuple[str, ...]:
+        """Unit of each of the m coordinates of c e."""
+        c = self.coupling.unit
+        return tuple({"": unit, unit: f"{c}²"}.get(c, f"{c}·{unit}") for unit in self.units)
 
     @property
     def breaks(self) -> tuple[float, ...]:
@@ -182,7 +224,7 @@ class Cell:
         """Weights of the coupling at the times, (T,); see `desired_weights`."""
         if self.coupling.is_constant:
             return self.coupling.weights(times, self.m)
-        return desired_weights(lambda at: self.coupling.weights(at, self.m), times)
+        return desired_weights(self.coupling.weights, times, self.m)
 
     def references(self, times: np.ndarray) -> list[Reference]:
         """What is desired at each of the times, (T,)."""
@@ -192,42 +234,47 @@ class Cell:
         """The instants in a part of a table, one after another."""
         desired, times = np.ascontiguousarray(table.desired[part]), table.t[part].tolist()
         if self.coupling.is_constant:
-            constant = Weights(*(weight[0] for weight in table.weights))
+            constant = StillWeights(*(weight[0] for weight in table.weights))
             return (Reference(row, constant, t) for row, t in zip(desired, times, strict=True))
         rows = zip(desired, times, *(weight[part] for weight in table.weights), strict=True)
         return (Reference(row, Weights(*weights), t) for row, t, *weights in rows)
 
     # -- internals ----------------------------------------------------------------------------------------
 
-    def _set_parameters(self) -> None:
-        self.parameters = tuple(
-            member_parameters(name, member.robot, member.friction, member.parameters)
-            for name, member in zip(self.names, self.members, strict=True)
-        )
-        self.theta = padded([p.theta for p in self.parameters])
-
-    def _set_initial_state(self) -> None:
-        q0, v0, theta_hat0 = [], [], []
-        for name, member, parameters in zip(self.names, self.members, self.parameters, strict=True):
+    def _read_members(self) -> None:
+        starts, parameters, q0, v0, theta_hat0 = [], [], [], [], []
+        for i, (name, member) in enumerate(zip(self.names, self.members, strict=True)):
             nv = member.robot.nv
-            q0.append(finite_array(f"{name}, q0", self._start(name, member), (nv,)))
-            v0.append(finite_array(f"{name}, v0", np.zeros(nv) if member.v0 is None else member.v0, (nv,)))
-            size = len(parameters.theta)
-            guess = np.zeros(size) if member.theta_hat0 is None else member.theta_hat0
-            theta_hat0.append(finite_array(f"{name}, theta_hat0", guess, (size,)))
-        self.q0, self.v0, self.theta_hat0 = padded(q0), padded(v0), padded(theta_hat0)
-
-    def _start(self, name: str, member: Member) -> ArrayLike:
-        if member.q0 is not None:
-            return member.q0
-        if hasattr(self.space, "start"):
-            return self.space.start(member.robot, member.trajectory(0.0).x)
-        raise InputError("expected joint positions to start from, found none", subject=f"{name}, q0")
-
-    def _check_members(self) -> None:
-        for name, member in zip(self.names, self.members, strict=True):
             check_trajectory(name, member.trajectory, self.labels)
             check_friction(name, member.friction, member.robot)
+            parameters.append(member_parameters(name, member.robot, member.friction, member.parameters))
+            source, start = self._start(i)
+            starts.append(source)
+            q0.append(finite_array(f"{name}, q0", start, (nv,)))
+            v0.append(finite_array(f"{name}, v0", np.zeros(nv) if member.v0 is None else member.v0, (nv,)))
+            size = len(parameters[-1].theta)
+            guess = np.zeros(size) if member.theta_hat0 is None else member.theta_hat0
+            theta_hat0.append(finite_array(f"{name}, theta_hat0", guess, (size,)))
+        self.starts = tuple(starts)
+        self.parameters, self.theta = tuple(parameters), padded([p.theta for p in parameters])
+        self.q0, self.v0, self.theta_hat0 = padded(q0), padded(v0), padded(theta_hat0)
+
+    def _start(self, i: int) -> tuple[str, ArrayLike]:
+        """Where q0 of a robot comes from, and q0."""
+        member, robot = self.members[i], self.robots[i]
+        if member.q0 is not None:
+            return "given", member.q0
+        x = member.trajectory(0.0).x
+        if hasattr(self.space, "start"):
+            return "path", self.space.start(robot, x)
+        if hasattr(self.space, "miss"):
+            preferred = getattr(self.space, "redundancy", None)
+            posture = None if preferred is None else preferred.of(self.robots, i)
+            try:
+                return "inverse kinematics", start_in(robot, x, self.space, posture)  # type: ignore[arg-type]
+            except UnreachableError as error:
+                raise UnreachableError(f"{error}", subject=f"{self.names[i]}, trajectory") from None
+        raise InputError("expected joint positions to start from, found none", subject=f"{self.names[i]}, q0")
 
     def __reduce__(self) -> tuple:
         """Copies and other processes bind the space anew: arrays that share memory would come apart."""

@@ -14,9 +14,10 @@ import numpy as np
 from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
-from ..coupling.reachability import reach
-from ..robots.robot import Robot, load_robot
+from ..robots.catalog import load_robot
+from ..robots.robot import Robot
 from ..simulation.simulate import Experiment
+from ..tasks.inverse_kinematics import reach
 from ..tasks.pose import PoseSpace
 from ..tasks.poses import Attached, AxisRotation, PoseTrajectory
 from ..tasks.rotations import exp
@@ -53,9 +54,7 @@ def ur5_payload(
     rest, a few centimetres and degrees off their paths.
 
     Args:
-        synchronized: False sets beta = K_eps = 0, independent adaptive control.
-        gains: by default ones that converge within the run.
-        parts: parts and options of the controller, see `ControllerParts`.
+        synchronized, gains, parts: see `ready_experiment`; the gains of the cell converge within the run.
     """
     members = [_member(i) for i in range(2)]
     cell = Cell(members, Coupling.pair(), PoseSpace(), name="UR5 pair with payload")

@@ -21,6 +21,8 @@ ZERO = 1e-8
 GAP = 1e4
 #: entries of K below this are rounding
 TINY = 1e-9
+#: parameters by name
+KINDS = ("full", "base")
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,5 +158,5 @@ def parameters_of(kind: str, robot: Robot) -> Parameters:
     Raises:
         InputError: another name.
     """
-    choice("parameters", kind, ("full", "base"))
+    choice("parameters", kind, KINDS)
     return FullParameters(robot) if kind == "full" else BaseParameters(robot)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from ..errors import InputError, MissingDependencyError, RobotError, near
+from .collection import PREFIX, described
+from .robot import Robot
 from .urdf.description import Description, read_urdf, urdf_folder
-from .urdf.meshes import data_folder
+from .urdf.document import Inertial
+from .urdf.packages import data_folder, named_folders
 
 
 @dataclass(frozen=True)
@@ -64,40 +68,91 @@ def catalog_names() -> tuple[str, ...]:
     return tuple(CATALOG)
 
 
-def load_description(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> Description:
-    """A robot from the catalogue, or from a URDF file.
+def load_robot(source: str | Path, tip: str | None = None, **options: Any) -> Robot:
+    """A robot from the catalogue, or from a file.
 
     Args:
-        name_or_path: a name of the catalogue, or the path of a URDF file: a `Path`, or a text with a
-            separator or the ending ".urdf".
-        package_dirs: as in `read_urdf`; for files only.
+        source: a catalogue name such as "a460"; the path of a URDF file, a xacro file, or MJCF; or a name of
+            the package robot_descriptions, such as "robot_descriptions:iiwa14_description".
+        tip: frame to control in Cartesian space; by default the catalogue's, or the end of the longest arm.
+            In a file with several branches the joints that do not move it are held.
+        options: `locked`, `package_dirs`, `inertials`, `strict` and `xacro_args`, see `load_description`.
 
     Raises:
-        RobotError: an unknown name, with the near ones, or a description that is refused.
-        MissingDependencyError: example-robot-data is not installed.
+        RobotError: no such file or name, or a description that is refused, with the reason.
+        FrameNotFound: no such frame.
+
+    Warns:
+        RobotWarning: once, if something was left out, assumed or held, or is suspicious; see `Robot.report`.
     """
-    if not isinstance(name_or_path, (str, Path)):
-        raise InputError(f"expected a name or a path, found {type(name_or_path).__name__}", subject="robot")
-    if isinstance(name_or_path, Path) or _looks_like_path(name_or_path):
-        return read_urdf(name_or_path, package_dirs)
-    if name_or_path not in CATALOG:
-        raise RobotError(
-            f"expected a name of the catalogue or a path, found {name_or_path!a}"
-            f"{near(name_or_path, CATALOG)}; the catalogue has: {', '.join(CATALOG)}",
-            subject="robot",
-            found=name_or_path,
-        )
-    return _load(name_or_path, CATALOG[name_or_path])
+    found = load_description(source, tip=tip, **options)
+    return Robot(
+        found.model,
+        found.tip,
+        visual=found.visual,
+        name=found.name,
+        document=found.document,
+        report=found.report,
+    )
+
+
+def load_description(
+    source: str | Path,
+    *,
+    tip: str | None = None,
+    locked: Mapping[str, float] | None = None,
+    package_dirs: Iterable[str | Path] = (),
+    inertials: Mapping[str, Inertial | Mapping[str, Any]] | None = None,
+    strict: bool = False,
+    xacro_args: Mapping[str, object] | None = None,
+) -> Description:
+    """A robot from the catalogue, from a file, or from the package robot_descriptions.
+
+    Args:
+        source: a name of the catalogue; the path of a file: a `Path`, or a text with a separator or the
+            ending ".urdf", ".xml" or ".xacro"; or "robot_descriptions:" and a name of that package, which
+            downloads what it has not got yet.
+        tip: name of the tip frame. For a file, joints that do not move it are held.
+        locked: positions, in rad or m, of joints that are to be held: they become fixed joints.
+        package_dirs: folders in which packages are looked for; for files only.
+        inertials: of links, in the place of what the file says, each an `Inertial` or a mapping of "mass",
+            "com" and "inertia".
+        strict: whether everything that would be a warning is an error.
+        xacro_args: values of the arguments of a xacro file, by name: texts, numbers, truth values.
+
+    Raises, warns: as `read_urdf`, and:
+        RobotError: an unknown name, with the near ones.
+        MissingDependencyError: a package that has the robot, or reads its kind of file, is not installed.
+    """
+    if not isinstance(source, (str, Path)):
+        raise InputError(f"expected a name or a path, found {type(source).__name__}", subject="robot")
+    options: dict[str, Any] = {"inertials": inertials, "strict": strict, "xacro_args": xacro_args}
+    if isinstance(source, str) and source.startswith(PREFIX):
+        place = described(source.removeprefix(PREFIX))
+        source, package_dirs = place.file, (*named_folders(package_dirs), *place.package_dirs)
+        options["xacro_args"] = place.arguments(xacro_args)
+    if isinstance(source, Path) or _looks_like_path(source):
+        return read_urdf(source, package_dirs, tip=tip, locked=locked, **options)
+    found = _load(source, locked or {}, options)
+    return found if tip is None else found.with_tip(tip)
 
 
 def _looks_like_path(text: str) -> bool:
     return "/" in text or "\\" in text or text.lower().endswith((".urdf", ".xml", ".xacro"))
 
 
-def _load(name: str, entry: Entry) -> Description:
-    locked = dict.fromkeys(entry.locked, 0.0)
-    description = read_urdf(_folder(name, entry) / entry.file, locked=locked, tip=entry.tip)
-    return replace(description, name=name)
+def _load(name: str, locked: Mapping[str, float], options: dict[str, Any]) -> Description:
+    """A robot of the catalogue; its tip holds nothing."""
+    if name not in CATALOG:
+        raise RobotError(
+            f"expected a name of the catalogue or a path, found {name!a}"
+            f"{near(name, CATALOG)}; the catalogue has: {', '.join(CATALOG)}",
+            subject="robot",
+            found=name,
+        )
+    entry = CATALOG[name]
+    file, held = _folder(name, entry) / entry.file, {**dict.fromkeys(entry.locked, 0.0), **locked}
+    return replace(read_urdf(file, tip=entry.tip, locked=held, **options), name=name)
 
 
 def _folder(name: str, entry: Entry) -> Path:

@@ -20,10 +20,13 @@ from ..errors import FrameNotFound, InputError
 from ..files import write_whole
 from .catalog import load_description
 from .urdf.checks import check_bodies, check_tree, inertial_fault
-from .urdf.description import Description, lock_joints
+from .urdf.description import Description
 from .urdf.document import Document, Geometry, Inertial, Joint, Limit, Link, Pose, Shape, upper_triangle
+from .urdf.locks import lock_joints
+from .urdf.meshes import SCHEMES
+from .urdf.names import is_plain
+from .urdf.suspicions import triangle_fault
 from .urdf.writer import to_xml
-from .urdf.xml import NAME_RULE, is_name
 
 Source = Document | Description | str | Path
 """A document, a description, a name of the catalogue, or the path of a URDF file."""
@@ -169,7 +172,7 @@ def _payload(
     box = np.diag([y + z, x + z, x + y]) * mass / 12
     I = symmetric_matrix("inertia", box if inertia is None else inertia, 3)
     inertial = Inertial(mass, upper_triangle(I), Pose(com))
-    if fault := inertial_fault(inertial):
+    if fault := inertial_fault(inertial) or triangle_fault(inertial):
         raise InputError(fault, subject="inertia")
     return Link(name, inertial, (Geometry(Shape("box", sides), Pose(com), _TOOL_COLOR),))
 
@@ -190,8 +193,9 @@ def _triple(name: str, value: ArrayLike) -> tuple[float, ...]:
 
 
 def _check_name(what: str, name: str) -> None:
-    if not isinstance(name, str) or not is_name(name):
-        raise InputError(f"expected {NAME_RULE}, found {name!r}", subject=what)
+    if not isinstance(name, str) or not is_plain(name):
+        rule = "1 to 128 letters, digits, '_', '-' or '.', beginning with a letter, a digit or '_'"
+        raise InputError(f"expected {rule}, found {name!r}", subject=what)
 
 
 def _check_meshes(document: Document, file: Path) -> None:
@@ -201,7 +205,7 @@ def _check_meshes(document: Document, file: Path) -> None:
     for link in document.links:
         for geometry in (*link.visuals, *link.collisions):
             filename = geometry.shape.filename
-            if filename is not None and not filename.startswith("package://"):
+            if filename is not None and not filename.startswith(("/", *SCHEMES)):
                 folders = f"into its folder {document.file.parent}, found {file.resolve().parent}"
                 raise document.error(
                     f"mesh '{filename}': expected to write {folders}", link, line=geometry.line

@@ -15,6 +15,7 @@ import pinocchio as pin
 
 from ..errors import RobotError
 from .robot import Robot
+from .units import subspace
 
 #: numbers this close to 0, 1 or -1 in fixed placements are taken as such, so that terms with them vanish
 SNAP = 1e-15
@@ -84,16 +85,14 @@ def _mechanism(robot: Robot) -> tuple[Mechanism, pin.SE3]:
 
 
 def _joint(model: pin.Model, j: int, first: bool) -> Joint:
-    data = model.joints[j].createData()
-    model.joints[j].calc(data, pin.neutral(model))
-    subspace = np.asarray(data.S).ravel()
-    turns = bool(np.any(subspace[3:]))
+    motion = subspace(model, j)
+    turns = bool(np.any(motion[3:]))
     placement = pin.SE3.Identity() if first else model.jointPlacements[j]
     return Joint(
         model.parents[j] - 1,
         _snap(placement.rotation),
         _snap(placement.translation),
-        _snap(subspace[3:] if turns else subspace[:3]),
+        _snap(motion[3:] if turns else motion[:3]),
         turns,
         float(model.armature[j - 1]),
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from ..errors import RobotError
-from .pseudo_inertia import principal_moments
+from .pseudo_inertia import NO_MOMENT, principal_moments
 
 
 def check_joints(robot: str, model: pin.Model) -> None:
@@ -43,8 +43,8 @@ def check_inertia(robot: str, joint: str, row: np.ndarray) -> None:
     body = f"robot '{robot}', body of '{joint}'"
     if row[0] <= 0:
         raise RobotError(f"expected a mass above 0 kg, found {row[0]:g}", subject=body, found=row[0])
-    lowest = principal_moments(row)[0]
-    if lowest <= 0:
+    lowest, _, highest = principal_moments(row)
+    if lowest < -NO_MOMENT or highest <= 0:
         raise RobotError(
             f"expected a positive definite inertia about the centre of mass, found a smallest eigenvalue of "
             f"{lowest:g} kg·m^2",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from types import NoneType
 from typing import Any
 
@@ -78,7 +79,8 @@ def carrying(robot: Robot, load: Load) -> Robot:
     body = pin.Inertia(load.mass, np.array(load.com), np.array(load.inertia))
     model.appendBodyToJoint(frame.parentJoint, body, frame.placement)
     document = _welded(robot.document, name, load)
-    return Robot(model, robot.tip, visual=robot.visual, name=robot.name, document=document)
+    kept = partial(Robot, visual=robot.visual, name=robot.name, report=robot.report)
+    return kept(model, robot.tip, document=document)
 
 
 def _welded(document: Document | None, frame: str, load: Load) -> Document | None:

@@ -52,6 +52,24 @@ def inverse_hessian(P: np.ndarray) -> np.ndarray:
     return np.einsum("...kim,...lmi->...kl", moved, moved)
 
 
+#: kg·m^2, that of 1 mg at 1 mm: what is smaller counts as no moment, whatever its sign
+NO_MOMENT = 1e-12
+
+
+def pullback(theta: np.ndarray) -> np.ndarray:
+    """How far inertial parameters can well be from theta, squared: tr(D_k P D_k P), (..., 10 bodies).
+
+    It is the diagonal of the inverse Hessian of -log det P, the metric of bodies that can exist: m^2 for the
+    mass, (h_x^2 + S_xx m)/2 for m c_x, and so on. Of a body that cannot exist, its size is taken.
+
+    Args:
+        theta: inertial parameters, (..., 10 bodies).
+    """
+    P = pseudo_inertia(theta.reshape(*theta.shape[:-1], -1, 10))
+    DP = D @ P[..., None, :, :]
+    return np.abs(np.einsum("...kij,...kji->...k", DP, DP)).reshape(theta.shape)
+
+
 def principal_moments(theta: np.ndarray) -> np.ndarray:
     """Moments of inertia of one body about its centre of mass, (3,), ascending, of its parameters, (10,)."""
     m, h = theta[0], theta[1:4]

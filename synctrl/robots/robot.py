@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import pinocchio as pin
@@ -12,10 +11,13 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance, per_joint
 from ..errors import FrameNotFound, InputError
-from .catalog import load_description
+from .friction import Friction
 from .model_checks import check_inertia, check_joints, check_numbering
 from .per_thread import PerThread
+from .units import joint_units
 from .urdf.document import Document, Pose
+from .urdf.inertials import with_bodies
+from .urdf.report import NOTHING, Report
 
 _WORLD_AXES = pin.LOCAL_WORLD_ALIGNED
 _regressor = pin.computeJointTorqueRegressor
@@ -24,8 +26,8 @@ _regressor = pin.computeJointTorqueRegressor
 class Robot:
     """A fixed-base robot with nv joints and one tip frame, placed in the world.
 
-    Joint positions q, (nv,), are angles in rad (or m for a sliding joint), also for joints that turn without
-    end, which Pinocchio stores as cosine and sine. Everything Cartesian is in world axes.
+    Joint positions q, (nv,), are angles in rad (or m for a sliding joint, see `joint_units`), also for joints
+    that turn without end, which Pinocchio stores as cosine and sine. Everything Cartesian is in world axes.
 
     The model is never changed after construction, and every thread that uses a Robot has scratch memory of
     its own: threads may share one.
@@ -36,6 +38,7 @@ class Robot:
         visual: shapes for display, or None.
         name: what error messages and legends call it.
         document: the URDF that describes it, base and all; None if there is none.
+        report: what was left out, assumed or held when its description was read, and what is suspicious.
 
     Raises:
         FrameNotFound: `tip` is not a frame of the model.
@@ -51,17 +54,20 @@ class Robot:
         visual: pin.GeometryModel | None = None,
         name: str | None = None,
         document: Document | None = None,
+        report: Report = NOTHING,
     ):
         instance("model", model, pin.Model, "a Pinocchio model, for example from load_robot")
         self.model = model
         self.name = name or model.name
         self.visual = visual
         self.document = document
+        self.report = report
         check_joints(self.name, model)
         check_numbering(self.name, model)
         self.tip, self.tip_id = tip, self._frame_id(tip)
         self.nv: int = model.nv
         self.joint_names: tuple[str, ...] = tuple(model.names)[1:]
+        self.joint_units: tuple[str, ...] = joint_units(model)
         self.body_count: int = model.njoints - 1
         self._data = PerThread(model.createData)
         self._weightless = pin.Model(model)
@@ -93,11 +99,11 @@ class Robot:
                 frame.placement = base * frame.placement
         document = None if self.document is None else self.document.placed(Pose(tuple(shift), tuple(angles)))
         visual = _moved(self.visual, base)
-        return type(self)(model, self.tip, visual=visual, name=name or self.name, document=document)
+        return self._with(model, visual=visual, name=name or self.name, document=document)
 
     def with_tip(self, tip: str) -> Self:
         """This robot controlled at another frame."""
-        return type(self)(self.model, tip, visual=self.visual, name=self.name, document=self.document)
+        return self._with(self.model, tip)
 
     def with_parameters(self, pi: ArrayLike) -> Self:
         """This robot with other true inertial parameters.
@@ -113,7 +119,9 @@ class Robot:
         for joint, row in enumerate(rows, start=1):
             check_inertia(self.name, self.joint_names[joint - 1], row)
             model.inertias[joint] = pin.Inertia.FromDynamicParameters(np.array(row))
-        return type(self)(model, self.tip, visual=self.visual, name=self.name)
+        rows_by_joint = dict(zip(self.joint_names, rows, strict=True))
+        document = None if self.document is None else with_bodies(self.document, rows_by_joint)
+        return self._with(model, document=document)
 
     def with_armature(self, armature: ArrayLike) -> Self:
         """This robot with rotors that turn with its joints: a diagonal added to M.
@@ -129,7 +137,7 @@ class Robot:
             raise InputError(f"expected at least 0 kg·m^2, found {values.min():g}", subject="armature")
         model = pin.Model(self.model)
         model.armature = values.copy()
-        return type(self)(model, self.tip, visual=self.visual, name=self.name, document=self.document)
+        return self._with(model)
 
     # -- what it is ---------------------------------------------------------------------------------------
 
@@ -149,9 +157,20 @@ class Robot:
         return tuple(f"{joint}.{kind}" for joint in self.joint_names for kind in kinds)
 
     @property
+    def joint_frames(self) -> tuple[str, ...]:
+        """Names of the frames of the joints, (nv,): their own, unless a link has the same."""
+        found = {frame.parentJoint: frame.name for frame in self.model.frames if frame.type == pin.JOINT}
+        return tuple(found.get(k, name) for k, name in enumerate(self.joint_names, start=1))
+
+    @property
     def armature(self) -> np.ndarray:
         """Inertia of rotors that the joints turn along, (nv,), kg·m^2."""
         return np.array(self.model.armature)
+
+    @property
+    def urdf_friction(self) -> Friction:
+        """What its description states of friction; it acts where a `Member` asks for it."""
+        return Friction(self.model.damping, self.model.friction)
 
     @property
     def gravity_vector(self) -> np.ndarray:
@@ -257,39 +276,24 @@ class Robot:
             raise FrameNotFound(self.name, frame, [f.name for f in self.model.frames])
         return int(self.model.getFrameId(frame))
 
+    def _with(self, model: pin.Model, tip: str | None = None, **changes: Any) -> Self:
+        """A robot with this model, and with what else it has but for the changes."""
+        make, (_, own) = self.__reduce__()
+        return make(model, own if tip is None else tip, **changes)
+
     def __reduce__(self) -> tuple:
         """Copies and other processes make the scratch memory anew."""
-        parts = partial(type(self), visual=self.visual, name=self.name, document=self.document)
-        return parts, (self.model, self.tip)
+        own = partial(type(self), visual=self.visual, name=self.name)
+        return partial(own, document=self.document, report=self.report), (self.model, self.tip)
 
     def __repr__(self) -> str:
         return f"Robot('{self.name}', {self.nv} joints, tip '{self.tip}')"
 
 
-def load_robot(name_or_path: str | Path, tip: str | None = None) -> Robot:
-    """A robot from the catalogue, or from a URDF file.
-
-    Args:
-        name_or_path: a catalogue name such as "a460", or the path of a URDF file.
-        tip: frame to control in Cartesian space; by default the catalogue's, or the last link's.
-
-    Raises:
-        RobotError: no such file or name, or a description that is refused, with the reason.
-        FrameNotFound: no such frame.
-    """
-    if not isinstance(name_or_path, (str, Path)):
-        raise InputError(f"expected a name or a path, found {type(name_or_path).__name__}", subject="robot")
-    found = load_description(name_or_path)
-    tip = found.tip if tip is None else tip
-    return Robot(found.model, tip, visual=found.visual, name=found.name, document=found.document)
-
-
 def _moved(visual: pin.GeometryModel | None, base: pin.SE3) -> pin.GeometryModel | None:
     """Shapes with those fixed to the world moved along with the base."""
-    if visual is None:
-        return None
-    moved = visual.copy()
-    for shape in moved.geometryObjects:
+    moved = None if visual is None else visual.copy()
+    for shape in () if moved is None else moved.geometryObjects:
         if shape.parentJoint == 0:
             shape.placement = base * shape.placement
     return moved

@@ -6,18 +6,16 @@ import numpy as np
 
 from ..checks import positive_number
 from ..errors import InputError
-from ..robots.robot import Robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .arms import add_bars, arms_scene, error_color
+from .arms import add_bars, add_disturbances, arms_scene, error_color, tip_positions
 from .runs import check_run, frame_indices, shown_experiment
 from .scene import Scene
 from .style import DESIRED, robot_color
 
-TORQUE = "#e0a100"
 LINE = 0.008  # m
 THIN, THICK = 0.006, 0.022  # m, radius of a bar without and with the largest synchronization error
-BALL, PUSH = 0.016, 0.075  # m, radius of a tip and of the mark of a disturbance
+BALL = 0.016  # m, radius of a tip
 PAYLOAD = (0.5, 0.08, 0.05)  # m
 PLANAR_TIMES, PAIR_TIMES = 10.0, 20.0  # how much larger tracking errors are drawn
 FPS = 30.0
@@ -62,7 +60,7 @@ def planar_scene(
     shown = share[frames]
     add_bars(scene, "error", result.info["pairs"], tips, THIN + shown * (THICK - THIN), shown)
     _add_tracking(scene, result, desired, tips, PLANAR_TIMES)
-    _add_disturbances(scene, result, robots, frames)
+    add_disturbances(scene, result, robots, frames)
     return scene
 
 
@@ -99,12 +97,12 @@ def payload_pair_scene(
     frames = frame_indices(result, fps)
     scene = arms_scene(result, experiment, frames, fps, caption)
     robots = shown_experiment(result, experiment).cell.robots
-    wrists, desired = (_tips(robots, q[frames]) for q in (result.q, result.x_desired))
+    wrists, desired = (tip_positions(robots, q[frames]) for q in (result.q, result.x_desired))
     color = error_color(share[frames].max(axis=1))
     middle, along = wrists.mean(axis=1), wrists[:, 1] - wrists[:, 0]
     scene.add_box("payload", PAYLOAD, middle, color, quaternion=_turned(along))
     _add_tracking(scene, result, desired, wrists, PAIR_TIMES)
-    _add_disturbances(scene, result, robots, frames)
+    add_disturbances(scene, result, robots, frames)
     return scene
 
 
@@ -115,23 +113,6 @@ def _add_tracking(scene: Scene, result: Result, desired: np.ndarray, tips: np.nd
         far = desired[:, i] + times * (tips[:, i] - desired[:, i])
         scene.add_segment(f"error of {name}", desired[:, i], far, THIN, robot_color(i))
         scene.add_sphere(f"end of error of {name}", BALL, far, robot_color(i))
-
-
-def _add_disturbances(scene: Scene, result: Result, robots: tuple[Robot, ...], frames: np.ndarray) -> None:
-    """A ball around the base of a robot while a torque acts on it from outside."""
-    for i, name in enumerate(result.names):
-        acts = np.abs(result.disturbance[:, i]).max(axis=1) > 0
-        if acts.any():
-            base = robots[i].with_tip(robots[i].joint_names[0]).tip_position(np.zeros(robots[i].nv))
-            scene.add_sphere(f"torque on {name}", PUSH * acts[frames], base, TORQUE)
-            scene.add_legend(f"torque on {name}", TORQUE)
-
-
-def _tips(robots: tuple[Robot, ...], q: np.ndarray) -> np.ndarray:
-    """Positions of the tips, (T, n, 3), m, of joint positions, (T, n, nv)."""
-    return np.array(
-        [[robot.tip_position(row[: robot.nv]) for robot, row in zip(robots, qs, strict=True)] for qs in q]
-    )
 
 
 def _share(result: Result, limit: float | None) -> tuple[np.ndarray, float]:

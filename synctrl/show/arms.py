@@ -6,13 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..errors import InputError
+from ..robots.robot import Robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .runs import shown_experiment
 from .scene import Scene
+from .skeleton import skeleton
 from .style import robot_color
 
+#: colour and radius, m, of the mark of a torque from outside
+TORQUE, PUSH = "#e0a100", 0.075
 #: colours of a mark without and with the largest synchronization error, told apart by lightness too
 CALM, ALARM = np.array([0.76, 0.79, 0.83]), np.array([0.70, 0.0, 0.11])
 
@@ -36,18 +39,57 @@ def arms_scene(
         colors: one for each arm; by default those of its parts.
 
     Raises:
-        InputError: no experiment, or a robot without shapes.
+        InputError: no experiment.
     """
-    title = str(result.info["title"])
-    scene = Scene(fps=fps, title=title[:1].upper() + title[1:], caption=caption)
-    for i, robot in enumerate(shown_experiment(result, experiment).cell.robots):
-        if robot.visual is None:
-            raise InputError(f"robot '{robot.name}' has no shapes to show")
-        q = np.array([robot.configuration(row) for row in result.q[frames, i, : robot.nv]])
-        color = None if colors is None else colors[i]
-        scene.add_robot(result.names[i], robot.model, robot.visual, q, color)
-        scene.add_legend(result.names[i], robot_color(i))
+    scene = titled_scene(result, fps, caption)
+    add_arms(scene, result, shown_experiment(result, experiment).cell.robots, frames, colors)
     return scene
+
+
+def titled_scene(result: Result, fps: float, caption: str) -> Scene:
+    """A scene with nothing in it, under the title of a run."""
+    title = str(result.info["title"])
+    return Scene(fps=fps, title=title[:1].upper() + title[1:], caption=caption)
+
+
+def add_arms(
+    scene: Scene,
+    result: Result,
+    robots: Sequence[Robot],
+    frames: np.ndarray,
+    colors: Sequence[str] | None = None,
+) -> None:
+    """The arms of a run; those without shapes as balls and capsules in the colour of the robot."""
+    for i, robot in enumerate(robots):
+        q = np.array([robot.configuration(row) for row in result.q[frames, i, : robot.nv]])
+        visual = robot.visual if has_shapes(robot) else skeleton(robot, robot_color(i))
+        color = None if colors is None else colors[i]
+        scene.add_robot(result.names[i], robot.model, visual, q, color)
+        scene.add_legend(result.names[i], robot_color(i))
+        if robot.document is not None:
+            scene.add_hidden(result.names[i], (mesh.filename or "" for mesh in robot.document.hidden))
+
+
+def has_shapes(robot: Robot) -> bool:
+    """Whether a robot has shapes to show."""
+    return robot.visual is not None and robot.visual.ngeoms > 0
+
+
+def add_disturbances(scene: Scene, result: Result, robots: Sequence[Robot], frames: np.ndarray) -> None:
+    """A ball around the first joint of a robot while a torque acts on it from outside."""
+    for i, name in enumerate(result.names):
+        acts = np.abs(result.disturbance[:, i]).max(axis=1) > 0
+        if acts.any():
+            base = robots[i].model.jointPlacements[1].translation
+            scene.add_sphere(f"torque on {name}", PUSH * acts[frames], base, TORQUE)
+            scene.add_legend(f"torque on {name}", TORQUE)
+
+
+def tip_positions(robots: Sequence[Robot], q: np.ndarray) -> np.ndarray:
+    """Positions of the tips, (T, n, 3), m, of joint positions, (T, n, nv)."""
+    return np.array(
+        [[robot.tip_position(row[: robot.nv]) for robot, row in zip(robots, qs, strict=True)] for qs in q]
+    )
 
 
 def add_bars(

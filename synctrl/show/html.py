@@ -21,7 +21,7 @@ body { margin: 0; overflow: hidden; font-family: system-ui, sans-serif; }
 #words h1 { margin: 0 0 4px; font-size: 17px; font-weight: 600; }
 #words p { margin: 0 0 3px; font-size: 13px; line-height: 1.35; }
 #words i { display: inline-block; width: 10px; height: 10px; margin: 0 5px 0 0; border-radius: 2px; }
-#words span { margin-right: 14px; }
+#words span { display: inline-block; margin-right: 14px; }
 #failure { color: #a40000; font-weight: 600; }
 """
 
@@ -79,6 +79,7 @@ def page(
     title: str,
     caption: str,
     legend: Sequence[tuple[str, str]] = (),
+    remarks: Sequence[str] = (),
 ) -> str:
     """A self-contained HTML page that shows a scene and asks nothing of the network.
 
@@ -88,6 +89,7 @@ def page(
         title: heading; text, never markup.
         caption: line below it; text, never markup.
         legend: label and colour (#rrggbb) pairs.
+        remarks: lines below the legend; text, never markup.
 
     Raises:
         MissingDependencyError: MeshCat's viewer is not installed.
@@ -102,7 +104,7 @@ def page(
             '<meta name="viewport" content="width=device-width"><link rel="icon" href="data:,">',
             f"<title>{escape(title) or 'Scene'}</title><style>{STYLE}</style></head><body>",
             f'<div><div id="meshcat-pane" data-target="{json.dumps(list(target))}"></div></div>',
-            f'<div id="words">{_words(title, caption, legend)}</div>',
+            f'<div id="words">{_words(title, caption, legend, remarks)}</div>',
             f'<script type="text/plain" id="licences">{_licences()}</script>',
             f'<script type="text/plain" id="commands">{lines}</script>',
             f"<script>{library}</script><script>{PLAYER}</script></body></html>\n",
@@ -118,9 +120,9 @@ def frame(page: str, height: int) -> str:
     )
 
 
-def _words(title: str, caption: str, legend: Sequence[tuple[str, str]]) -> str:
+def _words(title: str, caption: str, legend: Sequence[tuple[str, str]], remarks: Sequence[str]) -> str:
     entries = [f'<span><i style="background: {escape(c)}"></i>{escape(label)}</span>' for label, c in legend]
-    paragraphs = [escape(caption), "".join(entries)]
+    paragraphs = [escape(caption), "".join(entries), *map(escape, remarks)]
     heading = f"<h1>{escape(title)}</h1>" if title else ""
     text = "".join(f"<p>{p}</p>" for p in paragraphs if p)
     return f'{heading}{text}<p id="time"></p><p id="failure"></p>'

@@ -108,7 +108,7 @@ def _draw_arm(panel: Axes, robot: Robot, q: np.ndarray, index: int, alpha: float
 
 def _chain(robot: Robot, q: np.ndarray) -> np.ndarray:
     """Origins of the joints, and the tip, seen from above, (nv + 1, 2)."""
-    joints = [robot.with_tip(name).tip_position(q) for name in robot.joint_names]
+    joints = [robot.with_tip(frame).tip_position(q) for frame in robot.joint_frames]
     return np.array([*joints, robot.tip_position(q)])[:, :2]
 
 

@@ -8,14 +8,14 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from ..checks import instance
 from ..tasks.rotations import from_quaternion
-from .shapes import Shape, corners
+from .shapes import Color, Shape, corners
 
 ROOT = "/meshcat/<object>"  # where MeshCat puts the object of the path /meshcat
 STILL = 1e-6  # m, and so on: motion below this is not seen
@@ -54,6 +54,13 @@ def label(kind: str, name: str) -> str:
     instance("name", name, str, "text")
     readable = name.encode("utf-8", "replace").decode("utf-8")
     return f"{kind} {readable.replace('/', '∕')}"
+
+
+def paint(node: Node, color: Color) -> None:
+    """Give all shapes of a node and of its children one colour."""
+    node.shapes = [replace(shape, color=color) for shape in node.shapes]
+    for child in node.children:
+        paint(child, color)
 
 
 def bounding_box(nodes: Iterable[Node]) -> np.ndarray | None:

@@ -24,26 +24,29 @@ GAP, TITLE, LEGEND = 0.15, 0.31, 0.2
 _SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
-def stacked_panels(heights: Sequence[float], above: Sequence[float]) -> tuple[Figure, list[Axes]]:
+def stacked_panels(
+    heights: Sequence[float], above: Sequence[float], width: float = WIDTH
+) -> tuple[Figure, list[Axes]]:
     """Panels that share their time axis; to be called within `plots.style`.
 
     Args:
         heights: of the panels, from the top, inches.
         above: room left above each of them, inches.
+        width: of the figure, inches.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     height = sum(heights) + sum(above) + BOTTOM
-    figure = Figure(figsize=(WIDTH, height), dpi=DPI)
+    figure = Figure(figsize=(width, height), dpi=DPI)
     FigureCanvasAgg(figure)
     panels: list[Axes] = []
     top = height
     for own, room in zip(heights, above, strict=True):
         top -= room + own
-        place = LEFT / WIDTH, top / height, 1 - (LEFT + RIGHT) / WIDTH, own / height
+        place = LEFT / width, top / height, 1 - (LEFT + RIGHT) / width, own / height
         panels.append(figure.add_axes(place, sharex=panels[0] if panels else None))
-        _place_labels(panels[-1], own)
+        _place_labels(panels[-1], width - LEFT - RIGHT, own)
     for panel in panels[:-1]:
         panel.tick_params(labelbottom=False)
     return figure, panels
@@ -64,9 +67,8 @@ def ten_to(exponent: int) -> str:
     return f"10{str(exponent).translate(_SUPERSCRIPT)}"
 
 
-def _place_labels(panel: Axes, height: float) -> None:
+def _place_labels(panel: Axes, width: float, height: float) -> None:
     """Labels of the axes at fixed places, and the power of ten of all ticks where no title is."""
-    width = WIDTH - LEFT - RIGHT
     panel.yaxis.set_label_coords((LABEL - LEFT) / width, 0.5)
     panel.xaxis.set_label_coords(0.5, (LABEL - BOTTOM) / height)
     panel.yaxis.get_offset_text().set_x((EDGE - LEFT) / width)

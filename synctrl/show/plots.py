@@ -6,11 +6,11 @@ it as PNG and SVG, the same bytes every time.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from threading import RLock
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,20 @@ from ..errors import InputError, ResultError
 from ..files import whole_file
 from ..renamed import names_elsewhere
 from ..simulation.result import Result
-from .legends import axis_handles, legend, line_widths, plain, row_color, row_handles
-from .panels import DPI, GAP, LEGEND, TITLE, WIDTH, stacked_panels
+from .legends import (
+    axis_handles,
+    disturbance_handles,
+    disturbance_windows,
+    legend,
+    legend_rows,
+    line_widths,
+    plain,
+    row_color,
+    row_handles,
+    shortened,
+    text_width,
+)
+from .panels import DPI, GAP, LEFT, LEGEND, RIGHT, TITLE, WIDTH, stacked_panels
 from .runs import check_run
 from .style import ACCENT, DESIRED, display, line_style, robot_color
 
@@ -29,14 +41,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+#: of titles and of labels of axes, points
+TITLE_SIZE, LABEL_SIZE = 10, 9
 _STYLE: Any = {
     "font.family": "DejaVu Sans",
     "font.size": 9,
-    "axes.titlesize": 10,
+    "axes.titlesize": TITLE_SIZE,
     "axes.titley": 1.0,
     "axes.formatter.limits": (-3, 5),
     "axes.formatter.useoffset": False,
-    "axes.labelsize": 9,
+    "axes.labelsize": LABEL_SIZE,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -115,37 +129,41 @@ def save(figure: Figure, stem: str | Path) -> tuple[Path, Path]:
 # -- figures of the paper ---------------------------------------------------------------------------------
 
 
-def joint_trajectories(result: Result, robot: int) -> Figure:
+def joint_trajectories(result: Result, robot: int, *, width: float = WIDTH) -> Figure:
     """Actual (solid) and desired (dash-dot) coordinates of one robot, a panel per axis.
 
     Args:
-        result: the run; in joint space its coordinates are the joint angles.
+        result: the run; in joint space its coordinates are those of the joints.
         robot: which robot, counted from 0.
+        width: of the figure, inches.
 
     Raises:
         InputError: there is no such robot.
     """
     check_run(result, "x", "x_desired")
     _check_robot(result, robot)
-    unit, factor = display(result.unit("x"))
-    axes_names = result.info["axes"]
+    units, names = result.units("x")[robot], result.info["axes"]
     with style():
-        above = [LEGEND + TITLE, *[GAP] * (len(axes_names) - 1)]
-        figure, panels = stacked_panels([COORDINATE] * len(axes_names), above)
+        above = [LEGEND + TITLE, *[GAP] * (len(names) - 1)]
+        figure, panels = stacked_panels([COORDINATE] * len(names), above, width)
         for k, panel in enumerate(panels):
+            unit, factor = display(units[k])
             actual, desired = factor * result.x[:, robot, k], factor * result.x_desired[:, robot, k]
             panel.plot(result.t, actual, color=robot_color(robot), label="actual")
             panel.plot(result.t, desired, "-.", color=DESIRED, linewidth=1.1, label="desired")
-            panel.set_ylabel(f"{axes_names[k]}, {unit}")
+            room = 72 * COORDINATE - text_width(f", {unit}", LABEL_SIZE)
+            panel.set_ylabel(f"{shortened(plain(names[k]), room, LABEL_SIZE)}, {unit}")
             panel.margins(x=0)
         panels[-1].set_xlabel("time, s")
-        panels[0].set_title(plain(result.names[robot]), loc="left")
+        panels[0].set_title(titled(result.names[robot], width), loc="left")
         legend(figure, panels[0].get_lines())
     return figure
 
 
-def tracking_errors(result: Result, limits: tuple[float, float] | None = None) -> Figure:
-    """Tracking errors of all robots in one panel.
+def tracking_errors(
+    result: Result, limits: tuple[float, float] | None = None, *, width: float = WIDTH
+) -> Figure:
+    """Tracking errors of all robots, in one panel for each unit.
 
     Where the run fills little of the limits, a second panel magnifies it.
 
@@ -153,16 +171,17 @@ def tracking_errors(result: Result, limits: tuple[float, float] | None = None) -
         result: the run.
         limits: lowest and highest value shown, in the unit of the errors; by default what the run needs.
             Figures that are compared share them, see `common_limits`.
+        width: of the figure, inches.
     """
-    return _errors(result, "tracking_error", "tracking error e", limits)
+    return _errors(result, "tracking_error", "tracking error e", limits, width)
 
 
-def sync_errors(result: Result, limits: tuple[float, float] | None = None) -> Figure:
-    """Synchronization errors of all pairs; an error has the colour of the first robot of its pair.
+def sync_errors(result: Result, limits: tuple[float, float] | None = None, *, width: float = WIDTH) -> Figure:
+    """Synchronization errors of all pairs, in one panel for each unit; see `pair_colors`.
 
-    `limits` are as for `tracking_errors`.
+    `limits` and `width` are as for `tracking_errors`.
     """
-    return _errors(result, "sync_error", "synchronization error ε", limits)
+    return _errors(result, "sync_error", "synchronization error ε", limits, width)
 
 
 def common_limits(kind: str, *results: Result) -> tuple[float, float]:
@@ -182,49 +201,74 @@ SMALL = 0.4
 COORDINATE, PANEL, MAGNIFIED = 1.3, 2.1, 1.5
 
 
-def _errors(result: Result, kind: str, what: str, limits: tuple[float, float] | None) -> Figure:
-    own = _needed(result, kind)
-    shown = [own if limits is None else _read_limits(limits)]
-    if limits is not None and own[1] - own[0] < SMALL * (shown[0][1] - shown[0][0]):
-        shown.append(own)
-    unit, factor = display(result.unit(kind))
+class _Part(NamedTuple):
+    """What a panel shows of an error: the columns of one unit, in a range, and how much it is magnified."""
+
+    unit: str
+    columns: list[int]
+    low: float
+    high: float
+    times: float = 1.0
+
+
+def _errors(result: Result, kind: str, what: str, limits: tuple[float, float] | None, width: float) -> Figure:
+    parts = _parts(result, kind, limits)
+    handles = [*row_handles(result, kind), *axis_handles(result), *disturbance_handles(result)]
     with style():
-        heights, above = (PANEL, MAGNIFIED), (LEGEND + GAP, TITLE)
-        figure, panels = stacked_panels(heights[: len(shown)], above[: len(shown)])
-        for panel, (low, high) in zip(panels, shown, strict=True):
-            _error_lines(panel, result, kind, factor)
-            marks = _mark_disturbances(panel, result)
-            panel.set_ylim(factor * low, factor * high)
-            panel.set_ylabel(f"{what}, {unit}")
-            panel.margins(x=0)
-        if len(shown) == 2:
-            times = (shown[0][1] - shown[0][0]) / (shown[1][1] - shown[1][0])
-            panels[1].set_title(f"the same, on 1/{times:.2g} of the range", loc="left")
-            panels[1].set_ylabel(f"{what.split()[-1]}, {unit}")
+        room = [GAP if part.times == 1 else TITLE for part in parts]
+        above = [LEGEND * legend_rows(handles, width) + GAP, *room[1:]]
+        heights = [PANEL if part.times == 1 else MAGNIFIED for part in parts]
+        figure, panels = stacked_panels(heights, above, width)
+        for panel, part in zip(panels, parts, strict=True):
+            _draw_errors(panel, result, kind, what, part)
         panels[-1].set_xlabel("time, s")
-        legend(figure, [*row_handles(result, kind), *axis_handles(result), *marks])
+        legend(figure, handles)
     return figure
 
 
-def _error_lines(panel: Axes, result: Result, kind: str, factor: float) -> None:
+def _parts(result: Result, kind: str, limits: tuple[float, float] | None) -> list[_Part]:
+    check_run(result, kind)
+    parts = []
+    for unit, columns in columns_by_unit(result.units(kind)[0]).items():
+        own = _needed(result, kind, columns)
+        low, high = own if limits is None else _read_limits(limits)
+        times = (high - low) / (own[1] - own[0])
+        parts += [_Part(unit, columns, low, high)]
+        parts += [_Part(unit, columns, *own, times)] if SMALL * times > 1 else []
+    return parts
+
+
+def columns_by_unit(units: Sequence[str]) -> dict[str, list[int]]:
+    """Which columns are in which unit."""
+    return {unit: [k for k, own in enumerate(units) if own == unit] for unit in dict.fromkeys(units)}
+
+
+def _draw_errors(panel: Axes, result: Result, kind: str, what: str, part: _Part) -> None:
     """All lines, each narrower than the one below it, so that lines that coincide are all seen."""
+    unit, factor = display(part.unit)
     e = factor * getattr(result, kind)
     panel.axhline(0.0, color="#8a929c", linewidth=0.7, zorder=1)
-    for a in range(e.shape[2]):
+    for a in part.columns:
         for k, width in enumerate(line_widths(e.shape[1])):
             color = row_color(result, kind, k)
-            panel.plot(result.t, e[:, k, a], line_style(a), color=color, linewidth=width, zorder=2 + k)
+            panel.plot(result.t, e[:, k, a], ls=line_style(a), color=color, linewidth=width, zorder=2 + k)
+    shade_disturbances(panel, result)
+    panel.set_ylim(factor * part.low, factor * part.high)
+    panel.set_ylabel(f"{what if part.times == 1 else what.split()[-1]}, {unit}")
+    if part.times > 1:
+        panel.set_title(f"the same, on 1/{part.times:.2g} of the range", loc="left")
+    panel.margins(x=0)
 
 
-def _mark_disturbances(panel: Axes, result: Result) -> list[Any]:
-    """Shade the windows in which torques act from outside; returns what the legend needs."""
-    marks = []
-    for window in result.info.get("disturbances", ()):
-        start, stop = np.clip((window["start"], window["stop"]), result.t[0], result.t[-1])
-        if start < stop:
-            label = f"torque on {plain(result.names[window['robot']])}"
-            marks.append(panel.axvspan(start, stop, color=ACCENT, alpha=0.12, linewidth=0, label=label))
-    return marks
+def shade_disturbances(panel: Axes, result: Result) -> None:
+    """Shade the windows in which torques act from outside."""
+    for window in disturbance_windows(result):
+        panel.axvspan(window["start"], window["stop"], color=ACCENT, alpha=0.12, linewidth=0)
+
+
+def titled(name: str, width: float) -> str:
+    """A name as the title of the panels of a figure, `width` inches wide."""
+    return shortened(plain(name), 72 * (width - LEFT - RIGHT), TITLE_SIZE)
 
 
 def _read_limits(limits: tuple[float, float]) -> tuple[float, float]:
@@ -240,10 +284,11 @@ def _check_robot(result: Result, robot: int) -> None:
         raise InputError(f"expected an index from 0 to {last}, found {robot!r}", subject="robot")
 
 
-def _needed(result: Result, kind: str) -> tuple[float, float]:
+def _needed(result: Result, kind: str, columns: Sequence[int] | None = None) -> tuple[float, float]:
     """Lowest and highest value of an error, zero among them, with some room."""
     check_run(result, kind)
     e = getattr(result, kind)
+    e = e if columns is None else e[:, :, columns]
     low, high = min(float(e.min()), 0.0), max(float(e.max()), 0.0)
     room = 0.06 * (high - low) or 1.0
     return low - room, high + room

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..errors import InputError
+
 TINY = 1e-6  # m: too short to have a direction
 
 
@@ -22,3 +24,15 @@ def towards(along: np.ndarray) -> np.ndarray:
     turn = np.stack([-y, x, np.zeros_like(x), 1 + z], axis=1)
     turn[z < -1 + 1e-12] = [1, 0, 0, 0]
     return continuous(turn / np.linalg.norm(turn, axis=1, keepdims=True))
+
+
+def unit(name: str, quaternion: np.ndarray) -> np.ndarray:
+    """Quaternions, (T, 4), at length 1, each with the sign that is nearest to the one before.
+
+    Raises:
+        InputError: one is no rotation; the message begins with `name`.
+    """
+    norms = np.linalg.norm(quaternion, axis=1, keepdims=True)
+    if norms.min() < TINY:
+        raise InputError(f"{name}: quaternion: expected a rotation, found one of length {norms.min():g}")
+    return continuous(quaternion / norms)

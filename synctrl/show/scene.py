@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, instance, positive_number
-from ..errors import InputError
+from ..checks import finite_array, instance, positive_number, printable
+from ..errors import InputError, RobotWarning, warn
 from ..files import write_whole
 from ..robots.kinematics import joint_poses
 from . import shapes
 from .colors import ColorLike, hex_color, read_color, within_unit
 from .html import frame, page
 from .meshes import MeshLibrary
-from .nodes import Node, bounding_box, label, pack, scene_commands
-from .rotations import TINY, continuous, towards
-from .shapes import Color, Shape
+from .nodes import Node, bounding_box, label, pack, paint, scene_commands
+from .rotations import TINY, continuous, towards, unit
+from .shapes import Shape
 from .view import fit_camera, view_commands, viewer_axes
 
 if TYPE_CHECKING:
@@ -53,6 +54,7 @@ class Scene:
         self.title, self.caption = title, caption
         self.nodes: list[Node] = []
         self._legend: list[tuple[str, str]] = []
+        self._remarks: list[str] = []
         self._camera: tuple[np.ndarray, np.ndarray] | None = None
         self._frames: int | None = None
         self._meshes = MeshLibrary()
@@ -78,6 +80,9 @@ class Scene:
 
         Raises:
             RobotError: a shape cannot be drawn.
+
+        Warns:
+            RobotWarning: a mesh file cannot be shown; the page says so too.
         """
         poses = joint_poses(model, self._series(f"{name}: q", q, model.nq))
         links = [Node(label("joint", joint)) for joint in model.names]
@@ -85,9 +90,10 @@ class Scene:
             link.position, link.quaternion = pose[:, :3], continuous(pose[:, 3:])
         for geometry in visual.geometryObjects:
             links[geometry.parentJoint].shapes += self._meshes.shapes(geometry)
+        self._say_faults(name, (Path(geometry.meshPath) for geometry in visual.geometryObjects))
         robot = Node(label("robot", name), children=[link for link in links if link.shapes])
         if color is not None:
-            _paint(robot, read_color(name, color))
+            paint(robot, read_color(name, color))
         self._add(robot)
 
     def add_line(self, name: str, points: ArrayLike, color: ColorLike, width: float = 0.006) -> None:
@@ -161,6 +167,13 @@ class Scene:
         """An entry of the legend in the corner of the page."""
         self._legend.append((text, hex_color(read_color(text, color))))
 
+    def add_hidden(self, name: str, meshes: Iterable[str]) -> None:
+        """A line that says which meshes of a robot cannot be shown; none if all can."""
+        files = list(dict.fromkeys(printable(mesh.rpartition("/")[2])[:60] for mesh in meshes))
+        if files:
+            more = f" and {len(files) - 3} more" if len(files) > 3 else ""
+            self._remarks.append(f"Not shown of {name}: {', '.join(files[:3])}{more}")
+
     # -- how it is seen -----------------------------------------------------------------------------------
 
     def camera(self, position: ArrayLike, target: ArrayLike) -> None:
@@ -184,7 +197,7 @@ class Scene:
         """The scene as the text of a self-contained HTML page."""
         _, target, _ = self._view()
         packed = [pack(command) for command in self.commands()]
-        return page(packed, viewer_axes(target), self.title, self.caption, self._legend)
+        return page(packed, viewer_axes(target), self.title, self.caption, self._legend, self._remarks)
 
     def write(self, path: str | Path) -> Path:
         """Write the scene to one HTML file that plays offline; its folder is made.
@@ -213,6 +226,13 @@ class Scene:
             )
         return frame(text, round(positive_number("height", height)))
 
+    def _repr_html_(self) -> str:
+        """The scene in a notebook; where it is too large, what to do instead."""
+        try:
+            return self.html()
+        except InputError as error:
+            return f"<p>{escape(str(error))}</p>"
+
     # -- checks and common work ---------------------------------------------------------------------------
 
     def _view(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -220,6 +240,12 @@ class Scene:
         found = bounding_box(self.nodes)
         box = EMPTY if found is None else found
         return *(self._camera or fit_camera(box)), box
+
+    def _say_faults(self, name: str, files: Iterable[Path]) -> None:
+        found = {file: fault for file in files if (fault := self._meshes.faults.get(file))}
+        for file, fault in found.items():
+            warn(f"robot '{name}': mesh {file} is not shown: {fault}", RobotWarning)
+        self.add_hidden(name, (file.name for file in found))
 
     def _add(self, node: Node) -> None:
         if any(node.name == other.name for other in self.nodes):
@@ -238,10 +264,10 @@ class Scene:
     ) -> None:
         node = Node(label(kind, name), scale=scale)
         node.position = self._series(f"{name}: position", position, 3)
-        node.quaternion = _unit(name, self._series(f"{name}: quaternion", quaternion, 4))
+        node.quaternion = unit(name, self._series(f"{name}: quaternion", quaternion, 4))
         node.rgb = self._colors(name, color)
         node.shapes = [solid]
-        _paint(node, read_color(name, color if node.rgb is None else node.rgb[0]))
+        paint(node, read_color(name, color if node.rgb is None else node.rgb[0]))
         self._add(node)
 
     def _series(self, name: str, value: ArrayLike, width: int) -> np.ndarray:
@@ -269,17 +295,3 @@ class Scene:
         if isinstance(color, str) or np.ndim(color) != 2:
             return None
         return within_unit(name, self._series(f"{name}: color", color, 3))
-
-
-def _paint(node: Node, color: Color) -> None:
-    """Give all shapes of a node and of its children one colour."""
-    node.shapes = [replace(shape, color=color) for shape in node.shapes]
-    for child in node.children:
-        _paint(child, color)
-
-
-def _unit(name: str, quaternion: np.ndarray) -> np.ndarray:
-    norms = np.linalg.norm(quaternion, axis=1, keepdims=True)
-    if norms.min() < TINY:
-        raise InputError(f"{name}: quaternion: expected a rotation, found one of length {norms.min():g}")
-    return continuous(quaternion / norms)

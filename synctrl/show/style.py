@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
+LineStyle: TypeAlias = str | tuple[int, tuple[float, ...]]
 #: distinguishable with every kind of colour blindness, and dark enough on white
 PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00", "#3d3d8f", "#6b4423", "#4d4d4d")
 DESIRED = "#444444"
 ACCENT = "#b3001b"
 #: first axis solid, second dash-dot as in the paper, third dotted
-LINE_STYLES = ("-", "-.", ":", "--")
+LINE_STYLES: tuple[LineStyle, ...] = (
+    *("-", "-.", ":", "--"),
+    *((0, (8, 2)), (0, (6, 2, 1, 2, 1, 2)), (0, (1, 4)), (0, (3, 4))),
+)
 
 
 class Display(NamedTuple):
@@ -19,9 +23,10 @@ class Display(NamedTuple):
     factor: float
 
 
+_DEGREES = 57.29577951308232
 _DISPLAY = {
-    "rad": Display("deg", 57.29577951308232),
-    "rad²·s": Display("deg²·s", 57.29577951308232**2),
+    "rad": Display("deg", _DEGREES),
+    "rad²·s": Display("deg²·s", _DEGREES**2),
     "m": Display("mm", 1e3),
     "m²·s": Display("mm²·s", 1e6),
     "m²": Display("10⁻³ m²", 1e3),
@@ -34,7 +39,7 @@ def robot_color(index: int) -> str:
     return PALETTE[index % len(PALETTE)]
 
 
-def line_style(axis: int) -> str:
+def line_style(axis: int) -> LineStyle:
     """Line style of an axis, counted from 0."""
     return LINE_STYLES[axis % len(LINE_STYLES)]
 

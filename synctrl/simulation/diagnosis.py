@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import NonFiniteError, OrientationError, SimulationError, SingularJacobianError
+from ..robots.units import joined, unit_for
 from .closed_loop import ClosedLoop
-from .disturbances import DisturbanceSchedule
+from .schedules import DisturbanceSchedule
 from .stop import Excess, Push, Stop
 
 #: an acceleration from outside that no step follows: 0.2 rad in a millisecond, rad/s^2
@@ -31,7 +32,8 @@ NEARLY = 100.0
 #: causes that no closed loop has a hand in
 DESIRED = ("motion", "weights")
 
-UNITS = {"Lambda": " 1/s", "beta": " 1/s", "K_r": " N·m·s/rad", "K_eps": "", "Gamma": ""}
+DAMPING = "N·m·s/rad"
+UNITS = {"Lambda": " 1/s", "beta": " 1/s", "K_eps": "", "Gamma": ""}
 AWAY = "move the path away from the border of the workspace, or start in another configuration"
 #: what configurations do, by the kind of the error
 BY_KIND: dict[type[SimulationError], tuple[str, str]] = {
@@ -86,12 +88,11 @@ def diagnosed(
     if error.cause is not None and stop.calm:
         return error
     cause = find_cause(stop)
-    about: dict[str, Any] = {
-        "time": error.time, "robot": cause.robot, "joint": cause.joint, "cause": cause.word,
-    }  # fmt: skip
+    about: Any = {"time": error.time, "robot": cause.robot, "joint": cause.joint, "cause": cause.word}
     if not cause.ran_away:
         return type(error)(f"{error}; {cause.words}", **about)
-    place = stop.place(cause.robot, cause.joint)
+    name = "the cell" if cause.robot is None else loop.cell.names[cause.robot]
+    place = name if cause.joint is None else f"joint {cause.joint + 1} of {name}"
     return NonFiniteError(f"{place} ran away at t = {error.time:g} s: {cause.words}", **about)
 
 
@@ -99,7 +100,7 @@ def find_cause(stop: Stop) -> Cause:
     """What is to blame: a push or a start that no step follows, the path, a gain, the step, the period."""
     push = stop.push()
     if push is not None and push.acceleration > ABSURD:
-        return _pushed(push)
+        return _pushed(stop, push)
     if (start := _fast_start(stop)) is not None:
         return start
     if stop.calm and (met := BY_KIND.get(type(stop.error))) is not None:
@@ -111,21 +112,24 @@ def find_cause(stop: Stop) -> Cause:
     if stop.conditions.max() > NEARLY:
         return _nearly_singular(stop)
     if push is not None and push.acceleration > STRONG:
-        return _pushed(push)
+        return _pushed(stop, push)
     return _strong_start(stop) or _unclear(stop)
 
 
-def _pushed(push: Push) -> Cause:
-    words = f"a push of {push.torque:g} N·m accelerates it by {push.acceleration:.2g} rad/s²; make it smaller"
+def _pushed(stop: Stop, push: Push) -> Cause:
+    torque, rate = (stop.unit(unit, push.robot, push.joint) for unit in ("N·m", "rad/s²"))
+    gained = f"accelerates it by {push.acceleration:.2g} {rate}"
+    words = f"a push of {push.torque:g} {torque} {gained}; make it smaller"
     return Cause("disturbance", words, push.robot, push.joint)
 
 
 def _fast_start(stop: Stop) -> Cause | None:
     v0 = np.abs(stop.loop.cell.v0)
-    robot, joint = (int(k) for k in np.unravel_index(v0.argmax(), v0.shape))
     if not v0.max() > FASTEST_START:
         return None
-    return Cause("start", f"it starts with {v0.max():.3g} rad/s, which no step follows", robot, joint)
+    robot, joint = (int(k) for k in np.unravel_index(v0.argmax(), v0.shape))
+    speed = f"{v0.max():.3g} {stop.unit('rad/s', robot, joint)}"
+    return Cause("start", f"it starts with {speed}, which no step follows", robot, joint)
 
 
 def _strong_start(stop: Stop) -> Cause | None:
@@ -141,10 +145,9 @@ def _strong_start(stop: Stop) -> Cause | None:
 
 
 def _nearly_singular(stop: Stop) -> Cause:
-    conditions = stop.conditions
-    robot = int(conditions.argmax())
-    found = f"the Jacobian of {stop.place(robot, None)} was nearly singular before"
-    words = f"{found}, with condition number {conditions[robot]:.3g}; {AWAY}"
+    robot = int(stop.conditions.argmax())
+    found = f"the Jacobian of {stop.loop.cell.names[robot]} was nearly singular before"
+    words = f"{found}, with condition number {stop.conditions[robot]:.3g}; {AWAY}"
     return Cause("singular", words, robot, ran_away=False)
 
 
@@ -167,14 +170,14 @@ def _too_fast(stop: Stop, excesses: list[Excess]) -> Cause:
 
 
 def _unclear(stop: Stop) -> Cause:
+    if stop.h is not None and not stop.calm:
+        robot, joint = stop.quickest(range(stop.loop.cell.n))
+        words = "its closed loop is unstable; no gain, step or push stands out"
+        return Cause("unstable", words, robot, joint)
+    words = "nothing moved fast before: look at what is desired, and at its derivatives"
     if stop.h is None:
         words = "the closed loop is unstable, or too stiff for the tolerances of the method"
-        return Cause("unstable", words, stop.error.robot, ran_away=False)
-    if stop.calm:
-        words = "nothing moved fast before: look at what is desired, and at its derivatives"
-        return Cause("unstable", words, stop.error.robot, ran_away=False)
-    robot, joint = stop.quickest(range(stop.loop.cell.n))
-    return Cause("unstable", "its closed loop is unstable; no gain, step or push stands out", robot, joint)
+    return Cause("unstable", words, stop.error.robot, ran_away=False)
 
 
 def _gain(stop: Stop, gain: str, robot: int, joint: int) -> str:
@@ -186,5 +189,6 @@ def _gain(stop: Stop, gain: str, robot: int, joint: int) -> str:
     if values is None:  # an adaptation of another kind
         return "its adaptation"
     if gain == "K_r" and controller.k_r_space == "joint":
-        return f"K_r = {values[robot, joint]:g}{UNITS[gain]}"
-    return f"{gain} = {(values[robot] if values.ndim == 2 else values).max():g}{UNITS[gain]}"
+        return f"K_r = {values[robot, joint]:g} {stop.unit(DAMPING, robot, joint)}"
+    units = {**UNITS, "K_r": f" {joined(unit_for(DAMPING, unit) for unit in stop.loop.cell.units)}"}
+    return f"{gain} = {(values[robot] if values.ndim == 2 else values).max():g}{units[gain]}"

@@ -15,10 +15,12 @@ from ..coupling.cell import Cell
 from ..errors import InputError
 from ..robots.limits import joint_limits
 from ..robots.robot import Robot
+from ..robots.units import joined, unit_for
 from .plant import Output, Plant
 
 #: outputs of a run with held joints
 HELD = ("held_position", "held_velocity", "held_torque")
+HELD_AXES = ("time", "robot", "held joint")
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,14 +116,16 @@ class HeldJointsPlant(Plant):
     def outputs(self, hidden: np.ndarray) -> dict[str, Output]:
         """Positions, velocities and torques of the held joints, each (T, n, held joints)."""
         rows = hidden.reshape(len(hidden), -1, 3, self._count)
-        parts = {"rad": rows[:, :, 0], "rad/s": rows[:, :, 1], "N·m": self._torque(rows)}
+        held = [robot.joint_units[k] for robot, at in zip(self.robots, self._held, strict=True) for k in at]
+        parts = ("rad", rows[:, :, 0]), ("rad/s", rows[:, :, 1]), ("N·m", self._torque(rows))
+        axes = "time", "robot", "held joint"
         return {
-            name: (part.copy(), unit, ("time", "robot", "held joint"))
-            for name, (unit, part) in zip(HELD, parts.items(), strict=True)
+            name: (part.copy(), joined(unit_for(unit, joint) for joint in held), axes)
+            for name, (unit, part) in zip(HELD, parts, strict=True)
         }
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
-        """How far the held joints were moved, in rad: `held_joints`, one entry per robot."""
+        """How far the held joints were moved, in rad or m: `held_joints`, one entry per robot."""
         moved = np.abs(hidden.reshape(len(hidden), -1, 3, self._count)[:, :, 0] - self.at_rest)
         return {
             "held_joints": [

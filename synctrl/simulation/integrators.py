@@ -13,12 +13,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, NonFiniteError, SynctrlError
-from .advance import Control
+from ..robots.units import unit_for
+from .advance import Control, Step
 from .clock import Clock, before
-from .closed_loop import ClosedLoop
-from .handover import user_failure
-from .state import State
-from .steps import Step
+from .closed_loop import ClosedLoop, State
+from .guard import user_failure
 
 ADAPTIVE = ("RK45", "RK23", "DOP853", "Radau", "BDF", "LSODA")
 #: weights of the four stages, times 6
@@ -129,11 +128,12 @@ def _step(solver: Any) -> None:
 def _stuck(loop: ClosedLoop, method: str, solver: Any) -> NonFiniteError:
     """The error of a method that cannot go on, with the robot whose state changes fastest."""
     rate = loop.state(solver.fun(solver.t, solver.y))
-    v_dot = np.nan_to_num(np.abs(rate.v), nan=np.inf).max(axis=1)
-    i = int(v_dot.argmax())
+    v_dot = np.nan_to_num(np.abs(rate.v), nan=np.inf)
+    i, joint = (int(k) for k in np.unravel_index(v_dot.argmax(), v_dot.shape))
+    unit = unit_for("rad/s²", loop.cell.robots[i].joint_units[joint])
     return NonFiniteError(
         f"{method} got stuck at t = {solver.t:g} s, where {loop.cell.names[i]} accelerates with "
-        f"{v_dot[i]:.3g} rad/s²",
+        f"{v_dot[i, joint]:.3g} {unit}",
         time=float(solver.t),
         robot=i,
     )

@@ -1,21 +1,26 @@
-"""What a folder says of its sweep: `sweep.json`, read, checked, and compared with what is at hand."""
+"""What a sweep is, as plain data: told of an experiment, read from its `sweep.json`, checked and compared."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from ..analysis.metrics import ERRORS
-from ..checks import count, instance, non_negative_number, positive_number
+import numpy as np
+
+from ..analysis.metrics import ERRORS, Band, checked_band
+from ..checks import count, instance, positive_number
 from ..errors import InputError, ResultError
 from ..files import read_regular
+from ..simulation.recorder import describe
+from ..simulation.schedules import DisturbanceSchedule
 from .distributions import Values, described
-from .draws import Draws, Generations
+from .factors import Setup
 from .measures import MEASURES, TRUST
-from .rows import Format, columns
+from .rows import Draws, Format, Generations, columns
 
 #: what is written
 FORMAT = "synctrl sweep 2"
@@ -24,6 +29,37 @@ FORMATS: Mapping[str, Sequence[str]] = MappingProxyType(
     {"synctrl sweep 1": [name for name in MEASURES if name not in TRUST], FORMAT: MEASURES}
 )
 ABOUT = "sweep.json"
+#: instants at which desired motion and closed loop are looked at
+INSTANTS = 40
+#: digits that count: fewer than those in which machines may differ
+DIGITS = 9
+
+
+def describe_base(setup: Setup) -> dict[str, Any]:
+    """Names, gains and options of an experiment, and digests of what cannot be told in words."""
+    experiment = setup.experiment
+    loop, cell = experiment.closed_loop(), experiment.cell
+    schedule = DisturbanceSchedule(cell, experiment.disturbances)
+    times = np.linspace(0, setup.duration, INSTANTS)
+    described = {key: value for key, value in describe(loop).items() if key != "versions"}
+    table = cell.reference_table(times)
+    return {
+        **described,
+        "digest": {
+            "initial state": digest([loop.initial_state()]),
+            "desired motion": digest([table.xd, table.xd_dot, table.xd_ddot]),
+            "weights": digest([table.c, table.c_dot, table.c_ddot]),
+            "disturbances": digest([np.array(schedule.edges), schedule.torques]),
+            "dynamics": digest(_flow(setup, times)),
+        },
+    }
+
+
+def digest(arrays: Any) -> str:
+    """A short digest of arrays, to the digits that count; -0 counts as 0."""
+    rows = (" ".join(f"{value + 0.0:.{DIGITS - 1}e}" for value in array.ravel()) for array in arrays)
+    text = "\n".join(rows)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def read_about(folder: str | Path) -> dict[str, Any]:
@@ -75,7 +111,7 @@ def row_format(about: Mapping[str, Any]) -> Format:
     return Format(expected, draws, duration, measures)
 
 
-def checked_bands(bands: Any) -> dict[str, float]:
+def checked_bands(bands: Any) -> dict[str, Band]:
     """Settling bands by kind of error.
 
     Raises:
@@ -83,7 +119,7 @@ def checked_bands(bands: Any) -> dict[str, float]:
     """
     if not isinstance(bands, Mapping) or set(bands) != set(ERRORS):
         raise InputError(f"expected numbers for {' and '.join(ERRORS)}, found {bands!r}", subject="bands")
-    return {kind: non_negative_number(f"bands, {kind}", bands[kind]) for kind in ERRORS}
+    return {kind: checked_band(f"bands, {kind}", bands[kind]) for kind in ERRORS}
 
 
 def difference(there: Any, here: Any, where: str = "") -> str:
@@ -98,6 +134,9 @@ def difference(there: Any, here: Any, where: str = "") -> str:
     else:
         return "" if there == here else f"{where} is {_short(there)} there and {_short(here)} here"
     return next((found for name, a, b in parts if (found := difference(a, b, name))), "")
+
+
+# -- internals --------------------------------------------------------------------------------------------
 
 
 def _described_factors(factors: Any) -> dict[str, Values | None]:
@@ -120,3 +159,32 @@ def _described_factors(factors: Any) -> dict[str, Values | None]:
 def _short(value: Any) -> str:
     text = json.dumps(value, ensure_ascii=False)
     return text if len(text) <= 80 else text[:77] + "..."
+
+
+def _flow(setup: Setup, times: np.ndarray) -> list[np.ndarray]:
+    """y' of the closed loop at some instants, near its initial state: robots, friction, options and all.
+
+    Events of the plant come after it, each with what it makes of such a state.
+    """
+    loop = setup.experiment.closed_loop()
+    rng = np.random.default_rng(0)
+    y, none = loop.initial_state(), np.zeros((loop.cell.n, loop.cell.nv))
+    spread = 0.01 * _used(loop)
+    flow = [
+        loop.at(float(t)).evaluate(reference, y + spread * rng.standard_normal(y.size), none)[0]
+        for t, reference in zip(times, loop.cell.references(times), strict=True)
+    ]
+    for t in loop.events.tolist():
+        state = loop.state(y + spread * rng.standard_normal(y.size))
+        loop.at(t).meet(t, state)
+        flow += [np.array([t]), state.flat]
+    return flow
+
+
+def _used(loop: Any) -> np.ndarray:
+    """1 for joints that a robot has, 0 for padding and everything that is no joint."""
+    used = np.zeros(loop.size)
+    for part in loop.split(used)[:2]:
+        for i, robot in enumerate(loop.cell.robots):
+            part[i, : robot.nv] = 1
+    return used

@@ -18,12 +18,11 @@ from ..checks import choice, instance, positive_number
 from ..errors import InputError
 from ..robots.robot import Robot
 from .algebra import LAPACK, Algebra
+from .measurement import Kinematics, Tips
 from .measurement import Measurement as Measurement
-from .redundancy import Damping, InverseMap, Posture, Redundancy, inverse_map
-from .tips import Kinematics, Tips
+from .redundancy import Damping, Inverse, Joints, Posture, Redundancy, inverse_map
 
 AXES = "xyz"
-Joints = tuple[np.ndarray, np.ndarray]
 
 
 class BoundSpace(Protocol):
@@ -59,7 +58,8 @@ class Space(Protocol):
     The coordinates have different names, each a word of one line. Beside what is below, a space may offer any
     of the following, and is asked for it where it does; what it does not offer is not looked at.
 
-    - `units`: unit of each of the m coordinates, where they differ.
+    - `units`: unit of each of the m coordinates, where they differ; or, where they depend on the robots, a
+      method that gives them for these, as `labels` does.
     - `miss(robot, target, q) -> error, Jacobian`: by how much a robot at q misses a target, (m,), and J,
       (m, nv), with e' = -J v. With it a run begins only if joint positions exist for what is desired.
     - `start(robot, x) -> q`: joint positions, (nv,), of a robot that begins at x, (m,), and has no `q0`.
@@ -78,9 +78,12 @@ class Space(Protocol):
         """This space for certain robots."""
 
 
-def units_of(space: Space, m: int) -> tuple[str, ...]:
-    """Unit of each of the m coordinates of a space."""
-    return tuple(getattr(space, "units", (space.unit,) * m))
+def units_of(space: Space, robots: Sequence[Robot]) -> tuple[str, ...]:
+    """Unit of each of the m coordinates that a space has for these robots."""
+    units = getattr(space, "units", None)
+    if units is None:
+        return (space.unit,) * len(space.labels(robots))
+    return tuple(units(robots) if callable(units) else units)
 
 
 class JointSpace:
@@ -89,8 +92,14 @@ class JointSpace:
     unit = "rad"
 
     def labels(self, robots: Sequence[Robot]) -> tuple[str, ...]:
-        """`joint 1`, `joint 2`, ..."""
-        return tuple(f"joint {k}" for k in range(1, robots[0].nv + 1))
+        """Names of the joints, if all robots call them the same; else `joint 1`, `joint 2`, ..."""
+        names = {robot.joint_names for robot in robots}
+        return names.pop() if len(names) == 1 else tuple(f"joint {k}" for k in range(1, robots[0].nv + 1))
+
+    def units(self, robots: Sequence[Robot]) -> tuple[str, ...]:
+        """Units of the joints; `rad or m` where one robot turns and another one slides."""
+        of = (robot.joint_units for robot in robots)
+        return tuple(" or ".join(dict.fromkeys(units)) for units in zip(*of, strict=False))
 
     def bind(self, robots: Sequence[Robot]) -> BoundJointSpace:
         """Joint space of these robots.
@@ -139,7 +148,7 @@ class BoundTipSpace(ABC):
         square: which robots have as many joints as there are task coordinates, (..., 1).
     """
 
-    def __init__(self, space: Any, tips: Kinematics, inverse: InverseMap, square: np.ndarray):
+    def __init__(self, space: Any, tips: Kinematics, inverse: Inverse, square: np.ndarray):
         self._space, self._tips, self._inverse, self._square = space, tips, inverse, square
         self.limits, self.to_joints = space.limits, inverse.to_joints
 
@@ -177,10 +186,7 @@ class TipSpace(ABC):
 
     Args:
         m: number of task coordinates.
-        max_condition: a Jacobian with a larger condition number counts as singular.
-        singularity: "stop" ends a run at a singular Jacobian with an error. "damped", or a `Damping`, goes
-            on with damped least squares; the result's `info["damping"]` then says when and how much.
-        redundancy: what arms do with joints that the task leaves free.
+        max_condition, singularity, redundancy: see `CartesianSpace`.
 
     Raises:
         InputError: another word, or a limit that is not positive.
@@ -195,7 +201,9 @@ class TipSpace(ABC):
         self.m = m
         self.redundancy = Redundancy() if redundancy is None else redundancy
         instance("redundancy", self.redundancy, Redundancy, "a Redundancy")
-        self.damping = _damping(singularity)
+        self.damping = singularity if isinstance(singularity, Damping) else None
+        if self.damping is None and choice("singularity", singularity, ("stop", "damped")) == "damped":
+            self.damping = Damping()
         limit = positive_number("max_condition", max_condition)
         self.max_condition = limit if self.damping is None else np.inf
 
@@ -213,11 +221,8 @@ class TipSpace(ABC):
         """
         for robot in robots:
             if robot.nv < self.m:
-                raise InputError(
-                    f"expected robots with at least {self.m} joints, "
-                    f"found robot '{robot.name}' with {robot.nv}",
-                    subject=repr(self),
-                )
+                expected = f"expected robots with at least {self.m} joints"
+                raise InputError(f"{expected}, found '{robot.name}' with {robot.nv}", subject=repr(self))
         return self.over(Tips(robots), [[robot.nv] for robot in robots], self.redundancy.spread(robots))
 
     def over(
@@ -282,9 +287,3 @@ class CartesianSpace(TipSpace):
 
     def __repr__(self) -> str:
         return f"CartesianSpace('{self.axes}')"
-
-
-def _damping(singularity: str | Damping) -> Damping | None:
-    if isinstance(singularity, Damping):
-        return singularity
-    return Damping() if choice("singularity", singularity, ("stop", "damped")) == "damped" else None

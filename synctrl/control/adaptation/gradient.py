@@ -8,12 +8,12 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import positive_number
+from ...checks import finite_array, instance, positive_number
 from ...coupling.cell import Cell
 from ...errors import InputError
 from ...robots.pseudo_inertia import inverse_hessian, pseudo_inertia
 from ...robots.robot import Robot
-from ..ragged_gain import RaggedGain
+from ..gains import RaggedGain
 from .metric import DiagonalMetric, Metric, listed, make_metric, read_metric
 from .protocol import Adaptation, Seen
 
@@ -37,7 +37,7 @@ class Gradient:
         self.Gamma = read_metric(Gamma)
 
     @classmethod
-    def pullback(cls, robots: Robot | Sequence[Robot], gamma: float) -> Self:
+    def pullback(cls, robots: Robot | Sequence[Robot], gamma: float, friction: ArrayLike = ()) -> Self:
         """(14) in the metric of bodies: Gamma_kl = gamma tr(D_k P D_l P) per body.
 
         This is the inverse Hessian of -log det P, with P that of the robot as it is given. With it one
@@ -46,13 +46,17 @@ class Gradient:
         Args:
             robots: a robot for all of the cell, or one for each, with the parameters that are expected.
             gamma: rate, 1/(N·m), above 0.
+            friction: rates of the parameters that are adapted beside those of bodies, one each, as `Gamma`.
 
         Raises:
-            InputError: a rate that is not above 0, or a body whose pseudo-inertia is not positive definite.
+            InputError: rates that are not above 0, or a body whose pseudo-inertia is not positive definite.
         """
         rate = positive_number("gamma", gamma)
-        many = [robots] if isinstance(robots, Robot) else robots
-        return cls([rate * _pullback(robot) for robot in many])
+        given: Any = robots if isinstance(robots, (list, tuple)) else [robots]
+        for robot in given:
+            instance("robot", robot, Robot, "a Robot, for example from load_robot")
+        others = np.diag(finite_array("friction", friction, (None,)))
+        return cls([_beside(rate * _pullback(robot), others) for robot in given])
 
     def bind(self, cell: Cell) -> MetricGradient:
         """This adaptation for a cell.
@@ -141,7 +145,11 @@ def _pullback(robot: Robot) -> np.ndarray:
             subject=f"robot '{robot.name}'",
             found=float(lowest[k]),
         )
-    Gamma = np.zeros((10 * len(P), 10 * len(P)))
-    for k, block in enumerate(inverse_hessian(P)):
-        Gamma[10 * k : 10 * k + 10, 10 * k : 10 * k + 10] = block
-    return Gamma
+    return _beside(*inverse_hessian(P))
+
+
+def _beside(*blocks: np.ndarray) -> np.ndarray:
+    """A matrix of square blocks along its diagonal."""
+    from scipy.linalg import block_diag
+
+    return block_diag(*(block for block in blocks if block.size))

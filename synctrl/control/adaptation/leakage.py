@@ -12,7 +12,7 @@ from ...checks import positive_number
 from ...coupling.cell import Cell
 from ...errors import InputError
 from ...tasks.algebra import limited
-from ..ragged_gain import RaggedGain
+from ..gains import RaggedGain
 from .gradient import MetricGradient, metric_of
 from .metric import Metric, distance, listed, read_metric
 from .protocol import Seen

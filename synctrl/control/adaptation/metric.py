@@ -17,8 +17,7 @@ from numpy.typing import ArrayLike
 from ...checks import finite_array
 from ...errors import InputError
 from ...tasks.algebra import limited
-from ..gains import read_gain, spread_rows
-from ..ragged_gain import RaggedGain
+from ..gains import RaggedGain, read_gain, spread_rows
 
 #: share of the largest eigenvalue below which one counts as zero, and above which asymmetry is refused
 ROUNDING = 1e-12

@@ -18,8 +18,7 @@ from ...checks import finite_array, positive_number
 from ...coupling.cell import Cell
 from ...errors import InputError
 from ...tasks.algebra import limited
-from ..gains import spread_rows
-from ..ragged_gain import RaggedGain
+from ..gains import RaggedGain, spread_rows
 from .gradient import MetricGradient, metric_of
 from .metric import Metric, distance, listed, read_metric
 from .protocol import Seen

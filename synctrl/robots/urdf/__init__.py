@@ -1,15 +1,14 @@
 """Documents of robots: read strictly, checked, written anew for Pinocchio."""
 
+from .build import build_model, model_from_xml
 from .description import (
     Description,
-    build_model,
     describe,
     existing_file,
-    lock_joints,
-    model_from_xml,
     read_urdf,
     urdf_folder,
 )
+from .locks import lock_joints
 
 __all__ = [
     "Description",

@@ -6,27 +6,29 @@ checked, written anew: it never sees the file. Then its model is compared with t
 
 from __future__ import annotations
 
-import os
-import sys
-import tempfile
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-import coal
-import numpy as np
 import pinocchio as pin
 
-from ...checks import finite_number, instance
-from ...errors import FrameNotFound, RobotError, RobotWarning, near, warn
-from .checks import check_bodies, check_model, check_tree
-from .document import Document, Geometry, Joint, Link
-from .meshes import data_folder, find_mesh
-from .reader import read_document
-from .writer import dynamics_xml
-
-DEFAULT_COLOR = (0.9, 0.9, 0.9, 1.0)
+from ...checks import boolean, instance
+from ...errors import FrameNotFound, RobotError, near
+from .build import build_model, check_model
+from .checks import check_bodies, check_some_mass, check_tree
+from .document import Document, Inertial
+from .frictions import stated_friction
+from .inertials import with_inertials
+from .locks import settle_locks
+from .meshes import build_visual, find_pictures
+from .names import remark_names
+from .packages import Packages
+from .report import NOTHING, Notes, Report, warn_of
+from .sources import read_source
+from .suspicions import suspect
+from .tips import check_tip, default_tip
+from .xml import quoted
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +42,7 @@ class Description:
         tip: name of the frame that is its tip unless another is asked for.
         document: what was read; joints that were locked are fixed in it.
         locked: names of the joints that were locked.
+        report: what was left out, assumed or locked, and what is suspicious.
     """
 
     name: str
@@ -48,6 +51,18 @@ class Description:
     tip: str
     document: Document
     locked: tuple[str, ...] = ()
+    report: Report = NOTHING
+
+    def with_tip(self, tip: str) -> Description:
+        """The same with another tip frame.
+
+        Raises:
+            FrameNotFound: there is none of that name.
+        """
+        instance("frame", tip, str, "a name")
+        if not self.model.existFrame(tip):
+            raise FrameNotFound(self.name, tip, [frame.name for frame in self.model.frames])
+        return replace(self, tip=tip)
 
     @property
     def path(self) -> Path | None:
@@ -69,17 +84,17 @@ def read_urdf(
     path: str | Path,
     package_dirs: Iterable[str | Path] = (),
     *,
-    locked: Mapping[str, float] | None = None,
-    tip: str | None = None,
+    xacro_args: Mapping[str, object] | None = None,
+    **options: Any,
 ) -> Description:
-    """A robot from a URDF file.
+    """A robot from a URDF file, a xacro file or MJCF, see `read_source`.
 
     Args:
         path: the file.
         package_dirs: folders in which packages are looked for when a mesh is `package://name/...`, before
             those of example-robot-data.
-        locked: positions, in rad or m, of joints that are to be held: they become fixed joints.
-        tip: name of the tip frame; by default the last link that carries no other.
+        xacro_args: values of a xacro file's arguments.
+        options: `tip`, `locked`, `inertials` and `strict` as in `describe`.
 
     Raises:
         RobotError: a missing file, or the first defect, with file, line, link or joint, what was found and
@@ -87,11 +102,13 @@ def read_urdf(
         FrameNotFound: there is no such tip.
 
     Warns:
-        RobotWarning: an axis not of unit length, a missing mesh, an element that nobody here reads.
+        RobotWarning: once, if there is anything to say: what was left out, assumed or locked, and what is
+            suspicious; all of it is in the report.
     """
-    document = read_document(existing_file(path))
-    check_tree(document)
-    return describe(lock_joints(document, locked or {}), package_dirs, tip=tip, locked=tuple(locked or ()))
+    file = existing_file(path)
+    notes = Notes(file, strict=boolean("strict", options.pop("strict", False)))
+    document = read_source(file, Packages(file, package_dirs), notes, xacro_args)
+    return describe(document, package_dirs, notes=notes, **options)
 
 
 def describe(
@@ -99,49 +116,61 @@ def describe(
     package_dirs: Iterable[str | Path] = (),
     *,
     tip: str | None = None,
-    locked: tuple[str, ...] = (),
+    locked: Mapping[str, float] | None = None,
+    inertials: Mapping[str, Inertial | Mapping[str, Any]] | None = None,
+    notes: Notes | None = None,
 ) -> Description:
-    """Check a document and build its model. Arguments and errors as in `read_urdf`."""
-    check_tree(document)
-    check_bodies(document)
+    """Check a document and build its model.
+
+    Args:
+        document: the robot.
+        package_dirs: as in `read_urdf`.
+        tip: name of the tip frame, and joints that do not move it are held; by default the end of the longest
+            branch.
+        locked: positions, in rad or m, of joints that are to be held: they become fixed joints.
+        inertials: of links, in the place of what the document says, see `with_inertials`.
+        notes: what was remarked so far; a strict one makes every remark an error.
+
+    Raises, warns: as `read_urdf`.
+    """
+    notes = notes or Notes(document.file)
+    instance("frame", tip, (str, type(None)), "a name")
+    document = with_inertials(document, {} if inertials is None else inertials)
+    document, held = _settled(document, {} if locked is None else locked, tip, notes)
     model = build_model(document)
     check_model(document, model)
-    tip = tip or document.last_link
+    document = find_pictures(document, Packages(document.file, package_dirs), notes)
+    visual = build_visual(document, model)
+    tip = _tip(document, model, tip, held, notes)
+    report = replace(notes.report(document.source), known=tuple(stated_friction(document)))
+    warn_of(report)
+    name = document.name if document.name.isprintable() else quoted(document.name)
+    return Description(name, model, visual, tip, document, tuple(held), report)
+
+
+def _settled(
+    document: Document, locked: Mapping[str, float], tip: str | None, notes: Notes
+) -> tuple[Document, dict[str, float]]:
+    """The document with its joints held, checked, and the positions of these joints."""
+    check_some_mass(document)
+    check_tree(document)
+    check_tip(document, tip, notes)
+    document, held = settle_locks(document, locked, tip, notes)
+    check_tree(document)
+    check_bodies(document, notes)
+    remark_names(document, notes)
+    suspect(document, notes)
+    return document, held
+
+
+def _tip(
+    document: Document, model: pin.Model, tip: str | None, held: Mapping[str, float], notes: Notes
+) -> str:
+    if tip is None:
+        return default_tip(document, held, notes)
     if not model.existFrame(tip):
         raise FrameNotFound(document.name, tip, [frame.name for frame in model.frames])
-    visual = _build_visual(document, model, _package_dirs(package_dirs))
-    return Description(document.name, model, visual, tip, document, locked)
-
-
-def lock_joints(document: Document, positions: Mapping[str, float]) -> Document:
-    """The document with joints held at positions, in rad or m: they become fixed joints.
-
-    Raises:
-        RobotError: no such moving joint, or a position outside its limits.
-        InputError: a position that is no finite number.
-    """
-    instance("locked", positions, Mapping, "positions by the names of joints")
-    moving = {joint.name: joint for joint in document.moving_joints}
-    for name, position in positions.items():
-        if name not in moving:
-            raise document.error(
-                f"expected moving joints to lock, found '{name}'{near(name, moving)}; "
-                f"they are: {', '.join(moving)}",
-                found=name,
-            )
-        _check_position(document, moving[name], finite_number(f"position of joint '{name}'", position))
-    joints = (j.fixed(float(positions[j.name])) if j.name in positions else j for j in document.joints)
-    return replace(document, joints=tuple(joints))
-
-
-def _check_position(document: Document, joint: Joint, position: float) -> None:
-    limit = joint.limit
-    if limit is None or limit.lower is None or limit.upper is None:
-        return
-    if not limit.lower <= position <= limit.upper:
-        raise document.error(
-            f"expected a position from {limit.lower:g} to {limit.upper:g}, found {position:g}", joint
-        )
+    return tip
 
 
 # -- files -------------------------------------------------------------------------------------------------
@@ -176,100 +205,3 @@ def existing_file(path: str | Path) -> Path:
         f"; in its folder there are: {', '.join(beside[:5])}" if beside else ""
     )
     raise RobotError(f"expected a URDF file, found {kind}{hint}", file=file)
-
-
-def _package_dirs(package_dirs: Iterable[str | Path]) -> tuple[Path, ...]:
-    folders = (package_dirs,) if isinstance(package_dirs, (str, Path)) else package_dirs
-    instance("package_dirs", folders, Iterable, "folders")
-    folders = tuple(folders)
-    for folder in folders:
-        instance("package_dirs", folder, (str, Path), "folders")
-    stock = data_folder()
-    return (*map(Path, folders), *([stock] if stock else []))
-
-
-# -- Pinocchio ---------------------------------------------------------------------------------------------
-
-
-def build_model(document: Document) -> pin.Model:
-    """Pinocchio's model of a checked document.
-
-    Raises:
-        RobotError: Pinocchio refuses it all the same, with the parser's reason.
-    """
-    return model_from_xml(document.source, dynamics_xml(document))
-
-
-def model_from_xml(source: str, xml: str) -> pin.Model:
-    """Pinocchio's model of a URDF text; `source` is what messages call it."""
-    with _standard_error() as written:
-        try:
-            model, failure = pin.buildModelFromXML(xml), None
-        except Exception as error:
-            model, failure = None, error
-    if failure is not None:
-        reason = " ".join(written[0].split()) or str(failure)
-        message = f"expected a URDF that Pinocchio accepts, found: {reason}"
-        raise RobotError(message, file=source, found=reason) from failure
-    return model
-
-
-@contextmanager
-def _standard_error() -> Iterator[list[str]]:
-    """What is written to the standard error meanwhile, also by C++: one string, there when the block is left.
-
-    The reason why a parser refuses a document is said nowhere else.
-    """
-    written: list[str] = [""]
-    sys.stderr.flush()
-    try:
-        saved = os.dup(2)
-    except OSError:  # there is no standard error
-        yield written
-        return
-    with tempfile.TemporaryFile() as file:
-        os.dup2(file.fileno(), 2)
-        try:
-            yield written
-        finally:
-            os.dup2(saved, 2)
-            os.close(saved)
-            file.seek(0)
-            written[0] = file.read().decode(errors="replace")
-
-
-# -- shapes ------------------------------------------------------------------------------------------------
-
-
-def _build_visual(document: Document, model: pin.Model, package_dirs: tuple[Path, ...]) -> pin.GeometryModel:
-    """All shapes for display, each at its place in the frame of its link."""
-    visual = pin.GeometryModel()
-    for link in document.links:
-        frame_id = model.getFrameId(link.name, pin.BODY)
-        frame = model.frames[frame_id]
-        for k, geometry in enumerate(link.visuals):
-            found = _shape(document, link, geometry, package_dirs)
-            if found is None:
-                continue
-            colored, color = geometry.color is not None, np.array(geometry.color or DEFAULT_COLOR)
-            placement = frame.placement * geometry.origin.se3
-            place = (f"{link.name}_{k}", frame.parentJoint, frame_id, placement)
-            visual.addGeometryObject(pin.GeometryObject(*place, *found, colored, color))
-    return visual
-
-
-def _shape(
-    document: Document, link: Link, geometry: Geometry, package_dirs: tuple[Path, ...]
-) -> tuple[coal.CollisionGeometry, str, np.ndarray] | None:
-    """Coal's geometry, and path and scale of a mesh; None where the mesh is missing."""
-    shape = geometry.shape
-    if shape.kind != "mesh":
-        kinds = {"box": coal.Box, "cylinder": coal.Cylinder, "capsule": coal.Capsule, "sphere": coal.Sphere}
-        return kinds[shape.kind](*shape.size), "", np.ones(3)
-    folder = document.file.parent if document.file else Path.cwd()
-    file = find_mesh(shape.filename or "", folder, package_dirs)
-    if file is None:
-        missing = f"mesh '{shape.filename}' is missing and will not be shown"
-        warn(str(document.error(missing, link, line=geometry.line)), RobotWarning)
-        return None
-    return coal.BVHModelOBBRSS(), str(file), np.array(shape.size)

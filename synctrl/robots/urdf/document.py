@@ -7,6 +7,7 @@ plugins, textures, sensors) is left behind when it is read, so what is checked i
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
@@ -15,12 +16,15 @@ import numpy as np
 import pinocchio as pin
 
 from ...errors import RobotError
+from .report import Note
+from .xml import quoted
 
 Vector = tuple[float, ...]
 
 ZERO: Vector = (0.0, 0.0, 0.0)
 #: of a moment of inertia, in the order of a URDF
 INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+NO_INERTIA: Vector = (0.0,) * 6
 MOVING_TYPES = ("revolute", "continuous", "prismatic")
 
 
@@ -93,22 +97,33 @@ class Shape:
     """A geometric primitive or a mesh.
 
     `size` is (x, y, z) of a box, (radius, length) of a cylinder or capsule, (radius,) of a sphere, all in m,
-    and the scale (x, y, z) of a mesh, whose `filename` is as the file names it.
+    and the scale (x, y, z) of a mesh. A mesh has a `filename`, as the description names it, and the `file`
+    that was found, None if it is not shown.
     """
 
     kind: str
     size: Vector
     filename: str | None = None
+    file: Path | None = None
+
+    @property
+    def hidden(self) -> bool:
+        """Whether it is a mesh that cannot be shown."""
+        return self.kind == "mesh" and self.file is None
 
 
 @dataclass(frozen=True)
 class Geometry:
-    """A shape on a link, for display or collision. `color` is red, green, blue, alpha from 0 to 1."""
+    """A shape on a link, for display or collision.
+
+    `color` is red, green, blue, alpha from 0 to 1; `texture` names a picture whose mean is not known yet.
+    """
 
     shape: Shape
     origin: Pose = Pose()
     color: Vector | None = None
     line: int = 0
+    texture: str | None = None
 
 
 @dataclass(frozen=True)
@@ -124,22 +139,44 @@ class Link:
     @property
     def title(self) -> str:
         """What messages call it."""
-        return f"link '{self.name}'"
+        return f"link {quoted(self.name)}"
 
 
 @dataclass(frozen=True)
 class Limit:
-    """Limits of a joint: torque in N·m (or N), speed in rad/s (or m/s), and the range in rad (or m)."""
+    """Limits of a joint: torque in N·m (or N), speed in rad/s (or m/s), and the range in rad (or m).
 
-    effort: float
-    velocity: float
+    Torque and speed are infinite, and the ends of the range None, where there is no limit.
+    """
+
+    effort: float = math.inf
+    velocity: float = math.inf
     lower: float | None = None
     upper: float | None = None
+
+    @property
+    def rest(self) -> float:
+        """The position in the range that is nearest to 0."""
+        lower = -math.inf if self.lower is None else self.lower
+        return max(lower, min(0.0, math.inf if self.upper is None else self.upper))
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """A joint that follows another: its position is `multiplier` times that of `joint`, plus `offset`."""
+
+    joint: str
+    multiplier: float = 1.0
+    offset: float = 0.0
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint. `axis` is of unit length; `mimics` names the joint that a mimic joint follows."""
+    """A joint.
+
+    `axis` is of unit length; `armature` is the inertia of a rotor that turns along, in kg·m^2 (or kg);
+    `remarks` are what there is to say about it if it moves.
+    """
 
     name: str
     type: str
@@ -150,18 +187,25 @@ class Joint:
     limit: Limit | None = None
     damping: float = 0.0
     friction: float = 0.0
-    mimics: str | None = None
+    armature: float = 0.0
+    mimic: Mimic | None = None
     line: int = 0
+    remarks: tuple[Note, ...] = ()
 
     @property
     def title(self) -> str:
         """What messages call it."""
-        return f"joint '{self.name}'"
+        return f"joint {quoted(self.name)}"
 
     @property
     def moves(self) -> bool:
         """Whether the joint has a degree of freedom."""
         return self.type in MOVING_TYPES
+
+    @property
+    def unit(self) -> str:
+        """Unit of its position."""
+        return "m" if self.type == "prismatic" else "rad"
 
     def fixed(self, position: float) -> Joint:
         """This joint held at a position, in rad or m: a fixed joint."""
@@ -172,7 +216,7 @@ class Joint:
             else pin.SE3(pin.exp3(position * axis), np.zeros(3))
         )
         origin = self.origin if position == 0 else Pose.of(self.origin.se3 * motion)
-        return replace(self, type="fixed", origin=origin, limit=None, damping=0.0, friction=0.0, mimics=None)
+        return Joint(self.name, "fixed", self.parent, self.child, origin, self.axis, line=self.line)
 
 
 @dataclass(frozen=True)
@@ -187,7 +231,7 @@ class Document:
     @property
     def source(self) -> str:
         """What messages call it."""
-        return str(self.file) if self.file else f"robot '{self.name}'"
+        return str(self.file) if self.file else f"robot {quoted(self.name)}"
 
     @property
     def moving_joints(self) -> tuple[Joint, ...]:
@@ -195,16 +239,16 @@ class Document:
         return tuple(joint for joint in self.joints if joint.moves)
 
     @property
+    def hidden(self) -> tuple[Shape, ...]:
+        """Meshes that should be seen, and cannot be shown."""
+        shapes = (visual.shape for link in self.links for visual in link.visuals)
+        return tuple(shape for shape in shapes if shape.hidden)
+
+    @property
     def root(self) -> str:
         """Name of the link that is nobody's child."""
         children = {joint.child for joint in self.joints}
         return next(link.name for link in self.links if link.name not in children)
-
-    @property
-    def last_link(self) -> str:
-        """Name of the last link, in the order of the document, that carries no other."""
-        parents = {joint.parent for joint in self.joints}
-        return [link.name for link in self.links if link.name not in parents][-1]
 
     def placed(self, pose: Pose) -> Self:
         """The document with its base moved: a new root link, and the old one fixed to it."""
@@ -212,6 +256,11 @@ class Document:
         name = next(name for k in range(len(taken) + 1) if (name := f"place{k}") not in taken)
         joint = Joint(f"{name}_mount", "fixed", name, self.root, pose)
         return replace(self, links=(Link(name), *self.links), joints=(joint, *self.joints))
+
+    def renamed(self, names: Mapping[str, str]) -> Self:
+        """The document with other names for some joints."""
+        joints = (replace(joint, name=names.get(joint.name, joint.name)) for joint in self.joints)
+        return replace(self, joints=tuple(joints))
 
     def error(
         self,
@@ -231,7 +280,7 @@ class Document:
             line: where that part stands; by default the line of the item.
             found: what was found.
         """
-        robot = None if self.file else f"robot '{self.name}'"
+        robot = None if self.file else f"robot {quoted(self.name)}"
         place = item and ", ".join(word for word in (item.title, part) if word)
         subject = ": ".join(word for word in (robot, place) if word)
         line = line or (item.line if item else 0)

@@ -1,147 +1,150 @@
-"""Mesh files of a robot description: only inside its package or folder, and harmless to whoever draws them.
+"""Finding the meshes and textures that a description names, in its packages and nowhere else.
 
-A mesh is not parsed when a robot is loaded. What is checked is that its path, and every path named inside it,
-stays in the folder it belongs to, and that it is not cut short.
+Names are resolved once, when a description is read: what is drawn later is the file that was found then. See
+`mesh_files` for what is looked at in a file. A mesh that cannot be shown is left out.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Iterator
-from importlib import metadata
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NoReturn
+from urllib.parse import unquote
 
-from ...errors import RobotError
-from .xml import Element, quoted
+import coal
+import numpy as np
+import pinocchio as pin
 
-MAX_MESH_BYTES = 200_000_000
-FORMATS = (".stl", ".dae", ".obj")
+from .document import Document, Geometry, Link, Shape, Vector
+from .mesh_files import check_mesh
+from .packages import Packages
+from .regular import Unusable, read_regular, require_regular
+from .report import Notes
+from .textures import MAX_TEXTURE_BYTES, mean_color
+from .xml import quoted
 
-_SEGMENT = re.compile(r"[A-Za-z0-9_+()\- ][A-Za-z0-9_.+()\- ]*", re.ASCII)
-_DAE_IMAGES = re.compile(rb"<(?:\w+:)?init_from[^>]*>(.*?)</", re.DOTALL)
-_OBJ_LIBRARIES = re.compile(rb"^\s*mtllib\s+(.*?)\s*$", re.MULTILINE)
-_MTL_IMAGES = re.compile(rb"^\s*(?:map_\w+|bump|disp|decal|refl|norm)\s+(?:.*\s)?(\S+)\s*$", re.MULTILINE)
+DEFAULT_COLOR = (0.9, 0.9, 0.9, 1.0)
+SCHEMES = ("package://", "model://", "file://")
 
 
-def check_filename(mesh: Element) -> str:
-    """The file name of a `<mesh>`: `package://name/path` or a path below the description's own folder.
+def find_pictures(document: Document, packages: Packages, notes: Notes) -> Document:
+    """The document with the file of every mesh that is shown, and the mean colour of every texture.
+
+    A visual whose mesh cannot be shown stays in the document as it is named, without a file, and with a note.
 
     Raises:
-        RobotError: another scheme, an absolute path, `..`, or another format.
+        RobotError: the notes are strict.
     """
-    filename = mesh.text("filename")
-    path = filename.removeprefix("package://")
-    if not is_inside(path):
-        mesh.refuse(
-            "a mesh 'package://name/path' or a path below this folder, without '..'", quoted(filename)
-        )
-    if filename.startswith("package://") and "/" not in path:
-        mesh.refuse("a mesh file in its package", quoted(filename))
-    if Path(path).suffix.lower() not in FORMATS:
-        mesh.refuse(f"a mesh in one of the formats {', '.join(FORMATS)}", quoted(filename))
-    return filename
+    finder = _Finder(packages, notes)
+    visuals = [tuple(finder.visual(link, visual) for visual in link.visuals) for link in document.links]
+    links = (replace(link, visuals=found) for link, found in zip(document.links, visuals, strict=True))
+    return replace(document, links=tuple(links))
 
 
-def is_inside(path: str) -> bool:
-    """Whether a relative path can only lead down: plain segments, none empty, '.' only at the beginning."""
-    return all(_SEGMENT.fullmatch(segment) for segment in path.removeprefix("./").split("/"))
+def build_visual(document: Document, model: pin.Model) -> pin.GeometryModel:
+    """All shapes for display, each at its place in the frame of its link."""
+    visual = pin.GeometryModel()
+    for link in document.links:
+        frame_id = model.getFrameId(link.name, pin.BODY)
+        frame = model.frames[frame_id]
+        for k, geometry in enumerate(link.visuals):
+            if geometry.shape.hidden:
+                continue
+            colored, color = geometry.color is not None, np.array(geometry.color or DEFAULT_COLOR)
+            placement = frame.placement * geometry.origin.se3
+            place = (f"{link.name}_{k}", frame.parentJoint, frame_id, placement)
+            visual.addGeometryObject(pin.GeometryObject(*place, *_solid(geometry.shape), colored, color))
+    return visual
 
 
-def find_mesh(filename: str, folder: Path, package_dirs: Iterable[Path]) -> Path | None:
-    """The file a mesh name stands for, or None if there is none.
+def _solid(shape: Shape) -> tuple[coal.CollisionGeometry, str, np.ndarray]:
+    """Coal's geometry, and path and scale of a mesh."""
+    if shape.kind == "mesh":
+        return coal.BVHModelOBBRSS(), str(shape.file), np.array(shape.size)
+    kinds = {"box": coal.Box, "cylinder": coal.Cylinder, "capsule": coal.Capsule, "sphere": coal.Sphere}
+    return kinds[shape.kind](*shape.size), "", np.ones(3)
+
+
+def find_file(filename: str, packages: Packages) -> Path:
+    """The file that a name in a description stands for: a regular one that the description may read.
 
     Args:
-        filename: as `check_filename` has let it through.
-        folder: where the description is; plain paths are below it.
-        package_dirs: folders that hold packages; the first that has the file is taken.
+        filename: `package://name/path`, `file:///path`, or a path from the description's own folder.
+        packages: where the description is, and what it may read.
 
     Raises:
-        RobotError: the file is outside its package or folder (a symbolic link), or names files there.
+        Unusable: there is none, or it may not be read.
     """
-    for root, path in _candidates(filename, folder, package_dirs):
-        file = root / path
-        if file.is_file():
-            _check_file(file, root)
-            return file
-    return None
+    path = _path(filename, packages)
+    if not packages.allows(path):
+        raise Unusable(
+            f"it lies outside of {packages.home} and of the packages that are known; "
+            "name a folder that holds it in package_dirs"
+        )
+    require_regular(path)
+    return path.parent.resolve() / path.name
 
 
-def data_folder() -> Path | None:
-    """The folder of the packages of example-robot-data, or None where it is not installed."""
+def _path(filename: str, packages: Packages) -> Path:
+    scheme = next((scheme for scheme in SCHEMES if filename.startswith(scheme)), "")
+    rest = filename.removeprefix(scheme)
+    if scheme == "file://":
+        return Path("/", unquote(rest.removeprefix("localhost")))
+    if not scheme:
+        if "://" in filename:
+            raise Unusable(f"expected a path or one of {', '.join(SCHEMES)}")
+        return packages.here / filename
+    name, _, inside = rest.partition("/")
+    folder = packages.folder(name)
+    if folder is None:
+        raise Unusable(
+            f"package {quoted(name)} is neither above nor beside {packages.here}; "
+            "name a folder that holds it in package_dirs"
+        )
+    return folder / inside
+
+
+@dataclass
+class _Finder:
+    """Looks at each file once."""
+
+    packages: Packages
+    notes: Notes
+    checked: dict[Path, str] = field(default_factory=dict)
+
+    def visual(self, link: Link, visual: Geometry) -> Geometry:
+        """The visual of a link with its mesh file and the colour of its texture, if they can be used."""
+        shape = visual.shape
+        if shape.hidden:
+            try:
+                visual = replace(visual, shape=replace(shape, file=self._mesh(shape.filename or "")))
+            except Unusable as error:
+                self._leave_out(link, visual, f"mesh {quoted(shape.filename or '')}", error)
+        if texture := visual.texture:
+            try:
+                visual = replace(visual, texture=None, color=self._color(texture))
+            except Unusable as error:
+                self._leave_out(link, visual, f"texture {quoted(texture)}", error)
+        return visual
+
+    def _leave_out(self, link: Link, visual: Geometry, what: str, why: Unusable) -> None:
+        self.notes.add("left out", f"{link.title}, visual", f"{what} is not shown: {why}", visual.line)
+
+    def _mesh(self, filename: str) -> Path:
+        file = find_file(filename, self.packages)
+        if file not in self.checked:
+            self.checked[file] = _fault(file)
+        if self.checked[file]:
+            raise Unusable(self.checked[file])
+        return file
+
+    def _color(self, texture: str) -> Vector:
+        return mean_color(read_regular(find_file(texture, self.packages), MAX_TEXTURE_BYTES))
+
+
+def _fault(file: Path) -> str:
+    """Why a mesh cannot be shown, or nothing."""
     try:
-        found = metadata.distribution("example-robot-data").locate_file("cmeel.prefix/share")
-    except metadata.PackageNotFoundError:
-        return None
-    return Path(str(found))
-
-
-def _candidates(filename: str, folder: Path, package_dirs: Iterable[Path]) -> Iterator[tuple[Path, str]]:
-    if not filename.startswith("package://"):
-        yield folder, filename
-        return
-    package, _, path = filename.removeprefix("package://").partition("/")
-    for packages in package_dirs:
-        yield packages / package, path
-    for parent in folder.parents:
-        if parent.name == package and (parent / "package.xml").is_file():
-            yield parent, path
-
-
-def _check_file(file: Path, root: Path) -> None:
-    """Refuse a mesh that lies, or refers to something, outside `root`."""
-    if not file.resolve().is_relative_to(root.resolve()):
-        _refuse(file, f"a mesh inside {root}", "a link that leads out of it")
-    if file.stat().st_size > MAX_MESH_BYTES:
-        _refuse(file, f"a mesh of at most {MAX_MESH_BYTES / 1e6:g} MB", "a larger one")
-    try:
-        data = file.read_bytes()
-    except OSError as error:
-        raise RobotError(f"cannot be read: {error.strerror}", file=file) from error
-    {".stl": _check_stl, ".dae": _check_dae, ".obj": _check_obj}[file.suffix.lower()](file, data)
-
-
-def _check_stl(file: Path, data: bytes) -> None:
-    """A binary STL has 80 bytes of header, a count, 50 bytes per triangle; a text STL ends with its name."""
-    triangles = int.from_bytes(data[80:84], "little")
-    if len(data) >= 84 and len(data) >= 84 + 50 * triangles:
-        return
-    if data.lstrip().startswith(b"solid") and b"endsolid" in data:
-        return
-    _refuse(file, "an STL mesh", "one that is cut short or of another format")
-
-
-def _check_dae(file: Path, data: bytes) -> None:
-    if b"\0" in data or b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        _refuse(file, "a mesh in UTF-8 without <!DOCTYPE> and entities", "one with them")
-    if b"<COLLADA" not in data or b"</COLLADA>" not in data:
-        _refuse(file, "a COLLADA mesh", "one that is cut short or of another format")
-    for found in _DAE_IMAGES.findall(data):
-        _check_reference(file, _text(found))
-
-
-def _check_obj(file: Path, data: bytes) -> None:
-    for found in _OBJ_LIBRARIES.findall(data):
-        _check_reference(file, _text(found))
-        library = file.parent / _text(found)
-        if library.is_file():
-            for image in _MTL_IMAGES.findall(library.read_bytes()):
-                _check_reference(library, _text(image))
-
-
-def _check_reference(file: Path, reference: str) -> None:
-    """A file named in a mesh has to lie beside or below it."""
-    if not is_inside(reference.strip()) or not _stays(file.parent, reference.strip()):
-        _refuse(file, "references to files beside or below it", quoted(reference))
-
-
-def _stays(folder: Path, reference: str) -> bool:
-    return (folder / reference).resolve().is_relative_to(folder.resolve())
-
-
-def _refuse(file: Path, expected: str, found: str) -> NoReturn:
-    raise RobotError(f"expected {expected}, found {found}", file=file)
-
-
-def _text(data: bytes) -> str:
-    return data.decode("utf-8", errors="replace")
+        check_mesh(file)
+    except Unusable as error:
+        return str(error)
+    return ""

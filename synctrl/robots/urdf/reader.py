@@ -7,21 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...errors import near
-from .document import (
-    INERTIA,
-    MOVING_TYPES,
-    ZERO,
-    Document,
-    Geometry,
-    Inertial,
-    Joint,
-    Limit,
-    Link,
-    Pose,
-    Shape,
-    Vector,
-)
-from .meshes import check_filename
+from .document import INERTIA, MOVING_TYPES, NO_INERTIA, Document, Inertial, Joint, Link, Mimic, Vector
+from .extensions import EXTENSIONS, LINK_EXTENSIONS, refuse_loops, refuse_xacro
+from .limits import read_limit
+from .origins import read_origin
+from .report import Notes
+from .shapes import Material, read_materials, read_shapes
 from .xml import Element, parse_xml, quoted, read_bytes, shown_tag
 
 JOINT_TYPES = (*MOVING_TYPES, "fixed")
@@ -29,16 +20,13 @@ JOINT_PARTS = (
     *("parent", "child", "origin", "axis", "limit", "dynamics", "mimic"),
     *("calibration", "safety_controller"),
 )
-SHAPES = ("box", "cylinder", "sphere", "capsule", "mesh")
-EXTENSIONS = ("gazebo", "transmission", "ros2_control", "sensor")
-LINK_EXTENSIONS = ("contact", "surface", "gravity", "kinematic", "self_filter", "collision_checking")
-"""Elements of other programs, which say nothing about the mechanism."""
 
+WORLD = "universe"
 _NO_AXIS = 1e-6
 _UNIT_AXIS = 1e-3
 
 
-def read_document(file: Path) -> Document:
+def read_document(file: Path, notes: Notes | None = None) -> Document:
     """A URDF file as a document whose every value is finite and of the right kind.
 
     How the values fit together is not looked at here, see `check_tree` and `check_bodies`.
@@ -46,138 +34,68 @@ def read_document(file: Path) -> Document:
     Raises:
         RobotError: with file, line, link or joint, what was found and what is expected.
     """
-    return read_text(file, read_bytes(file))
+    return read_text(file, read_bytes(file), notes)
 
 
-def read_text(file: Path, data: bytes) -> Document:
-    """`read_document` for the content `data` of `file`."""
-    root = parse_xml(str(file), data)
+def read_text(file: Path, data: bytes, notes: Notes | None = None) -> Document:
+    """`read_document` for the content `data` of `file`; `notes` takes what is left out and assumed."""
+    root = parse_xml(str(file), data, notes)
     if root.tag != "robot":
         root.refuse("a URDF with the root element <robot>", f"<{shown_tag(root.tag)}>")
-    _refuse_xacro(root)
+    refuse_xacro(root)
+    refuse_loops(root)
     root.know(("link", "joint", "material", *EXTENSIONS), ("name", "version"))
-    colors = _colors(root)
+    materials = read_materials(root)
     return Document(
-        name=root.name(),
-        links=tuple(_link(element, colors) for element in root.all("link")),
+        name=_robot_name(root, file),
+        links=tuple(_link(element, materials) for element in root.all("link")),
         joints=tuple(_joint(element) for element in root.all("joint")),
         file=file,
     )
 
 
-def _refuse_xacro(root: Element) -> None:
-    for child in root.children:
-        if child.tag.startswith("xacro:"):
-            child.refuse("a plain URDF", "a xacro macro; expand the file with xacro first")
+def _robot_name(root: Element, file: Path) -> str:
+    if root.attributes.get("name", "").strip():
+        return root.name()
+    root.note("assumed", f"the robot has no name; it is called as its file, {quoted(file.stem)}")
+    return file.stem
 
 
 # -- links -------------------------------------------------------------------------------------------------
 
 
-def _link(element: Element, colors: dict[str, Vector]) -> Link:
+def _link(element: Element, materials: dict[str, Material]) -> Link:
     element.know(("inertial", "visual", "collision", *LINK_EXTENSIONS), ("name", "type"))
     inertial = element.optional("inertial")
     return Link(
-        name=element.name(),
+        name=_link_name(element, "name"),
         inertial=None if inertial is None else _inertial(inertial),
-        visuals=tuple(_geometry(visual, colors) for visual in element.all("visual")),
-        collisions=tuple(_geometry(collision, {}) for collision in element.all("collision")),
+        visuals=read_shapes(element, "visual", materials),
+        collisions=read_shapes(element, "collision", {}),
         line=element.line,
     )
 
 
-def _inertial(element: Element) -> Inertial:
+def _inertial(element: Element) -> Inertial | None:
     element.know(("origin", "mass", "inertia"))
-    mass, inertia = element.required("mass"), element.required("inertia")
+    mass, inertia = element.optional("mass"), element.optional("inertia")
+    if mass is None:
+        element.note("left out", "an <inertial> without a <mass>")
+        return None
     mass.know((), ("value",))
-    inertia.know((), INERTIA)
+    if inertia is None:
+        element.note("assumed", "without an <inertia> the mass is taken as that of a point")
     return Inertial(
         mass=mass.number("value"),
-        inertia=tuple(inertia.number(key) for key in INERTIA),
-        origin=_origin(element),
+        inertia=NO_INERTIA if inertia is None else _moments(inertia),
+        origin=read_origin(element),
         line=element.line,
     )
 
 
-def _origin(element: Element) -> Pose:
-    origin = element.optional("origin")
-    if origin is None:
-        return Pose()
-    origin.know((), ("xyz", "rpy"))
-    return Pose(origin.numbers("xyz", 3, ZERO), origin.numbers("rpy", 3, ZERO))
-
-
-# -- shapes ------------------------------------------------------------------------------------------------
-
-
-def _geometry(element: Element, colors: dict[str, Vector]) -> Geometry:
-    element.know(("origin", "geometry", "material", "verbose"), ("name",))
-    return Geometry(
-        shape=_shape(element.required("geometry")),
-        origin=_origin(element),
-        color=_color(element, colors) if element.tag == "visual" else None,
-        line=element.line,
-    )
-
-
-def _shape(geometry: Element) -> Shape:
-    geometry.know(SHAPES, ("name",))
-    shapes = [child for child in geometry.children if child.tag in SHAPES]
-    if len(shapes) != 1:
-        geometry.refuse(f"one shape of {', '.join(SHAPES)}", str(len(shapes)))
-    shape = shapes[0]
-    if shape.tag == "mesh":
-        return _mesh(shape)
-    if shape.tag == "box":
-        shape.know((), ("size",))
-        size = shape.numbers("size", 3)
-        if min(size) <= 0:
-            shape.refuse("a size above 0 in each direction", " ".join(f"{s:g}" for s in size))
-        return Shape("box", size)
-    measures = ("radius",) if shape.tag == "sphere" else ("radius", "length")
-    shape.know((), measures)
-    return Shape(shape.tag, tuple(shape.positive(measure) for measure in measures))
-
-
-def _mesh(mesh: Element) -> Shape:
-    mesh.know((), ("filename", "scale"))
-    scale = mesh.numbers("scale", 3, (1.0, 1.0, 1.0))
-    if 0 in scale:
-        mesh.refuse("a scale other than 0 in each direction", " ".join(f"{s:g}" for s in scale))
-    return Shape("mesh", scale, check_filename(mesh))
-
-
-def _colors(root: Element) -> dict[str, Vector]:
-    """Colours by the name of their material; those of the robot come before those inside links."""
-    visuals = [visual for link in root.all("link") for visual in link.all("visual")]
-    colors: dict[str, Vector] = {}
-    for material in [m for parent in (root, *visuals) for m in parent.all("material")]:
-        material.know(("color", "texture"), ("name",))
-        color = material.optional("color")
-        if color is not None:
-            colors.setdefault(material.attributes.get("name", ""), _rgba(color))
-    return colors
-
-
-def _rgba(color: Element) -> Vector:
-    color.know((), ("rgba",))
-    rgba = color.numbers("rgba", 4)
-    if min(rgba) < 0 or max(rgba) > 1:
-        color.refuse("rgba of 4 numbers from 0 to 1", " ".join(f"{c:g}" for c in rgba))
-    return rgba
-
-
-def _color(element: Element, colors: dict[str, Vector]) -> Vector | None:
-    material = element.optional("material")
-    if material is None or material.optional("texture") is not None:
-        return None
-    color = material.optional("color")
-    if color is not None:
-        return _rgba(color)
-    name = material.attributes.get("name", "")
-    if name not in colors:
-        material.warn(f"no colour is known for material {quoted(name)}{near(name[:60], colors)}")
-    return colors.get(name)
+def _moments(inertia: Element) -> Vector:
+    inertia.know((), INERTIA)
+    return tuple(inertia.number(key) for key in INERTIA)
 
 
 # -- joints ------------------------------------------------------------------------------------------------
@@ -194,7 +112,7 @@ def _joint(element: Element) -> Joint:
         type=kind,
         parent=_end(element, "parent"),
         child=_end(element, "child"),
-        origin=_origin(element),
+        origin=read_origin(element),
         line=element.line,
     )
     return joint if kind == "fixed" else _moving(element, joint)
@@ -203,21 +121,36 @@ def _joint(element: Element) -> Joint:
 def _end(element: Element, role: str) -> str:
     end = element.required(role)
     end.know((), ("link",))
-    return end.name("link")
+    return _link_name(end, "link")
+
+
+def _link_name(element: Element, attribute: str) -> str:
+    """The name of a link; what engines call the world cannot be one."""
+    name = element.name(attribute)
+    return f"{name} (link)" if name == WORLD else name
 
 
 def _moving(element: Element, joint: Joint) -> Joint:
     """The joint with what only moving joints have; a fixed joint's axis and limits mean nothing."""
     damping, friction = _dynamics(element)
-    mimic = element.optional("mimic")
+    limit, remarks = read_limit(element, joint.type)
     return replace(
         joint,
         axis=_axis(element),
-        limit=_limit(element, joint.type),
+        limit=limit,
+        remarks=remarks,
         damping=damping,
         friction=friction,
-        mimics=None if mimic is None else mimic.name("joint"),
+        mimic=_mimic(element),
     )
+
+
+def _mimic(element: Element) -> Mimic | None:
+    mimic = element.optional("mimic")
+    if mimic is None:
+        return None
+    mimic.know((), ("joint", "multiplier", "offset"))
+    return Mimic(mimic.name("joint"), mimic.number("multiplier", 1.0), mimic.number("offset", 0.0))
 
 
 def _axis(element: Element) -> Vector:
@@ -230,28 +163,20 @@ def _axis(element: Element) -> Vector:
     if length < _NO_AXIS:
         axis.refuse("an axis with a direction", " ".join(f"{x:g}" for x in xyz))
     if abs(length - 1) > _UNIT_AXIS:
-        axis.warn(f"the axis has length {length:g}; its direction is taken")
+        axis.note("assumed", f"the axis has length {length:g}; its direction is taken")
     return xyz if length == 1 else tuple(x / length for x in xyz)
 
 
-def _limit(element: Element, kind: str) -> Limit | None:
-    """Limits of a moving joint; a continuous one has no range, and may have none at all."""
-    if kind == "continuous":
-        limit = element.optional("limit")
-        return None if limit is None else Limit(limit.positive("effort"), limit.positive("velocity"))
-    limit = element.required("limit")
-    limit.know((), ("lower", "upper", "effort", "velocity"))
-    lower, upper = limit.number("lower"), limit.number("upper")
-    if lower >= upper:
-        limit.refuse("lower below upper", f"{lower:g} and {upper:g}")
-    return Limit(limit.positive("effort"), limit.positive("velocity"), lower, upper)
-
-
 def _dynamics(element: Element) -> tuple[float, float]:
-    dynamics = element.optional("dynamics")
+    """Viscous and Coulomb friction: they act only if asked for, so a senseless one is left out."""
+    dynamics = element.first("dynamics")
     if dynamics is None:
         return 0.0, 0.0
-    for key in ("damping", "friction"):
-        if dynamics.number(key, 0.0) < 0:
-            dynamics.refuse(f"{key} of at least 0", f"{dynamics.number(key):g}")
-    return dynamics.number("damping", 0.0), dynamics.number("friction", 0.0)
+    return _friction(dynamics, "damping"), _friction(dynamics, "friction")
+
+
+def _friction(dynamics: Element, key: str) -> float:
+    value = dynamics.number(key, 0.0)
+    if value < 0:
+        dynamics.note("left out", f"{key} of {value:g}, which would drive the joint")
+    return max(value, 0.0)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+import sys
 from dataclasses import replace
 from xml.sax.saxutils import quoteattr
 
-from .document import INERTIA, Document, Geometry, Joint, Link, Pose, Shape, Vector
+from .document import INERTIA, Document, Geometry, Joint, Limit, Link, Pose, Shape, Vector
+
+_LARGEST = sys.float_info.max
 
 
 def to_xml(document: Document) -> str:
@@ -20,18 +24,9 @@ def to_xml(document: Document) -> str:
 
 
 def dynamics_xml(document: Document) -> str:
-    """The document without its shapes, as Pinocchio gets it.
-
-    A fixed joint that shares its name with a link gets another one: Pinocchio knows both as frames, and could
-    tell neither from the other by name.
-    """
-    names = {link.name for link in document.links}
+    """The document without its shapes: what an engine needs of it."""
     links = tuple(replace(link, visuals=(), collisions=()) for link in document.links)
-    joints = tuple(
-        replace(joint, name=f"{joint.name} (fixed)") if joint.name in names and not joint.moves else joint
-        for joint in document.joints
-    )
-    return to_xml(replace(document, links=links, joints=joints))
+    return to_xml(replace(document, links=links))
 
 
 def _tag(tag: str, /, **attributes: str | float | Vector) -> str:
@@ -44,7 +39,7 @@ def _written(value: str | float | Vector) -> str:
         return value
     if isinstance(value, tuple):
         return " ".join(map(_written, value))
-    return repr(float(value))
+    return repr(max(-_LARGEST, min(float(value), _LARGEST)))
 
 
 def _origin_lines(origin: Pose, indent: str) -> list[str]:
@@ -95,9 +90,18 @@ def _joint_lines(joint: Joint) -> list[str]:
     lines += _origin_lines(joint.origin, "    ")
     if joint.moves:
         lines += [f"    <{_tag('axis', xyz=joint.axis)}/>"]
-    if joint.limit is not None:
-        limits = {k: v for k, v in vars(joint.limit).items() if v is not None}
-        lines += [f"    <{_tag('limit', **limits)}/>"]
+    if joint.moves:
+        lines += [f"    <{_tag('limit', **_bounds(joint))}/>"]
     if joint.damping or joint.friction:
         lines += [f"    <{_tag('dynamics', damping=joint.damping, friction=joint.friction)}/>"]
     return [*lines, "  </joint>"]
+
+
+def _bounds(joint: Joint) -> dict[str, float]:
+    """Limits as numbers; the largest means none, for which a file has no word that all readers take."""
+    limit = joint.limit or Limit()
+    bounds = {"effort": limit.effort, "velocity": limit.velocity}
+    if joint.type != "continuous":
+        bounds["lower"] = -math.inf if limit.lower is None else limit.lower
+        bounds["upper"] = math.inf if limit.upper is None else limit.upper
+    return bounds

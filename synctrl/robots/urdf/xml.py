@@ -2,7 +2,7 @@
 
 An `Element` knows its file, line and place ("link 'arm', inertial, mass"), so that whoever reads a value from
 it can say exactly where a bad one stands. Values are read here and nowhere else: a number is a plain finite
-decimal number, a name is made of characters that mean nothing to a browser, a shell or a file system.
+decimal number; a name may be any text, and is `quoted` wherever it is shown.
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 from xml.parsers import expat
 
-from ...errors import RobotError, RobotWarning, warn
+from ...checks import unprintable
+from ...errors import RobotError
+from .report import Notes
 
 MAX_BYTES = 10_000_000
 MAX_DEPTH = 50
@@ -25,25 +27,19 @@ MAX_NUMBER = 1e16
 """Beyond it nothing about a robot is meant; squares and products of such numbers are still finite."""
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]{0,127}", re.ASCII)
-_RESERVED = ("universe",)
-_MISSPELT = 0.65
+_INFINITE = re.compile(r"[+-]?inf(inity)?", re.IGNORECASE)
+_LONGEST_NAME = 900
+_MISSPELT = 0.75
+MECHANISM = (
+    *("inertial", "mass", "inertia", "origin", "parent", "child", "axis", "mimic", "value", "link", "joint"),
+    *("xyz", "rpy", "multiplier", "offset"),
+)
+"""Elements and attributes without which a file would mean another mechanism, or one that stands elsewhere."""
 
 
 def quoted(text: str) -> str:
     """`text` from a file as it can be shown: one line, printable, at most 60 characters."""
     return ascii(text if len(text) <= 60 else text[:57] + "...")
-
-
-def is_name(text: str) -> bool:
-    """Whether `text` can be the name of a robot, link or joint."""
-    return bool(_NAME.fullmatch(text)) and text not in _RESERVED
-
-
-NAME_RULE = (
-    "1 to 128 letters, digits, '_', '-' or '.', beginning with a letter, a digit or '_', "
-    f"and not {' or '.join(map(repr, _RESERVED))}"
-)
 
 
 @dataclass(slots=True, eq=False)
@@ -55,7 +51,9 @@ class Element:
     file: str
     line: int
     place: str
+    notes: Notes
     children: list[Element] = field(default_factory=list)
+    content: str = ""
 
     # -- saying what is wrong -----------------------------------------------------------------------------
 
@@ -67,9 +65,9 @@ class Element:
         """Raise the error: this was expected, that was found."""
         raise self.error(f"expected {expected}, found {found}")
 
-    def warn(self, message: str) -> None:
-        """Warn about this element."""
-        warn(str(self.error(message)), RobotWarning)
+    def note(self, kind: str, text: str) -> None:
+        """Remark something about this element, see `Notes`."""
+        self.notes.add(kind, self.place, text, self.line)
 
     # -- children -----------------------------------------------------------------------------------------
 
@@ -84,6 +82,13 @@ class Element:
             found[1].refuse(f"one <{tag}>", f"another in line {found[0].line}")
         return found[0] if found else None
 
+    def first(self, tag: str) -> Element | None:
+        """The child with this tag, or None; of several that do not matter the first."""
+        found = self.all(tag)
+        for other in found[1:]:
+            other.note("left out", f"another <{tag}>; that in line {found[0].line} is taken")
+        return found[0] if found else None
+
     def required(self, tag: str) -> Element:
         """The one child with this tag."""
         child = self.optional(tag)
@@ -92,14 +97,26 @@ class Element:
         return child
 
     def know(self, children: Iterable[str] = (), attributes: Iterable[str] = ()) -> None:
-        """Refuse children and attributes that are misspelt; warn of others that nobody here reads."""
+        """Remark children and attributes that nobody here reads.
+
+        Raises:
+            RobotError: one that looks like a misspelt part of the mechanism, in the place of the right one.
+        """
         children, attributes = tuple(children), tuple(attributes)
         for child in self.children:
             if child.tag not in children:
-                _unknown(child, f"<{shown_tag(child.tag)}>", child.tag, children)
+                there = {other.tag for other in self.children}
+                child._unknown(f"<{shown_tag(child.tag)}>", child.tag, set(children) - there)
         for attribute in self.attributes:
             if attribute not in attributes and not attribute.startswith("xmlns"):
-                _unknown(self, f"attribute {quoted(attribute)}", attribute, attributes)
+                missing = set(attributes) - set(self.attributes)
+                self._unknown(f"attribute {quoted(attribute)}", attribute, missing)
+
+    def _unknown(self, what: str, name: str, missing: set[str]) -> None:
+        for word in sorted(missing.intersection(MECHANISM)):
+            if _resembles(name[:60], word):
+                raise self.error(f"{what} is not known here (did you mean {word!r}?)")
+        self.note("left out", f"{what} is not read")
 
     # -- values -------------------------------------------------------------------------------------------
 
@@ -110,11 +127,12 @@ class Element:
         return self.attributes[attribute]
 
     def name(self, attribute: str = "name") -> str:
-        """An attribute that is the name of something."""
+        """An attribute that is the name of something: any text, made one line, which is shown `quoted`."""
         text = self.text(attribute)
-        if not is_name(text):
-            self.refuse(f"a {attribute} of {NAME_RULE}", quoted(text))
-        return text
+        if not text.strip() or len(text) > _LONGEST_NAME:
+            found = f"{quoted(text)} of {len(text)}"
+            self.refuse(f"a {attribute} of 1 to {_LONGEST_NAME} characters, not all blank", found)
+        return "".join(c if unprintable(c) is None else ascii(c)[1:-1] for c in text)
 
     def number(self, attribute: str, default: float | None = None) -> float:
         """An attribute that is one finite number."""
@@ -140,6 +158,16 @@ class Element:
             self.refuse(f"{attribute} above 0", f"{value:g}")
         return value
 
+    def bound(self, attribute: str) -> float | None:
+        """An attribute that bounds something: a number, infinite where it is beyond measure, or None."""
+        if attribute not in self.attributes:
+            return None
+        word = self.attributes[attribute].strip()
+        if not _INFINITE.fullmatch(word) and not _NUMBER.fullmatch(word):
+            self.refuse(f"{attribute} of 1 number", quoted(word))
+        value = float(word)
+        return value if abs(value) <= MAX_NUMBER else math.copysign(math.inf, value)
+
     def _finite(self, word: str, expected: str) -> float:
         if not _NUMBER.fullmatch(word) or not math.isfinite(float(word)):
             self.refuse(expected, quoted(word))
@@ -153,11 +181,9 @@ def shown_tag(tag: str) -> str:
     return quoted(tag)[1:-1]
 
 
-def _unknown(element: Element, what: str, name: str, known: tuple[str, ...]) -> None:
-    meant = get_close_matches(name[:60], known, n=1, cutoff=_MISSPELT)
-    if meant:
-        raise element.error(f"{what} is not known here (did you mean {meant[0]!r}?)")
-    element.warn(f"{what} is not read")
+def _resembles(name: str, word: str) -> bool:
+    """Whether a name can be a misspelt word: nearly the same, or the same letters in another order."""
+    return bool(get_close_matches(name, (word,), cutoff=_MISSPELT)) or sorted(name) == sorted(word)
 
 
 def read_bytes(file: Path) -> bytes:
@@ -172,20 +198,25 @@ def read_bytes(file: Path) -> bytes:
     return data
 
 
-def parse_xml(file: str, data: bytes) -> Element:
+def parse_xml(file: str, data: bytes, notes: Notes | None = None) -> Element:
     """The root element of an XML document.
 
     Args:
         file: what messages call it.
         data: the document, in UTF-8.
+        notes: where its elements take their notes.
 
     Raises:
         RobotError: not UTF-8, not well-formed, a document type declaration, or nested or filled without end.
     """
-    return _Reader(file).read(_utf8(file, data))
+    return _Reader(file, notes or Notes(file)).read(_utf8(file, data))
 
 
 def _utf8(file: str, data: bytes) -> bytes:
+    if b"\0" in data:
+        line = data.count(b"\n", 0, data.index(b"\0")) + 1
+        found = "a zero character, as in UTF-16"
+        raise RobotError(f"expected text in UTF-8, found {found}", file=file, line=line)
     try:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -198,14 +229,15 @@ def _utf8(file: str, data: bytes) -> bytes:
 class _Reader:
     """Builds elements from Expat's events, and stops at the first that has no business in a URDF."""
 
-    def __init__(self, file: str):
-        self.file = file
+    def __init__(self, file: str, notes: Notes):
+        self.file, self.notes = file, notes
         self.count = 0
         self.open: list[Element] = []
         self.root: Element | None = None
         self.parser = expat.ParserCreate("utf-8")
         self.parser.StartElementHandler = self._start
         self.parser.EndElementHandler = lambda tag: self.open.pop()
+        self.parser.CharacterDataHandler = self._text
         self.parser.StartDoctypeDeclHandler = self._doctype
         self.parser.XmlDeclHandler = self._declaration
 
@@ -226,12 +258,17 @@ class _Reader:
             self._refuse(f"elements nested at most {MAX_DEPTH} deep", "a deeper one")
         parent = self.open[-1] if self.open else None
         place = _place(parent, tag, attributes)
-        element = Element(tag, attributes, self.file, self.parser.CurrentLineNumber, place)
+        line = self.parser.CurrentLineNumber
+        element = Element(tag, attributes, self.file, line, place, self.notes)
         if parent is None:
             self.root = element
         else:
             parent.children.append(element)
         self.open.append(element)
+
+    def _text(self, text: str) -> None:
+        element = self.open[-1]
+        element.content += text if len(element.content) < _LONGEST_NAME else ""
 
     def _doctype(self, *_: Any) -> None:
         self._refuse("a document without <!DOCTYPE> and entities", "<!DOCTYPE>")

@@ -1,0 +1,186 @@
+"""Joints that are held: those that the user names, and those that cannot move by themselves.
+
+Locks come first: limits and masses of a joint that is held are not asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+
+from ...checks import finite_number, instance
+from ...errors import near
+from .branches import Branches
+from .checks import body_parameters
+from .document import Document, Joint, Limit
+from .report import Notes
+from .xml import quoted
+
+Found = dict[str, tuple[float, str]]
+"""By joint: the position at which it is held, and why."""
+
+
+def lock_joints(document: Document, positions: Mapping[str, float]) -> Document:
+    """The document with joints held at positions, in rad or m: they become fixed joints.
+
+    Raises:
+        RobotError: no such moving joint, or a position outside its limits.
+        InputError: a position that is no finite number.
+    """
+    instance("locked", positions, Mapping, "positions by the names of joints")
+    moving = {joint.name: joint for joint in document.moving_joints}
+    for name, position in positions.items():
+        if name not in moving:
+            raise document.error(
+                f"expected moving joints to lock, found {quoted(str(name))}{near(str(name), moving)}; "
+                f"they are: {', '.join(map(quoted, moving))}",
+                found=name,
+            )
+        _check_position(document, moving[name], finite_number(f"position of {moving[name].title}", position))
+    return _fixed(document, {name: float(position) for name, position in positions.items()})
+
+
+def _check_position(document: Document, joint: Joint, position: float) -> None:
+    limit = joint.limit
+    if limit is None or limit.lower is None or limit.upper is None or limit.lower >= limit.upper:
+        return
+    if not limit.lower <= position <= limit.upper:
+        raise document.error(
+            f"expected a position from {limit.lower:g} to {limit.upper:g}, found {position:g}", joint
+        )
+
+
+def _fixed(document: Document, positions: Mapping[str, float]) -> Document:
+    joints = (j.fixed(positions[j.name]) if j.name in positions else j for j in document.joints)
+    return replace(document, joints=tuple(joints))
+
+
+def settle_locks(
+    document: Document, asked: Mapping[str, float], tip: str | None, notes: Notes
+) -> tuple[Document, dict[str, float]]:
+    """The document with everything held that the user asks for, or that cannot move by itself.
+
+    Args:
+        document: one tree.
+        asked: positions by joint, rad or m.
+        tip: the tip that the user asks for: joints that do not move it are held.
+        notes: where each joint that is held unasked is named.
+
+    Returns:
+        The document, and the positions of the joints that are held in it.
+    """
+    document, held = lock_joints(document, asked), {name: float(q) for name, q in asked.items()}
+    steps = (partial(_leaders, tip=tip), partial(_followers, held=held), partial(_beside, tip=tip))
+    for find in (*steps, partial(_massless, tip=tip)):
+        document = _hold_found(document, find(document), held, notes)
+    document = _without_range(document, notes)
+    return _hold_found(document, _narrow(document), held, notes), held
+
+
+def _hold_found(document: Document, found: Found, held: dict[str, float], notes: Notes) -> Document:
+    """The document with what was found held, told and taken down."""
+    moving = {joint.name: joint for joint in document.moving_joints}
+    for name, (position, reason) in found.items():
+        joint = moving[name]
+        notes.add("locked", joint.title, f"held at {position:g} {joint.unit}: {reason}", joint.line)
+        held[name] = position
+    return _fixed(document, {name: position for name, (position, _) in found.items()})
+
+
+def _rest(joint: Joint) -> float:
+    return 0.0 if joint.limit is None else joint.limit.rest
+
+
+def _followers(document: Document, held: Mapping[str, float]) -> Found:
+    """Joints that mimic another: where that one is, or rests."""
+    joints, found = {joint.name: joint for joint in document.joints}, Found()
+    for joint in document.moving_joints:
+        if joint.mimic is not None:
+            lost = "" if joint.mimic.joint in joints else ", which there is not"
+            reason = f"it follows joint {quoted(joint.mimic.joint)}{lost}"
+            found[joint.name] = _followed(joint, joints, held, ()), reason
+    return found
+
+
+def _followed(
+    joint: Joint,
+    joints: Mapping[str, Joint],
+    held: Mapping[str, float],
+    seen: tuple[str, ...],
+) -> float:
+    """Where a joint is, in rad or m, if what it follows is held or rests."""
+    if joint.name in held or joint.mimic is None or joint.name in seen:
+        return held.get(joint.name, _rest(joint))
+    leader = joints.get(joint.mimic.joint)
+    position = 0.0 if leader is None else _followed(leader, joints, held, (*seen, joint.name))
+    return joint.mimic.offset + joint.mimic.multiplier * position
+
+
+def _leaders(document: Document, tip: str | None) -> Found:
+    """Fingers that others follow: without these, which are held, they would be half a gripper."""
+    branches, found = Branches(document), Found()
+    kept = {*branches.moving_tip(tip), *(set(branches.moving) - branches.fingers)} or set(branches.moving)
+    for name, joint in branches.moving.items():
+        others = branches.joined(name) - {name}
+        if joint.mimic is None and others and name not in kept:
+            found[name] = _rest(joint), f"joint {quoted(min(others))} follows it, and is held"
+    return found
+
+
+def _beside(document: Document, tip: str | None) -> Found:
+    """Joints beside the tip that was asked for, if any joint moves it.
+
+    An arm that goes on behind its tip is not cut there: its joints move the load that the others carry.
+    """
+    branches = Branches(document)
+    chain = branches.moving_tip(tip)
+    chain += branches.behind(chain)
+    reason = f"it does not move the tip {quoted(str(tip))}"
+    others = {name: joint for name, joint in branches.moving.items() if name not in chain}
+    return {name: (_rest(joint), reason) for name, joint in others.items()} if chain else {}
+
+
+def _massless(document: Document, tip: str | None) -> Found:
+    """Fingers and sliding last joints that carry no mass: nothing says how they would move."""
+    branches, parameters = Branches(document), body_parameters(document)
+    arm = branches.moving_tip(tip) if tip is not None else branches.longest
+    return {
+        name: (_rest(joint), f"link {quoted(joint.child)} and what it carries have no mass")
+        for name, joint in branches.moving.items()
+        if (name not in arm or (joint.type == "prismatic" and tip is None))
+        and not any(parameters[carried][0] for carried in branches.carried_by(name))
+    }
+
+
+# -- ranges of no length -----------------------------------------------------------------------------------
+
+
+def _is_narrow(joint: Joint) -> bool:
+    limit = joint.limit
+    return limit is not None and limit.lower is not None and limit.lower == limit.upper
+
+
+def _without_range(document: Document, notes: Notes) -> Document:
+    """If every joint of the arm has the range 0 to 0, the file knows no ranges: there are none."""
+    branches = Branches(document)
+    arm = [joint for name, joint in branches.moving.items() if name not in branches.fingers]
+    if not arm or not all(_is_narrow(joint) and _rest(joint) == 0 for joint in arm):
+        return document
+    for joint in arm:
+        notes.add("assumed", f"{joint.title}, limit", "the range 0 to 0 of every joint is none", joint.line)
+    names = {joint.name for joint in arm}
+    return replace(document, joints=tuple(_open(j) if j.name in names else j for j in document.joints))
+
+
+def _open(joint: Joint) -> Joint:
+    return replace(joint, limit=replace(joint.limit or Limit(), lower=None, upper=None))
+
+
+def _narrow(document: Document) -> Found:
+    """Joints whose range has no length."""
+    return {
+        joint.name: (_rest(joint), f"its range is {_rest(joint):g} to {_rest(joint):g}")
+        for joint in document.moving_joints
+        if _is_narrow(joint)
+    }

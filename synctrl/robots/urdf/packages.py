@@ -1,0 +1,172 @@
+"""Packages of robot descriptions: where they are, and which folders a description may read.
+
+A package is a folder with a package.xml, and is called what that file says, whatever the folder's name is.
+Where that file is missing, a folder with `meshes` beside `urdf` or `robots` is a package of its own name.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from functools import cached_property
+from importlib import metadata
+from pathlib import Path
+from xml.etree import ElementTree
+
+from ...checks import instance
+from .regular import Unusable, read_regular
+
+MANIFEST = "package.xml"
+DESCRIPTIONS, MESHES = ("urdf", "robots"), "meshes"
+
+_MANIFEST_BYTES = 1_000_000
+_DEPTH = 3
+"""How far below a folder that holds packages they are looked for: in a workspace, src/repository/package."""
+
+
+class Packages:
+    """The packages that a description can name.
+
+    Attributes:
+        here: the folder of the description, in which its relative paths begin.
+        home: the package that the description lies in; `here` if it lies in none.
+    """
+
+    def __init__(self, file: Path | None, folders: Iterable[str | Path] = ()) -> None:
+        """Where to look.
+
+        Args:
+            file: the description; None means the working directory.
+            folders: that the user has named: packages, or folders that hold packages.
+
+        Raises:
+            InputError: `folders` are no folders' names.
+        """
+        self.here = Path(os.path.abspath(file.parent if file else "."))
+        self.home = next(filter(_package_name, self._above), self.here)
+        self._named = named_folders(folders)
+
+    def folder(self, name: str) -> Path | None:
+        """The folder of the package called `name`, or None.
+
+        Looked for above the description, beside it and beside its package, in the folders that the user has
+        named, in those of ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, and among the packages of
+        example-robot-data, in this order.
+        """
+        if not _is_plain(name):
+            return None
+        above = (folder for folder in self._above if _package_name(folder) == name)
+        return next(above, None) or self._others.get(name) or _first_folder(self._installed, name)
+
+    @property
+    def _above(self) -> tuple[Path, ...]:
+        return self.here, *self.here.parents
+
+    @cached_property
+    def roots(self) -> tuple[Path, ...]:
+        """The folders in which the description may read, links followed."""
+        holders = (*self._named, *_search_path("ROS_PACKAGE_PATH"), *self._installed)
+        return tuple(dict.fromkeys(folder.resolve() for folder in (self.home, *self._siblings, *holders)))
+
+    def allows(self, file: Path) -> bool:
+        """Whether the description may read this file, wherever links lead."""
+        try:
+            resolved = file.resolve()
+        except (OSError, RuntimeError, ValueError):  # a name that is too long, links in a circle, a zero byte
+            return False
+        return any(resolved.is_relative_to(root) for root in self.roots)
+
+    @cached_property
+    def _others(self) -> dict[str, Path]:
+        """Packages by name that are neither above the description nor installed; the first counts."""
+        holders = (*self._named, *_search_path("ROS_PACKAGE_PATH"))
+        below = (folder for holder in holders for folder in (holder, *_below(holder, _DEPTH)))
+        found: dict[str, Path] = {}
+        for folder in (self.here, *_below(self.here, 1), *self._siblings, *below):
+            found.setdefault(_package_name(folder) or folder.name, folder)
+        return found
+
+    @cached_property
+    def _siblings(self) -> tuple[Path, ...]:
+        """Packages beside that of the description."""
+        beside = _below(self.home.parent, 1) if _package_name(self.home) else ()
+        return tuple(filter(_package_name, beside))
+
+    @cached_property
+    def _installed(self) -> tuple[Path, ...]:
+        """Folders whose packages lie in folders of their names."""
+        shares = [prefix / "share" for prefix in _search_path("AMENT_PREFIX_PATH")]
+        stock = data_folder()
+        return (*shares, *([stock] if stock else []))
+
+
+def data_folder() -> Path | None:
+    """The folder of the packages of example-robot-data, or None where it is not installed."""
+    try:
+        found = metadata.distribution("example-robot-data").locate_file("cmeel.prefix/share")
+    except metadata.PackageNotFoundError:
+        return None
+    return Path(str(found))
+
+
+def named_folders(folders: Iterable[str | Path]) -> tuple[Path, ...]:
+    """Folders as a user names them, one or several, as absolute paths.
+
+    Raises:
+        InputError: they are no folders' names.
+    """
+    given = (folders,) if isinstance(folders, (str, Path)) else folders
+    instance("package_dirs", given, Iterable, "folders")
+    given = tuple(given)
+    for folder in given:
+        instance("package_dirs", folder, (str, Path), "folders")
+    return tuple(Path(os.path.abspath(folder)) for folder in given)
+
+
+def _search_path(variable: str) -> tuple[Path, ...]:
+    """The absolute folders that an environment variable lists."""
+    listed = os.environ.get(variable, "").split(os.pathsep)
+    return tuple(Path(folder) for folder in listed if os.path.isabs(folder))
+
+
+def _is_plain(name: str) -> bool:
+    """Whether a name stands for something inside a folder, and for nothing else."""
+    return name not in ("", ".", "..") and not set(name) & {"/", "\\", "\0"}
+
+
+def _is_laid_out(folder: Path) -> bool:
+    """Whether a folder looks like a package: descriptions and meshes side by side."""
+    return os.path.isdir(folder / MESHES) and any(os.path.isdir(folder / name) for name in DESCRIPTIONS)
+
+
+def _first_folder(holders: Iterable[Path], name: str) -> Path | None:
+    return next((holder / name for holder in holders if os.path.isdir(holder / name)), None)
+
+
+def _below(folder: Path, depth: int) -> Iterator[Path]:
+    """The folders below a folder, by name, hidden ones left out; packages are not looked into."""
+    try:
+        children = sorted(entry.path for entry in os.scandir(folder) if entry.is_dir())
+    except OSError:  # no such folder, or one that may not be read
+        return
+    for child in map(Path, children):
+        if child.name.startswith("."):
+            continue
+        yield child
+        if depth > 1 and not _package_name(child):
+            yield from _below(child, depth - 1)
+
+
+def _package_name(folder: Path) -> str | None:
+    """What a package is called: as its package.xml says, or else as its folder; None if it is no package."""
+    try:
+        data = read_regular(folder / MANIFEST, _MANIFEST_BYTES)
+    except Unusable:
+        return folder.name if _is_laid_out(folder) else None
+    if b"<!DOCTYPE" in data:  # nobody needs entities here
+        return folder.name
+    try:
+        name = ElementTree.fromstring(data).findtext("name", "")
+    except (SyntaxError, ValueError, LookupError):  # not XML, or an encoding that nobody knows
+        return folder.name
+    return name.strip() or folder.name

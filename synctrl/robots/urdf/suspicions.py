@@ -1,0 +1,84 @@
+"""What is possible in a robot description, and yet most often a mistake: said, and taken as it stands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from .branches import Branches
+from .document import Document, Inertial, Joint
+from .report import Notes
+from .xml import quoted
+
+FARTHEST_COM = 3.0
+LARGEST_GYRATION = 1.0
+LONGEST_RANGE = 4.001 * math.pi
+LIGHTEST = 0.01
+DENSEST = 3e5
+"""In kg/m^3: more than ten times osmium. A mass in g, or an inertia in other units, gives far more."""
+_ROUNDING = 1e-9
+
+
+def triangle_fault(inertial: Inertial) -> str | None:
+    """Principal moments A + B < C, which no body has, as they are integrals of squares over it; or None."""
+    low, middle, high = np.linalg.eigvalsh(inertial.matrix)
+    if low + middle >= (1 - _ROUNDING) * high:
+        return None
+    return (
+        f"expected an inertia in which no principal moment exceeds the sum of the others, found principal "
+        f"moments {low:g}, {middle:g}, {high:g} kg·m^2"
+    )
+
+
+def suspect(document: Document, notes: Notes) -> None:
+    """Remark what is suspicious about the moving bodies and joints of a checked document."""
+    branches = Branches(document)
+    moved = [
+        (link, inertial)
+        for link in document.links
+        if (inertial := link.inertial) is not None and branches.chain(link.name)
+    ]
+    for link, inertial in moved:
+        for text in _of_link(inertial):
+            notes.add("suspicious", f"{link.title}, inertial", text, inertial.line)
+    for joint in document.moving_joints:
+        if text := _of_range(joint):
+            notes.add("suspicious", f"{joint.title}, limit", text, joint.line)
+    masses = [inertial.mass for _, inertial in moved if inertial.mass > 0]
+    if len(masses) > 1 and max(masses) <= LIGHTEST:
+        text = f"no link weighs more than {1e3 * max(masses):g} g: placeholders?"
+        notes.add("suspicious", f"robot {quoted(document.name)}", text)
+
+
+def _of_link(inertial: Inertial) -> Iterator[str]:
+    mass, largest = inertial.mass, float(np.linalg.eigvalsh(inertial.matrix)[2])
+    distance = math.hypot(*inertial.origin.xyz)
+    if fault := triangle_fault(inertial):
+        yield f"{fault}; no body has them, and physically consistent adaptation cannot use them"
+    if mass <= 0:
+        return
+    if distance > FARTHEST_COM:
+        yield f"the centre of mass is {distance:g} m away: a length in mm?"
+    radius = math.sqrt(max(largest, 0.0) / mass)
+    if radius > LARGEST_GYRATION:
+        yield f"{mass:g} kg have a radius of gyration of {radius:g} m: a mass or inertia in other units?"
+    if 0 < radius < _densest(mass):
+        yield (
+            f"{mass:g} kg have a radius of gyration of {1e3 * radius:.2g} mm, too dense for any material: "
+            "a mass in g, or an inertia in other units?"
+        )
+
+
+def _densest(mass: float) -> float:
+    """Radius of gyration, m, of the densest ball: any other body of its density has a larger one."""
+    return math.sqrt(0.4) * math.cbrt(3 * mass / (4 * math.pi * DENSEST))
+
+
+def _of_range(joint: Joint) -> str:
+    limit = joint.limit
+    if limit is None or limit.lower is None or limit.upper is None or joint.type == "prismatic":
+        return ""
+    length = limit.upper - limit.lower
+    return f"a range of {length:g} rad: in degrees?" if length > LONGEST_RANGE else ""

@@ -1,0 +1,159 @@
+"""The scene of any run: its arms, where their tips should go, and bars between robots that are compared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..analysis.metrics import row_names
+from ..checks import positive_number
+from ..errors import InputError, SynctrlError
+from ..robots.robot import Robot
+from ..robots.written import read_robot
+from ..simulation.result import Result
+from ..simulation.simulate import Experiment
+from .arms import ALARM, add_arms, add_disturbances, has_shapes, tip_positions, titled_scene
+from .colors import read_color
+from .legends import pair_colors, pair_symbols
+from .runs import check_run, frame_indices, shown_experiment
+from .scene import Scene
+from .skeleton import reach
+from .style import DESIRED, robot_color
+
+#: as shares of the reach of the arms: a tip, a desired path, and bars without and with the largest error
+BALL, LINE, THIN, THICK = 0.032, 0.006, 0.006, 0.02
+#: colour of the bar where there is no other
+ONE_PAIR = "#a3acb7"
+#: reach that is assumed where arms have none, such as wheels, m
+NO_REACH = 0.3
+#: a tip that moves less is drawn without a path, m
+STILL = 1e-3
+#: how far coordinates called x, y, z may be off the tips, m
+AT_TIP = 1e-6
+FPS = 30.0
+
+
+def scene_of(
+    result: Result,
+    experiment: Experiment | None = None,
+    *,
+    limit: float | None = None,
+    fps: float = FPS,
+    package_dirs: Iterable[str | Path] = (),
+) -> Scene:
+    """The scene of a run: `scene_of(result).write("cell.html")`, or the scene itself in a notebook.
+
+    It has the arms, the desired paths of their tips where the space says where these are, and a bar between
+    the tips of every pair that is compared, in the pair's colour; it grows, and turns red, with the
+    synchronization error. Robots without shapes are drawn as plain links.
+
+    Args:
+        result: a run in any space, also one that was loaded: its robots are then made again from what the
+            result says of them.
+        experiment: what made it, for results whose robots cannot be made again.
+        limit: synchronization error that is fully red, in its unit; by default the largest of the run.
+        fps: frames per second.
+        package_dirs: folders in which packages with meshes of loaded results are looked for.
+
+    Raises:
+        InputError: nothing to show, or a robot that cannot be made again, by name.
+    """
+    check_run(result, "x", "x_desired", "sync_error", "q", "disturbance")
+    robots = _robots(result, experiment, package_dirs)
+    frames = frame_indices(result, fps)
+    scene = titled_scene(result, fps, "")
+    add_arms(scene, result, robots, frames)
+    tips, scale = tip_positions(robots, result.q[frames]), _scale(robots)
+    for i, name in enumerate(result.names):
+        scene.add_sphere(f"tip of {name}", BALL * scale, tips[:, i], robot_color(i))
+    desired = _desired_tips(result, robots, frames, tips)
+    if desired is not None:
+        _add_paths(scene, result, desired, LINE * scale)
+    _add_bars(scene, result, tips, frames, limit, scale)
+    add_disturbances(scene, result, robots, frames)
+    scene.caption = " ".join(_caption(robots, result, desired is not None))
+    return scene
+
+
+def _robots(
+    result: Result, experiment: Experiment | None, package_dirs: Iterable[str | Path]
+) -> Sequence[Robot]:
+    """The robots of a run: those of its experiment, or made again."""
+    if experiment is not None or result.experiment is not None:
+        return shown_experiment(result, experiment).cell.robots
+    robots, folders = [], tuple(package_dirs)
+    for about in result.info["robots"]:
+        try:
+            robots.append(read_robot(about, about["name"], about["joints"], folders))
+        except SynctrlError as error:
+            raise InputError(
+                f"expected the one that made this result: {about['name']} ('{about.get('model', '?')}') "
+                f"cannot be made again from the file, {error}",
+                subject="experiment",
+            ) from error
+    return robots
+
+
+def _scale(robots: Sequence[Robot]) -> float:
+    """Reach of the arms, as a measure for what is drawn beside them, m."""
+    reaches = [found for robot in robots if (found := reach(robot)) > 0]
+    return float(np.median(reaches)) if reaches else NO_REACH
+
+
+def _desired_tips(
+    result: Result, robots: Sequence[Robot], frames: np.ndarray, tips: np.ndarray
+) -> np.ndarray | None:
+    """Where the tips should be, (T, n, 3), m; None in a space that does not say it.
+
+    In joint space x is q. In others the coordinates called x, y and z are those of the tip, if they are where
+    the tips are; those that are left free are as the tips have them.
+    """
+    if result.x.shape == result.q.shape and np.array_equal(result.x, result.q):
+        return tip_positions(robots, result.x_desired[frames])
+    axes = {"xyz".index(name): k for k, name in enumerate(result.info["axes"]) if name in ("x", "y", "z")}
+    rows, columns = [*axes], [*axes.values()]
+    if not axes or np.abs(result.x[frames][..., columns] - tips[..., rows]).max() > AT_TIP:
+        return None
+    desired = tips.copy()
+    desired[..., rows] = result.x_desired[frames][..., columns]
+    return desired
+
+
+def _add_paths(scene: Scene, result: Result, desired: np.ndarray, width: float) -> None:
+    drawn = [i for i in range(len(result.names)) if np.ptp(desired[:, i], axis=0).max() > STILL]
+    for i in drawn:
+        scene.add_line(f"desired path of {result.names[i]}", desired[:, i], DESIRED, width)
+    if drawn:
+        scene.add_legend("desired paths", DESIRED)
+
+
+def _add_bars(
+    scene: Scene, result: Result, tips: np.ndarray, frames: np.ndarray, limit: float | None, scale: float
+) -> None:
+    """A bar for each pair, from tip to tip; of more than two robots, from the middle of the tips to each."""
+    size = np.linalg.norm(result.sync_error, axis=2)
+    limit = float(size.max()) or 1.0 if limit is None else positive_number("limit", limit)
+    share = np.clip(size[frames] / limit, 0, 1)
+    names, colors = row_names(result, "sync_error"), pair_colors(result)
+    colors = colors if len(colors) > 1 else [ONE_PAIR]
+    marks = zip(result.info["pairs"], colors, pair_symbols(result), names, strict=True)
+    for k, (robots, color, symbol, name) in enumerate(marks):
+        calm = np.array(read_color(symbol, color)[:3])
+        shade = calm + share[:, k, None] * (ALARM - calm)
+        radius = scale * (THIN + share[:, k] * (THICK - THIN))
+        for end in robots[1:] if len(robots) == 2 else robots:
+            start = tips[:, robots[0]] if len(robots) == 2 else tips[:, robots].mean(axis=1)
+            scene.add_segment(f"{symbol}, to {result.names[end]}", start, tips[:, end], radius, shade)
+        scene.add_legend(f"{symbol}: {name.partition(': ')[2]}", color)
+
+
+def _caption(robots: Sequence[Robot], result: Result, has_paths: bool) -> list[str]:
+    lines = ["Bars between compared tips grow and turn red with the synchronization error."]
+    if not has_paths:
+        lines.append("Desired paths are not shown: the coordinates are not those of tips.")
+    plain = [name for name, robot in zip(result.names, robots, strict=True) if not has_shapes(robot)]
+    if plain:
+        lines.append(f"Without shapes in their descriptions, as plain links: {', '.join(plain)}.")
+    return lines

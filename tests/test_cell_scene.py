@@ -1,0 +1,167 @@
+"""The scene of any run: made again from a file, in any space, with bars that say who is compared."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from cells import SMALL_GAINS, small_cell
+from machines import random_robot
+from seams.degrees import Degrees
+from sliders import SCARA, load, pair, urdf
+from test_animation import ends, node
+
+from synctrl import Cell, Coupling, Experiment, Hold, JointSpace, Member, Result, Robot, load_robot
+from synctrl.errors import InputError, RobotWarning
+from synctrl.experiments import mobile_robot
+from synctrl.robots.written import read_robot, write_robot
+from synctrl.show import scene_of
+from synctrl.show.arms import ALARM
+from synctrl.show.cell_scene import STILL
+from synctrl.show.legends import pair_colors
+from synctrl.show.skeleton import skeleton
+
+
+@pytest.fixture(scope="module")
+def star() -> Result:
+    return Experiment(small_cell(4, coupling=Coupling.star(4)), SMALL_GAINS, 0.2).simulate(dt=5e-3)
+
+
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory: pytest.TempPathFactory) -> Result:
+    """Arms in joint space whose description has no shapes."""
+    robot = load(tmp_path_factory.mktemp("bare"), "bare", SCARA, shapes=False)
+    return pair((robot, robot)).simulate(dt=2e-3)
+
+
+def reloaded(result: Result, folder: Any) -> Result:
+    return Result.load(result.save(folder / "run.npz"))
+
+
+def test_the_scene_of_a_loaded_run_is_the_same_page(star, bare, tmp_path):
+    for run in (star, bare):
+        assert scene_of(reloaded(run, tmp_path)).page() == scene_of(run).page()
+
+
+def test_arms_with_meshes_come_back_from_a_file(tmp_path):
+    ur5 = load_robot("ur5").placed((1.0, 2.0, 0.3), (0.1, 0.2, 0.3), name="left")
+    again = read_robot(write_robot(ur5), "left", ur5.joint_names)
+    q = np.linspace(-1, 1, 6)
+    np.testing.assert_allclose(again.tip_pose(q).homogeneous, ur5.tip_pose(q).homogeneous, atol=1e-12)
+    assert [g.meshPath for g in again.visual.geometryObjects] == [
+        g.meshPath for g in ur5.visual.geometryObjects
+    ]
+    assert "file" not in write_robot(ur5)  # the place of the catalogue's files is none of the result's
+
+
+def test_a_locked_and_placed_panda_comes_back_with_its_tip():
+    panda = load_robot("panda", tip="panda_link7").placed((0, 1, 0))
+    again = read_robot(write_robot(panda), "panda", panda.joint_names)
+    assert (again.tip, again.joint_names) == ("panda_link7", panda.joint_names)
+    np.testing.assert_allclose(again.inertial_parameters, panda.inertial_parameters, atol=1e-12)
+
+
+def test_bars_join_compared_tips_in_different_colours_and_turn_red(star):
+    scene = scene_of(star, fps=1 / star.t[1])
+    size = np.linalg.norm(star.sync_error, axis=2)
+    for k, (i, j) in enumerate(star.info["pairs"]):
+        bar = node(scene, f"segment ε{'₁₂₃'[k]}, to {star.names[j]}")
+        start, end = ends(bar)
+        np.testing.assert_allclose(start[:, :2], star.x[: len(start), i], atol=1e-9)
+        np.testing.assert_allclose(end[:, :2], star.x[: len(end), j], atol=1e-9)
+        worst = size[: len(start), k].argmax()
+        if size[worst, k] == size.max():
+            np.testing.assert_allclose(bar.rgb[worst], ALARM)
+        assert bar.scale[worst, 0] == bar.scale[:, 0].max()
+    bars = [color for text, color in scene._legend if text.startswith("ε")]
+    assert bars == pair_colors(star) and len({*bars}) == 3
+
+
+def test_robots_without_shapes_are_drawn_as_plain_links_and_the_page_says_so(bare):
+    scene = scene_of(bare)
+    robot = node(scene, "robot robot 1")
+    assert sum(len(child.shapes) for child in robot.children) == 4 + 1 + 3  # balls, a rod, and links
+    assert "as plain links: robot 1, robot 2" in scene.caption
+
+
+def test_plain_links_reach_from_joint_to_joint():
+    robot = random_robot(3, 4)
+    shapes = skeleton(robot, "red").geometryObjects
+    links = [g for g in shapes if isinstance(g.geometry, type(shapes[-1].geometry))]
+    for link in links:
+        half = link.placement.rotation[:, 2] * link.geometry.halfLength
+        start, end = link.placement.translation - half, link.placement.translation + half
+        ways = [robot.model.jointPlacements[j].translation for j in range(1, robot.model.njoints)]
+        ways.append(robot.model.frames[robot.tip_id].placement.translation)
+        assert np.abs(start).max() < 1e-9 and min(np.abs(end - way).max() for way in ways) < 1e-9
+
+
+def test_in_joint_space_the_desired_paths_are_those_of_the_tips(bare):
+    scene = scene_of(bare)
+    robot = bare.experiment.cell.robots[0]
+    tips = np.array([robot.tip_position(q) for q in bare.x_desired[:, 0]])
+    low, high = node(scene, "line desired path of robot 1").shapes[0].bounds
+    np.testing.assert_allclose([low, high], [tips.min(axis=0), tips.max(axis=0)], atol=0.02)
+
+
+def test_tips_that_stand_still_have_no_path():
+    run = mobile_robot().simulate(0.05)
+    assert np.ptp(run.x[:, 0]) > STILL
+    assert not [each for each in scene_of(run).nodes if each.name.startswith("line")]
+
+
+def test_a_space_of_ones_own_that_has_no_tips_is_shown_without_paths():
+    arm = load_robot("planar2r")
+    members = [Member(arm.placed((i, 0, 0)), Hold([10.0, 60.0]), q0=[0.2, 1.0]) for i in range(2)]
+    run = Experiment(Cell(members, Coupling.pair(), Degrees()), SMALL_GAINS, 0.02).simulate()
+    scene = scene_of(run)
+    assert not [each for each in scene.nodes if each.name.startswith("line")]
+    assert "Desired paths are not shown" in scene.caption
+
+
+def test_a_robot_that_cannot_be_made_again_is_named_and_its_experiment_taken(tmp_path):
+    model = load_robot("planar2r").model
+    robots = [Robot(pin.Model(model), "tip", name=f"mine {k}") for k in range(2)]
+    members = [Member(robot, Hold([0.1, 1.0])) for robot in robots]
+    experiment = Experiment(Cell(members, Coupling.pair(), JointSpace()), SMALL_GAINS, 0.02)
+    loaded = reloaded(experiment.simulate(), tmp_path)
+    with pytest.raises(InputError, match=r"robot 1 \('mine 0'\)") as caught:
+        scene_of(loaded)
+    assert caught.value.subject == "experiment"
+    assert scene_of(loaded, experiment).nodes
+
+
+def test_a_description_of_another_robot_or_no_description_is_refused_by_name(star):
+    robots = [{**robot, "joints": ["a", "b"]} for robot in star.info["robots"]]
+    for wrong in (robots, [{**robot, "urdf": "<robot"} for robot in robots]):
+        run = replace(star, info={**star.info, "robots": wrong}, experiment=None)
+        with pytest.raises(InputError, match="cannot be made again") as caught:
+            scene_of(run)
+        assert caught.value.subject == "experiment"
+
+
+def test_a_notebook_shows_the_scene_or_says_that_it_is_too_large(star, monkeypatch):
+    scene = scene_of(star)
+    assert scene._repr_html_().startswith("<iframe sandbox=")
+    monkeypatch.setattr("synctrl.show.scene.NOTEBOOK_LIMIT", 10)
+    assert "use write()" in scene._repr_html_() and "<iframe" not in scene._repr_html_()
+
+
+def test_meshes_beside_a_file_of_ones_own_are_found_again_from_elsewhere(tmp_path, monkeypatch):
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.box((0.3, 0.1, 0.1)).export(tmp_path / "box.stl")
+    text = urdf("boxes", SCARA).replace('<box size="0.3 0.06 0.06"/>', '<mesh filename="box.stl"/>')
+    (tmp_path / "boxes.urdf").write_text(text, encoding="utf-8")
+    robot = load_robot(tmp_path / "boxes.urdf")
+    run = pair((robot, robot)).simulate(0.02, dt=2e-3)
+    (tmp_path / "other").mkdir()
+    monkeypatch.chdir(tmp_path / "other")
+    loaded = reloaded(run, tmp_path)
+    assert loaded.info["robots"][0]["file"] == str(tmp_path / "boxes.urdf")
+    assert scene_of(loaded).page() == scene_of(run).page()
+    (tmp_path / "box.stl").unlink()
+    with pytest.warns(RobotWarning, match=r"box\.stl"):
+        assert "Not shown of robot 1: box.stl" in scene_of(loaded).page()

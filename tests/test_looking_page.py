@@ -1,0 +1,22 @@
+"""The page about looking at results works as it stands there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from synctrl.simulation.views import FIGURES
+
+PAGE = (Path(__file__).parents[1] / "docs" / "looking.md").read_text("utf-8")
+
+
+def test_the_page_runs_and_leaves_what_it_says(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (block,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    exec(compile(block, "docs/looking.md", "exec"), {})
+    written = {str(file.relative_to(tmp_path)) for file in tmp_path.rglob("*") if file.is_file()}
+    assert written == {"run.npz", "cell.html", "figures/torque.png", "figures/torque.svg"}
+
+
+def test_the_page_names_all_figures():
+    assert re.findall(r"^\| `(\w+)` \|", PAGE, flags=re.MULTILINE) == [*FIGURES]

@@ -1,0 +1,302 @@
+"""MJCF loads as MuJoCo computes it, opens no file but its own, and is refused where it is no arm."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from synctrl import Robot, load_robot
+from synctrl.errors import MissingDependencyError, RobotError, RobotWarning
+
+mujoco = pytest.importorskip("mujoco", reason="MuJoCo is an extra: pip install 'synctrl[mujoco]'")
+
+ROUNDING = 1e-10
+INERTIAL = '<inertial mass="2" pos=".1 .02 .03" quat=".9 .1 .2 .3" diaginertia=".03 .02 .015"/>'
+SMALL = '<inertial mass=".5" pos=".05 0 .01" diaginertia=".002 .003 .004"/>'
+ARM = f"""
+<mujoco model="arm">
+  <compiler angle="degree"/>
+  <default><joint damping=".1"/><default class="seen"><geom group="2"/></default></default>
+  <worldbody>
+    <geom type="plane" size="1 1 .1"/>
+    <body name="base" pos="0 0 .1" euler="10 20 30">
+      <inertial mass="1" pos="0 0 0" diaginertia=".1 .1 .1"/>
+      <body name="upper" pos="0 0 .2">
+        <joint name="turn" axis="0 0 2" pos=".01 .02 .03" range="-90 45" armature=".1" frictionloss=".2"/>
+        {INERTIAL}
+        <geom class="seen" type="box" size=".1 .05 .02" rgba="1 0 0 1"/>
+        <body name="lower" pos=".3 0 0" euler="0 30 0">
+          <joint name="push" type="slide" axis="1 1 0" range="-.1 .3" ref=".05"/>
+          <geom type="capsule" size=".03" fromto="0 0 0 .2 0 0"/>
+          <body name="hand" pos=".2 0 0">
+            <joint name="spin" axis="0 1 0" ref="20" armature=".02"/>
+            {SMALL}
+            <site name="tool" pos="0 0 .1" euler="90 0 0"/>
+          </body>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor joint="turn" gear="5" ctrlrange="-2 2"/>
+    <position joint="push" kp="10" forcerange="-7 7"/>
+  </actuator>
+</mujoco>
+"""
+
+
+def write(folder: Path, text: str, name: str = "arm.xml") -> Path:
+    (folder / name).parent.mkdir(parents=True, exist_ok=True)
+    (folder / name).write_text(text, encoding="utf-8")
+    return folder / name
+
+
+def quietly(file: Path, **options: object) -> Robot:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RobotWarning)
+        return load_robot(file, **options)
+
+
+def mujoco_torque(model: object, robot: Robot, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """Inverse dynamics by MuJoCo without its passive forces, in the robot's order of joints."""
+    data, acceleration, torque = mujoco.MjData(model), np.zeros(model.nv), np.zeros(model.nv)
+    joints = [model.joint(name) for name in robot.joint_names]
+    dofs = [int(joint.dofadr[0]) for joint in joints]
+    data.qpos[[int(joint.qposadr[0]) for joint in joints]] = q
+    data.qvel[dofs], acceleration[dofs] = v, a
+    mujoco.mj_forward(model, data)
+    mujoco.mj_mulM(model, data, torque, acceleration)
+    return (torque + data.qfrc_bias)[dofs]
+
+
+# -- what it says ------------------------------------------------------------------------------------------
+
+
+def test_dynamics_are_those_of_mujoco_in_random_states(tmp_path: Path) -> None:
+    file = write(tmp_path, ARM)
+    robot, model = quietly(file), mujoco.MjModel.from_xml_path(str(file))
+    assert sorted(robot.joint_names) == ["push", "spin", "turn"]
+    for q, v, a in np.random.default_rng(0).uniform(-2, 2, (20, 3, robot.nv)):
+        expected = mujoco_torque(model, robot, q, v, a)
+        assert abs(robot.inverse_dynamics(q, v, a) - expected).max() < ROUNDING
+
+
+def test_a_site_is_a_frame_where_mujoco_has_it(tmp_path: Path) -> None:
+    file = write(tmp_path, ARM)
+    robot, model = quietly(file, tip="tool"), mujoco.MjModel.from_xml_path(str(file))
+    data, q = mujoco.MjData(model), np.array([0.3, -0.2, 0.7])
+    for name, position in zip(robot.joint_names, q, strict=True):
+        data.joint(name).qpos[0] = position
+    mujoco.mj_forward(model, data)
+    pose = robot.tip_pose(q)
+    assert abs(pose.translation - data.site("tool").xpos).max() < ROUNDING
+    assert abs(pose.rotation - data.site("tool").xmat.reshape(3, 3)).max() < ROUNDING
+
+
+def test_limits_rotors_and_friction_come_along(tmp_path: Path) -> None:
+    robot = quietly(write(tmp_path, ARM))
+    of = {joint.name: joint for joint in robot.document.moving_joints}
+    assert of["turn"].limit.effort == pytest.approx(10)
+    assert (of["turn"].limit.lower, of["turn"].limit.upper) == pytest.approx((-math.pi / 2, math.pi / 4))
+    assert (of["turn"].friction, of["turn"].damping) == (0.2, 0.1)
+    assert of["push"].limit.effort == 7
+    assert (of["push"].limit.lower, of["push"].limit.upper) == (-0.1, 0.3)
+    assert (of["spin"].type, of["spin"].limit.effort) == ("continuous", math.inf)
+    rotors = dict(zip(robot.joint_names, robot.armature, strict=True))
+    assert rotors == {"turn": 0.1, "push": 0.0, "spin": 0.02}
+
+
+def test_shapes_are_seen_in_their_size_place_and_colour(tmp_path: Path) -> None:
+    robot = quietly(write(tmp_path, ARM))
+    box = next(g for link in robot.document.links for g in link.visuals if g.shape.kind == "box")
+    assert box.shape.size == pytest.approx((0.2, 0.1, 0.04))
+    assert box.color == (1, 0, 0, 1)
+    assert robot.visual.ngeoms == 2
+
+
+def test_an_equality_of_joints_makes_one_follow(tmp_path: Path) -> None:
+    text = ARM.replace("<actuator>", '<equality><joint joint1="spin" joint2="turn"/></equality><actuator>')
+    with pytest.warns(RobotWarning, match="spin"):
+        robot = load_robot(write(tmp_path, text))
+    assert sorted(robot.joint_names) == ["push", "turn"]
+
+
+def test_an_equality_with_a_number_holds_a_joint_there(tmp_path: Path) -> None:
+    held = '<equality><joint joint1="spin" polycoef=".4 0 0 0 0"/></equality><actuator>'
+    file = write(tmp_path, ARM.replace("<actuator>", held))
+    with pytest.warns(RobotWarning, match="locked"):
+        robot = load_robot(file, tip="tool")
+    free = quietly(write(tmp_path, ARM, "free.xml"), tip="tool")
+    at = {"turn": 0.3, "push": 0.1, "spin": math.radians(20) + 0.4}
+    poses = [arm.tip_pose([at[name] for name in arm.joint_names]) for arm in (robot, free)]
+    assert poses[0].isApprox(poses[1], ROUNDING)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ('<joint name="spin" axis="0 1 0" ref="20"', '<joint name="spin" type="ball"', "ball joint"),
+        ('<joint name="spin"', '<joint axis="1 0 0"/><joint name="spin"', "one joint of a body, found 2"),
+        (
+            "<actuator>",
+            '<equality><connect body1="hand" body2="base" anchor="0 0 0"/></equality><actuator>',
+            "closes a loop",
+        ),
+        ("<worldbody>", '<worldbody><body><freejoint/><geom size=".1"/></body>', "free joint"),
+        ("<worldbody>", "<worldbody><unknown/>", "MuJoCo compiles.*unrecognized"),
+        ("<worldbody>", '<extension><plugin plugin="mujoco.pid"/></extension><worldbody>', "plugin"),
+        (
+            "<actuator>",
+            '<tendon><fixed armature=".3"><joint joint="spin" coef="1"/></fixed></tendon><actuator>',
+            "MuJoCo computes",
+        ),
+        ("<mujoco", "<!DOCTYPE mujoco><mujoco", "DOCTYPE"),
+    ],
+)
+def test_what_is_no_arm_is_refused_with_the_reason(old: str, new: str, reason: str, tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match=reason) as caught:
+        quietly(write(tmp_path, ARM.replace(old, new, 1)))
+    assert caught.value.file is not None
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('name="spin"', 'name="spin" stiffness="3"', "a spring of 3"),
+        ("<compiler", '<option gravity="0 0 -1.62"/><compiler', "in place of 0 0 -1.62"),
+        ("<compiler", '<option><flag gravity="disable"/></option><compiler', "in place of 0 0 0"),
+        ('<body name="hand"', '<body name="hand" gravcomp="1"', "gravcomp"),
+        ('forcerange="-7 7"', 'forcerange="-7 9"', "smaller limit of force, 7"),
+    ],
+)
+def test_what_acts_and_is_not_taken_is_said(old: str, new: str, said: str, tmp_path: Path) -> None:
+    with pytest.warns(RobotWarning):
+        robot = load_robot(write(tmp_path, ARM.replace(old, new)))
+    assert said in str(robot.report)
+
+
+def test_a_model_in_which_nothing_moves_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match="joints that move"):
+        quietly(write(tmp_path, "<mujoco><worldbody><body><geom size='.1'/></body></worldbody></mujoco>"))
+
+
+def test_an_urdf_with_the_ending_xml_is_read_as_one(tmp_path: Path) -> None:
+    planar = Path(load_robot("planar2r").document.file)
+    file = write(tmp_path, planar.read_text(encoding="utf-8"), "planar.xml")
+    assert load_robot(file).nv == 2
+
+
+def test_without_mujoco_the_advice_is_to_install_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(MissingDependencyError, match=r"synctrl\[mujoco\]"):
+        load_robot(write(tmp_path, ARM))
+
+
+# -- files -------------------------------------------------------------------------------------------------
+
+TETRAHEDRON = "\n".join(
+    ["v 0 0 0", "v .1 0 0", "v 0 .1 0", "v 0 0 .1", "f 1 3 2", "f 1 2 4", "f 1 4 3", "f 2 3 4", ""]
+)
+
+
+def with_mesh(inertial: str, file: str = "part.obj", compiler: str = 'meshdir="meshes"') -> str:
+    """An arm of one link whose shape is a mesh."""
+    return f"""<mujoco model="one"><compiler {compiler}/><asset><mesh name="part" file="{file}"/></asset>
+    <worldbody><body name="link"><joint name="turn"/>{inertial}
+    <geom type="mesh" mesh="part" pos=".1 .2 .3" quat="1 2 0 0"/></body></worldbody></mujoco>"""
+
+
+def test_the_file_may_be_split(tmp_path: Path) -> None:
+    write(
+        tmp_path,
+        f'<mujocoinclude><body name="more" pos="0 0 1">{SMALL}</body></mujocoinclude>',
+        "more/more.xml",
+    )
+    whole = ARM.replace('<site name="tool"', '<include file="more/more.xml"/><site name="tool"')
+    robot = quietly(write(tmp_path, whole))
+    assert "more" in {link.name for link in robot.document.links}
+
+
+def test_a_mass_from_a_mesh_is_that_of_mujoco(tmp_path: Path) -> None:
+    write(tmp_path / "meshes", TETRAHEDRON, "part.obj")
+    file = write(tmp_path, with_mesh(""))
+    robot, model = quietly(file), mujoco.MjModel.from_xml_path(str(file))
+    assert robot.inertial_parameters[0] == pytest.approx(model.body("link").mass[0])
+
+
+@pytest.mark.parametrize("inertial", ["", SMALL])
+def test_a_mesh_is_seen_where_its_own_file_puts_it(inertial: str, tmp_path: Path) -> None:
+    """MuJoCo moves a mesh's frame into its centre of mass; what is drawn is the file."""
+    write(tmp_path / "meshes", TETRAHEDRON, "part.obj")
+    robot = quietly(write(tmp_path, with_mesh(inertial)))
+    (shape,) = (g for link in robot.document.links for g in link.visuals)
+    assert shape.origin.se3.translation == pytest.approx([0.1, 0.2, 0.3])
+    expected = np.array([[1, 0, 0], [0, -0.6, -0.8], [0, 0.8, -0.6]])
+    assert shape.origin.se3.rotation == pytest.approx(expected)
+    assert Path(shape.shape.filename) == Path("meshes/part.obj")
+
+
+def test_a_missing_mesh_costs_only_the_picture(tmp_path: Path) -> None:
+    with pytest.warns(RobotWarning, match=r"part\.obj"):
+        robot = load_robot(write(tmp_path, with_mesh(SMALL)))
+    assert robot.nv == 1
+
+
+def test_a_missing_mesh_that_has_the_mass_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match=r"mass.*part\.obj"):
+        quietly(write(tmp_path, with_mesh("")))
+
+
+@pytest.mark.parametrize("named", ["../../part.obj", "OUT", "link.obj"])
+def test_a_mesh_outside_of_the_package_is_not_read(named: str, tmp_path: Path) -> None:
+    write(tmp_path, TETRAHEDRON, "part.obj")
+    home = tmp_path / "home"
+    (home / "meshes").mkdir(parents=True)
+    (home / "meshes" / "link.obj").symlink_to(tmp_path / "part.obj")
+    named = named.replace("OUT", str(tmp_path / "part.obj"))
+    with pytest.raises(RobotError, match="outside of the package"):
+        quietly(write(home, with_mesh("", named)))
+
+
+def test_an_include_outside_of_the_package_is_not_read(tmp_path: Path) -> None:
+    write(tmp_path, "<mujocoinclude/>", "outside.xml")
+    text = ARM.replace("<worldbody>", '<include file="../outside.xml"/><worldbody>')
+    with pytest.raises(RobotError, match="outside"):
+        quietly(write(tmp_path / "home", text))
+
+
+def test_a_file_that_includes_itself_is_refused(tmp_path: Path) -> None:
+    write(tmp_path, '<mujocoinclude><include file="loop.xml"/></mujocoinclude>', "loop.xml")
+    with pytest.raises(RobotError, match="include itself"):
+        quietly(write(tmp_path, ARM.replace("<worldbody>", '<include file="loop.xml"/><worldbody>')))
+
+
+def test_a_pipe_in_the_place_of_a_mesh_is_not_waited_for(tmp_path: Path) -> None:
+    (tmp_path / "meshes").mkdir()
+    os.mkfifo(tmp_path / "meshes" / "part.obj")
+    with pytest.raises(RobotError, match="not a regular file"):
+        quietly(write(tmp_path, with_mesh("")))
+
+
+def test_mujoco_opens_no_file_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its compiler gets a text and the content of meshes, and knows no folder in which either could lie."""
+    write(tmp_path / "meshes", TETRAHEDRON, "part.obj")
+    file = write(tmp_path, with_mesh("", compiler='meshdir="meshes" texturedir="/"'))
+    given: list[str] = []
+    compile_text = mujoco.MjModel.from_xml_string
+
+    def listening(text: str, assets: dict[str, bytes]) -> object:
+        given.extend([text, *assets])
+        return compile_text(text, assets)
+
+    monkeypatch.setattr(mujoco, "MjModel", type("Model", (), {"from_xml_string": staticmethod(listening)}))
+    quietly(file)
+    text, *assets = given
+    assert [word.split('"')[1] for word in text.split(" file=")[1:]] == assets
+    assert "dir=" not in text
