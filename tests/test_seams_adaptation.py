@@ -188,5 +188,18 @@ def test_every_integrator_lets_estimates_settle_where_steps_end(integrator):
 
 
 def test_maps_without_bodies_are_refused_by_name():
-    with pytest.raises(InputError, match=r"Natural needs all inertial parameters .* LinearParameters"):
+    with refused(InputError, "robot 1, adaptation", found="LinearParameters"):
         with_adaptation(planar_four(), Natural(0.1))
+
+
+@pytest.mark.parametrize("dt", [2e-3, 5e-4])
+def test_both_engines_go_from_sample_to_sample_along_the_same_geodesic(dt):
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    experiment = with_adaptation(a460_pair(), Natural(2.0))
+    one, other = (
+        experiment.simulate(0.1, dt=dt, engine=engine, control_period=2e-3)
+        for engine in ("pinocchio", "compiled")
+    )
+    scale = np.abs(one.theta_hat).max()
+    assert np.abs(one.theta_hat - one.theta_hat[0]).max() > 1e-3 * scale
+    assert np.abs(one.theta_hat - other.theta_hat).max() <= 1e-9 * scale

@@ -123,7 +123,11 @@ static void coast(const Cell *c, Quantities *a, Work *k, const Steps *s, int sta
 /* From here on acts what the controller asks for here. */
 static void sample(const Cell *c, Quantities *a, Work *k, const Steps *s) {
     memcpy(a->acting, a->tau, sizeof(double) * c->n * nv);
-    if (s->holds) memcpy(k->held, k->k[0], sizeof(double) * state_size(c));
+    if (!s->holds) return;
+    memcpy(k->held, k->k[0], sizeof(double) * state_size(c));
+    memcpy(a->z_sampled, a->z, sizeof(double) * c->n * Z);
+    memcpy(a->z_dot_sampled, a->z_dot, sizeof(double) * c->n * Z);
+    a->since[0] = s->period;
 }
 
 /* One row of the log, of an instant at which the loop was evaluated. */
@@ -225,14 +229,20 @@ static void runge_kutta(const Cell *c, Quantities *a, Work *k, const Steps *s, R
         y[j] += h / 6 * (slope[0][j] + 2 * (slope[1][j] + slope[2][j]) + slope[3][j]);
 }
 
-/* Let adaptations make of their state what they do after a step, before anything is asked about it. */
+/* Let adaptations make of their state what they do after a step or a sample, before anything is asked about it. */
 static void settle(const Cell *c, Quantities *a, Work *k, double *y) {
     place(c, a, y, k->k[0]);
-    for (int i = 0; i < c->n; i++)
-        if (kinds[c->kind[i]].settle) {
+    for (int i = 0; i < c->n; i++) {
+        const double *z = NULL;
+        if (kinds[c->kind[i]].leap && a->since[0] > 0) {
+            call_leap(c, a, i, k);
+            z = a->leapt;
+        } else if (kinds[c->kind[i]].settle) {
             call_settle(c, a, i, k);
-            memcpy(a->z + (size_t)i * Z, a->settled + (size_t)i * Z, sizeof(double) * Z);
+            z = a->settled;
         }
+        if (z) memcpy(a->z + (size_t)i * Z, z + (size_t)i * Z, sizeof(double) * Z);
+    }
 }
 
 /* All that happens at the start of a step, before time goes on; whether the run ends here. With continuous control

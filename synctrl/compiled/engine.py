@@ -164,7 +164,7 @@ class _Steps:
         self._before = np.zeros((2, 2, v0.size))
         buffers = (part.ctypes.data for part in self._before)
         work.step_error = structs.StepError(0, np.abs(v0).max(), 0, 0, 0, *buffers)
-        self._steps = structs.Steps(holds=run.every is not None)
+        self._steps = structs.Steps(holds=run.every is not None, period=run.info.get("control_period") or 0.0)
         self._block: Block | None = None
         program.tell(self._steps, {"disturbance": run.schedule.torques, "pi": program.carried})
         ctypes.memset(work.side, 0, 8 * run.loop.cell.n)

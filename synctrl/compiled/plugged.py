@@ -39,11 +39,13 @@ class Learning(NamedTuple):
         estimate: CasADi function, z -> theta_hat.
         rate: CasADi function, z, q, v, v_ref, a_ref, s_q, Y^T s_q -> z'.
         settle: CasADi function, z -> z after a step; None if it stays what it is.
+        leap: CasADi function, z, z', h -> z after a sample of h s; None if that is z + h z', settled.
     """
 
     estimate: Any
     rate: Any
     settle: Any
+    leap: Any
 
 
 def trace_law(controller: Controller) -> list[Any]:
@@ -83,11 +85,14 @@ def trace_learning(controller: Controller) -> list[Learning | None]:
         motion = {name: _padded(name, joints, cell.nv) for name in MOTION}
         estimates, settled = adaptation.estimate(z), adaptation.settle(z)
         rates = adaptation.rate(z, Seen(**motion, gradient=gradient, regressor=None))
+        z_dot, h = symbols("z_dot", *z.shape), np.tile(symbols("h", 1), (cell.n, 1))
+        leapt = adaptation.leap(z, z_dot, h[:1, 0]) if hasattr(adaptation, "leap") else None
         return [
             Learning(
                 _function("estimate", i, [z], [estimates[:, :P]]),
                 _function("rate", i, [z, *(x[:, :nv] for x in motion.values()), gradient[:, :P]], [rates]),
                 None if settled is z else _function("settle", i, [z], [settled]),
+                None if leapt is None else _function("leap", i, [z, z_dot, h], [leapt]),
             )
             for i, (nv, P) in enumerate(zip(joints, counts, strict=True))
         ]

@@ -112,6 +112,12 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "e_star": Quantity("work", "n", "m", "coupled error"),
         "s_q": Quantity("work", "n", "nv", "error in velocity of the joints"),
         "theta_hat": Quantity("work", "n", "P", "estimates"),
+        "z_sampled": Quantity("work", "n", "Z", "state of the adaptation at the last sample"),
+        "z_dot_sampled": Quantity("work", "n", "Z", "its rate there"),
+        "since": Quantity("work", "one", "1", "how long a sample lasts, s; 0 before the first"),
+        "leapt": Quantity(
+            "work", "n", "Z", "state of the adaptation after a sample, for example along a curve"
+        ),
         "settled": Quantity("work", "n", "Z", "state of the adaptation after a step, for example projected"),
     }
 )
@@ -150,6 +156,7 @@ FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
         "guard": Signature(("e", "J", "J_inv"), ("watched", "side")),
         "estimate": Signature(("z",), ("theta_hat",)),
         "settle": Signature(("z",), ("settled",)),
+        "leap": Signature(("z_sampled", "z_dot_sampled", "since"), ("leapt",)),
     }
 )  # fmt: skip
 

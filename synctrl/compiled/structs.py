@@ -88,6 +88,7 @@ class Steps(ctypes.Structure):
         first, count: those to be made.
         length: of the block.
         holds: whether torque and adaptation are held between samples.
+        period: how long they are held, s.
         t: instants of those to be made, (count + 1), s.
         marks: what happens at the start of each, see `Mark`.
         disturbed, loaded: which disturbance and which load acts in each.
@@ -100,6 +101,7 @@ class Steps(ctypes.Structure):
 
     _fields_ = [
         *((name, ctypes.c_int) for name in ("first", "count", "length", "holds")),
+        ("period", ctypes.c_double),
         ("t", Doubles),
         ("marks", Chars),
         ("disturbed", Ints),
@@ -182,13 +184,14 @@ def functions_of(kind: Kind) -> list[str]:
     """Names of the functions that a kind has.
 
     A space that watches nothing has no `guard`, an adaptation whose state is theta_hat no `estimate`,
-    and one that leaves its state as a step leaves it no `settle`.
+    and one that leaves its state as a step or a sample leaves it no `settle` or `leap`.
     """
     learning = kind.learning
     lacks = {
         "guard": not kind.watches,
         "estimate": learning is None,
         "settle": learning is None or learning.settle is None,
+        "leap": learning is None or learning.leap is None,
     }
     return [name for name in FUNCTIONS if not lacks.get(name, False)]
 

@@ -152,6 +152,9 @@ class Trace:
         yield self._function("estimate", theta_hat=array_of(learning.estimate(z)))
         if learning.settle is not None:
             yield self._function("settle", settled=array_of(learning.settle(z)))
+        if learning.leap is not None:
+            sampled = (self.given[name] for name in FUNCTIONS["leap"].inputs)
+            yield self._function("leap", leapt=array_of(learning.leap(*sampled)))
 
     def _adaptive(self, v_ref: np.ndarray, a_ref: np.ndarray, s_q: np.ndarray) -> tuple:
         """Y theta_hat, and z' of the adaptation; with (14) its state z is theta_hat."""
