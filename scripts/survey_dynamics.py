@@ -24,10 +24,9 @@ def differences(
 ) -> dict[str, float]:
     """Largest relative differences of a robot from Pinocchio's own model of its file.
 
-    Joints that the robot does not have are held there, too, at 0 or as near to it as they can go, or where
-    the joint is that they follow.
+    Joints that the robot does not have stand there at 0, or as near to it as they can go, or where the joint
+    is that they follow. The regressor is compared by the torque that it gives with the true parameters.
     """
-    model = _reduced(robot, model, followers)
     rng, order = np.random.default_rng(0), _order(robot, model)
     worst = dict.fromkeys(("M", "C", "g", "regressor"), 0.0)
     for _ in range(SAMPLES):
@@ -36,10 +35,11 @@ def differences(
             robot.mass_matrix(q),
             robot.coriolis_matrix(q, v),
             robot.gravity(q),
-            robot.regressor(q, v, v_ref, a_ref),
+            robot.regressor(q, v, v_ref, a_ref) @ robot.inertial_parameters,
         )
-        theirs = _theirs(model, order, q, v, v_ref, a_ref)
-        for name, a, b in zip(worst, ours, theirs, strict=True):
+        at = _configuration(model, followers, dict(zip(robot.joint_names, q, strict=True)))
+        moving = [_all_joints(model, order, vector) for vector in (v, v_ref, a_ref)]
+        for name, a, b in zip(worst, ours, _theirs(model, order, at, *moving), strict=True):
             worst[name] = max(worst[name], float(abs(a - b).max() / max(abs(b).max(), 1e-9)))
     return worst
 
@@ -49,12 +49,18 @@ def _order(robot: Robot, model: pin.Model) -> np.ndarray:
     return np.array([model.joints[model.getJointId(name)].idx_v for name in robot.joint_names])
 
 
-def _reduced(robot: Robot, model: pin.Model, followers: Followers) -> pin.Model:
-    held = [k for k, name in enumerate(model.names) if k and name not in robot.joint_names]
-    q = pin.neutral(model)
-    for joint in (joint for k in held if (joint := model.joints[k]).nq == 1):
-        q[joint.idx_q] = _place(model, model.names[joint.id], followers)
-    return pin.buildReducedModel(model, held, q)
+def _all_joints(model: pin.Model, order: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Velocities of all joints of a model, those of the robot given and others 0."""
+    there = np.zeros(model.nv)
+    there[order] = vector
+    return there
+
+
+def _configuration(model: pin.Model, followers: Followers, moving: Mapping[str, float]) -> np.ndarray:
+    angles = np.zeros(model.nv)
+    for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True):
+        angles[joint.idx_v] = moving[name] if name in moving else _place(model, name, followers)
+    return pin.integrate(model, pin.neutral(model), angles)
 
 
 def _place(model: pin.Model, name: str, followers: Followers) -> float:
@@ -82,25 +88,16 @@ def followers_in(text: str) -> Followers:
 def _theirs(
     model: pin.Model, order: np.ndarray, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray
 ) -> tuple[np.ndarray, ...]:
-    """M, C, g and the Slotine-Li regressor by Pinocchio alone, in the robot's order of joints."""
-
-    def sorted_in(vector: np.ndarray) -> np.ndarray:
-        there = np.zeros(model.nv)
-        there[order] = vector
-        return there
-
-    data, weightless = model.createData(), pin.Model(model)
+    """M, C, g and torque by the Slotine-Li regressor, by Pinocchio alone, in the robot's order of joints."""
+    data, weightless, grid = model.createData(), pin.Model(model), np.ix_(order, order)
     weightless.gravity.setZero()
-    q, v, v_ref, a_ref = map(sorted_in, (q, v, v_ref, a_ref))
-    q = pin.integrate(model, pin.neutral(model), q)
     M = pin.crba(model, data, q).copy()
     C = pin.computeCoriolisMatrix(model, data, q, v).copy()
     g = pin.computeGeneralizedGravity(model, data, q).copy()
     Y = pin.computeJointTorqueRegressor(model, data, q, (v + v_ref) / 2, a_ref).copy()
     Y -= pin.computeJointTorqueRegressor(weightless, weightless.createData(), q, (v - v_ref) / 2, 0 * v)
-    columns = np.concatenate([np.arange(10 * k, 10 * k + 10) for k in order])
-    grid = np.ix_(order, order)
-    return M[grid], C[grid], g[order], np.atleast_2d(Y)[order][:, columns]
+    parameters = np.concatenate([inertia.toDynamicParameters() for inertia in list(model.inertias)[1:]])
+    return M[grid], C[grid], g[order], (np.atleast_2d(Y) @ parameters)[order]
 
 
 def loop_difference(robot: Robot, duration: float = 0.1) -> float:

@@ -134,8 +134,8 @@ def what_it_is(text: str) -> str:
         return "not a robot"
     joints = [joint for joint in root.findall("joint") if joint.find("child") is not None]
     types = [joint.get("type") for joint in joints]
-    if {"floating", "planar"} & {*types}:
-        return "floating or planar joint"
+    if {"floating", "planar", "spherical"} & {*types}:
+        return "a joint of several degrees of freedom"
     count = sum(kind in MOVING for kind in types)
     if not count:
         return "nothing moves"
@@ -231,8 +231,7 @@ def _compare(robot: Robot, text: str, row: Row) -> None:
     try:
         row.errors = differences(robot, pin.buildModelFromXML(text), followers_in(text))
     except ValueError as error:
-        row.errors = {"not compared": math.nan}
-        row.others["Pinocchio"] = row.others["Pinocchio"] or str(error)
+        row.stopped = f"not compared: {error}"
 
 
 def _run(task: Task, tip: str, row: Row) -> None:

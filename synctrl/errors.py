@@ -103,9 +103,10 @@ class FrameNotFound(RobotError):
 
     def __init__(self, robot: str, frame: str, available: Iterable[str]):
         self.robot, self.frame, self.available = robot, frame, tuple(available)
+        there = (name if name.isprintable() else ascii(name) for name in self.available)
         super().__init__(
             f"robot '{robot}' has no frame '{frame}'{near(frame, self.available)}; "
-            f"its frames are: {', '.join(self.available)}"
+            f"its frames are: {', '.join(there)}"
         )
 
 

@@ -15,10 +15,14 @@ import pytest
 import trimesh
 import yourdfpy
 from PIL import Image
+from sliders import GANTRY, pair, urdf
 
+from synctrl import load_robot
+from synctrl.errors import RobotWarning
 from synctrl.robots.catalog import load_description
 from synctrl.robots.urdf import Description
 from synctrl.robots.urdf.regular import Unusable
+from synctrl.show import scene_of
 from synctrl.show.mesh_files import read_mesh
 from synctrl.show.meshes import MeshLibrary
 from synctrl.show.shapes import Shape, corners
@@ -76,6 +80,11 @@ def test_the_axis_that_a_collada_file_calls_up_plays_no_part_here_or_in_pinocchi
     ((shape, _),) = drawn(tmp_path / "a.dae", meshes.collada(unit=f"<up_axis>{axis}</up_axis>"))
     theirs = coal.MeshLoader().load(str(tmp_path / "a.dae"), np.ones(3)).vertices()
     np.testing.assert_allclose(box([shape]), [theirs.min(axis=0), theirs.max(axis=0)])
+
+
+def test_empty_lines_before_a_collada_file_do_no_harm(tmp_path):
+    ((shape, _),) = drawn(tmp_path / "a.dae", b" \n\n" + meshes.collada())
+    np.testing.assert_allclose(box([shape]), [[0, 0, 0], [1, 2, 3]])
 
 
 def test_nodes_within_nodes_draw_a_shape_as_often_as_they_say(tmp_path):
@@ -190,6 +199,17 @@ def test_a_gltf_file_opens_its_numbers_in_its_package_only(folder):
     for name in (b"../../outside.bin", b"pipe.png", b"/etc/passwd", b"none.bin"):
         with pytest.raises(Unusable):
             drawn(folder / "a.gltf", named % name)
+
+
+def test_the_scene_of_a_run_says_which_pictures_are_missing(tmp_path):
+    mesh = '<visual><geometry><mesh filename="package://none/meshes/gone.stl"/></geometry></visual>'
+    text = urdf("arm", GANTRY).replace('<link name="link1">', f'<link name="link1">{mesh}')
+    file = tmp_path / "arm.urdf"
+    file.write_text(text)
+    with pytest.warns(RobotWarning, match="gone.stl"):
+        robot = load_robot(file)
+    page = scene_of(pair((robot, robot)).simulate(dt=5e-3)).page()
+    assert page.count(": gone.stl</p>") == 2
 
 
 # -- a second opinion --------------------------------------------------------------------------------------

@@ -211,8 +211,15 @@ def test_the_longest_branch_bears_the_tip(tmp_path):
 
 def test_fingers_of_a_hand_that_was_asked_for_are_held(tmp_path):
     fingers = link("x") + joint("jx", "c", "x") + link("y") + joint("jy", "c", "y")
-    robot = loaded(tmp_path, robot_text(ARM + fingers), tip="c")
-    assert held(robot) == {"jx", "jy"}
+    for tip in ("c", "a"):
+        robot = loaded(tmp_path, robot_text(ARM + fingers), tip=tip)
+        assert held(robot) == {"jx", "jy"} and robot.joint_names == ("ja", "jb", "jc")
+
+
+def test_of_a_torso_that_carries_two_arms_as_the_tip_the_arms_are_held(tmp_path):
+    arms = chain("l1 l2 l3", "torso") + chain("r1 r2 r3", "torso")
+    robot = loaded(tmp_path, robot_text(chain("torso") + arms), tip="torso")
+    assert robot.joint_names == ("jtorso",)
 
 
 def test_an_arm_is_not_cut_behind_its_tip(tmp_path):
@@ -418,6 +425,25 @@ def test_moments_of_next_to_nothing_are_none_whatever_their_sign(tmp_path):
     assert robot.nv == 3
     again = robot.with_parameters(robot.inertial_parameters)
     np.testing.assert_allclose(again.mass_matrix(np.ones(3)), robot.mass_matrix(np.ones(3)), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("inertial", "said"),
+    [
+        (f'<mass value="0"/>{INERTIA.format(i=0.02)}', "assumed"),
+        ('<mass value="0.5"/>', "assumed"),
+        (f'<mass value="0"/>{INERTIA.format(i=0)}', None),
+        (INERTIA.format(i=0.02), "left out"),
+        ("", "left out"),
+    ],
+)
+def test_an_inertial_that_lacks_something_costs_nothing_on_a_fixed_link(inertial, said, tmp_path):
+    part = f'<link name="d"><inertial>{inertial}</inertial></link>'
+    mount = '<joint name="jd" type="fixed"><parent link="c"/><child link="d"/><origin xyz="0 0.1 0"/></joint>'
+    robot = loaded(tmp_path, robot_text(ARM + part + mount))
+    assert [note.kind for note in robot.report] == ([said] if said else [])
+    if said != "left out":
+        same_as_pinocchio(robot, tmp_path / "robot.urdf")
 
 
 def test_physically_consistent_adaptation_says_that_it_cannot_use_what_no_body_has(tmp_path):

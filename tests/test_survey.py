@@ -52,7 +52,7 @@ def tree(*edges: str, kind: str = "revolute", mass: float = 1.0) -> str:
         (tree("ab", "ac", "ad", "ae"), "wheels or fingers"),
         (tree("ab", "bc", "cd", "ae", "ef", "fg", "ah", "hi", "ij"), "more than two limbs"),
         (tree("ab", "bc", kind="fixed"), "nothing moves"),
-        (tree("ab", "bc", kind="floating"), "floating or planar joint"),
+        (tree("ab", "bc", kind="floating"), "a joint of several degrees of freedom"),
         (tree("ab", "bc", mass=0), "no masses"),
         (
             tree("ab").replace('<parent link="a"/>', '<parent link="x"/>'),
@@ -93,9 +93,7 @@ def test_a_difference_from_plain_pinocchio_is_found() -> None:
     robot, other = load_robot("planar2r"), survey_dynamics.pin.buildModelFromXML(PLANAR)
     other.inertias[2].mass *= 1.001
     errors = survey_dynamics.differences(robot, other)
-    assert errors["M"] > 1e-5
-    assert errors["C"] > 1e-5
-    assert errors["regressor"] < 1e-12
+    assert min(errors[name] for name in ("M", "C", "regressor")) > 1e-5
 
 
 @pytest.mark.skipif(not find_spec("xacro"), reason="needs the extra xacro")

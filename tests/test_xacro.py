@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from synctrl import load_robot
-from synctrl.errors import InputError, MissingDependencyError, RobotError
+from synctrl.errors import InputError, MissingDependencyError, RobotError, RobotWarning
 from synctrl.robots.urdf import xacro as xacro_module
 from synctrl.robots.urdf.xacro import expand_xacro
 
@@ -317,6 +317,17 @@ def test_arguments_for_another_kind_of_file_are_refused() -> None:
     file = load_robot("planar2r").document.file
     with pytest.raises(InputError, match="xacro_args"):
         load_robot(file, xacro_args={"a": 1})
+
+
+@pytest.mark.parametrize("use", ["", '<link name="${width}"/>'])
+def test_a_definition_in_a_urdf_is_left_out_if_nothing_uses_it(use: str, tmp_path: Path) -> None:
+    file = write(tmp_path / "arm.urdf", arm('<xacro:property name="width" value="1"/>' + use))
+    if use:
+        with pytest.raises(RobotError, match="unexpanded xacro"):
+            load_robot(file)
+    else:
+        with pytest.warns(RobotWarning, match="xacro:property"):
+            load_robot(file)
 
 
 CASE = Path(__file__).parent / "cases" / "urdf" / "xacro_file.xacro"

@@ -292,10 +292,8 @@ class Robot:
 
 def _moved(visual: pin.GeometryModel | None, base: pin.SE3) -> pin.GeometryModel | None:
     """Shapes with those fixed to the world moved along with the base."""
-    if visual is None:
-        return None
-    moved = visual.copy()
-    for shape in moved.geometryObjects:
+    moved = None if visual is None else visual.copy()
+    for shape in () if moved is None else moved.geometryObjects:
         if shape.parentJoint == 0:
             shape.placement = base * shape.placement
     return moved

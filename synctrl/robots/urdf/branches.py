@@ -48,11 +48,13 @@ class Branches:
         return self.chain(next((j.child for j in self.document.joints if j.name == tip), ""))
 
     def behind(self, chain: tuple[str, ...]) -> tuple[str, ...]:
-        """How a chain of joints goes on, as long as there is one way on that is no finger."""
+        """How a chain of joints goes on to the end of its arm; not at all if there are several ways on."""
         found: tuple[str, ...] = ()
-        while chain and len(on := self.next[(*chain, *found)[-1]]) == 1 and on[0] not in self.fingers:
+        on = [name for name in self.next[chain[-1]] if name not in self.fingers] if chain else []
+        while len(on) == 1:
             found += (on[0],)
-        return () if found and self.next[found[-1]] else found
+            on = [name for name in self.next[on[0]] if name not in self.fingers]
+        return () if on else found
 
     def carried_by(self, name: str) -> set[str]:
         """A moving joint and all that it carries."""

@@ -13,6 +13,7 @@ EXTENSIONS = ("gazebo", "transmission", "ros2_control", "sensor", "mujoco", "gro
 LINK_EXTENSIONS = ("contact", "surface", "gravity", "kinematic", "self_filter", "collision_checking")
 """Elements of other programs, which say nothing about the mechanism."""
 
+_DEFINITIONS = ("xacro:property", "xacro:arg")
 _EXPANDS = "a plain URDF"
 _ADVICE = "unexpanded xacro; expand the file with xacro first, or load the .xacro file itself"
 _CLOSES = ("loop_joint", "closed_loop", "loop_closure", "ball_constraint", "linear_bushing_rpy", "equality")
@@ -28,11 +29,14 @@ def everything(element: Element) -> Iterator[Element]:
 def refuse_xacro(root: Element) -> None:
     """Refuse macros, and expressions in the robot itself, wherever they stand.
 
+    Definitions that no expression uses say nothing.
+
     Raises:
         RobotError: with the advice to expand the file.
     """
+    unused = [child for child in root.children if child.tag in _DEFINITIONS and not child.children]
     for element in everything(root):
-        if element.tag.startswith("xacro:"):
+        if element.tag.startswith("xacro:") and element not in unused:
             element.refuse(_EXPANDS, f"<{shown_tag(element.tag)}>: {_ADVICE}")
     robot = (part for child in root.children if child.tag not in EXTENSIONS for part in everything(child))
     for element in (root, *robot):

@@ -38,7 +38,7 @@ def lock_joints(document: Document, positions: Mapping[str, float]) -> Document:
                 found=name,
             )
         _check_position(document, moving[name], finite_number(f"position of {moving[name].title}", position))
-    return _held(document, {name: float(position) for name, position in positions.items()})
+    return _fixed(document, {name: float(position) for name, position in positions.items()})
 
 
 def _check_position(document: Document, joint: Joint, position: float) -> None:
@@ -51,7 +51,7 @@ def _check_position(document: Document, joint: Joint, position: float) -> None:
         )
 
 
-def _held(document: Document, positions: Mapping[str, float]) -> Document:
+def _fixed(document: Document, positions: Mapping[str, float]) -> Document:
     joints = (j.fixed(positions[j.name]) if j.name in positions else j for j in document.joints)
     return replace(document, joints=tuple(joints))
 
@@ -73,19 +73,19 @@ def settle_locks(
     document, held = lock_joints(document, asked), {name: float(q) for name, q in asked.items()}
     steps = (partial(_leaders, tip=tip), partial(_followers, held=held), partial(_beside, tip=tip))
     for find in (*steps, partial(_massless, tip=tip)):
-        document = _hold(document, find(document), held, notes)
+        document = _hold_found(document, find(document), held, notes)
     document = _without_range(document, notes)
-    return _hold(document, _narrow(document), held, notes), held
+    return _hold_found(document, _narrow(document), held, notes), held
 
 
-def _hold(document: Document, found: Found, held: dict[str, float], notes: Notes) -> Document:
+def _hold_found(document: Document, found: Found, held: dict[str, float], notes: Notes) -> Document:
     """The document with what was found held, told and taken down."""
     moving = {joint.name: joint for joint in document.moving_joints}
     for name, (position, reason) in found.items():
         joint = moving[name]
         notes.add("locked", joint.title, f"held at {position:g} {joint.unit}: {reason}", joint.line)
         held[name] = position
-    return _held(document, {name: position for name, (position, _) in found.items()})
+    return _fixed(document, {name: position for name, (position, _) in found.items()})
 
 
 def _rest(joint: Joint) -> float:
