@@ -30,13 +30,13 @@ from benchmark_report import Table, is_installed, machine, markdown
 from naive_loop import BareCalls, NaiveLoop
 
 from synctrl import Experiment, load_robot
-from synctrl.compiled.run import Compiled
+from synctrl.compiled.engine import Compiled
 from synctrl.errors import SimulationError
 from synctrl.experiments import (
     a460_pair, mixed_four, mobile_robot, panda_four, planar_four, rigid_object, ur5_payload,
 )  # fmt: skip
 from synctrl.files import write_whole
-from synctrl.simulation.run import run_reference
+from synctrl.simulation.engines import run_reference
 
 DT = 1e-3
 MOST_STEPS = 10_000

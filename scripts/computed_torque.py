@@ -115,7 +115,7 @@ class Mujoco:
     def __init__(self, task: Task):
         import mujoco
 
-        from synctrl.simulation.mujoco_plant import MujocoArm
+        from synctrl.simulation.mujoco import MujocoArm
 
         self.mujoco, self.task, self.model = mujoco, task, MujocoArm(task.robot).model
         self.model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4

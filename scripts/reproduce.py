@@ -9,18 +9,17 @@ import argparse
 import sys
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
-from synctrl.analysis.identification import Identification, identify
+from synctrl.analysis.convergence import Identification, identify
 from synctrl.analysis.metrics import as_data, metrics, settling_bands, write_metrics
 from synctrl.errors import SynctrlError
-from synctrl.paper.batch import PlannedRun, run_all
 from synctrl.paper.claims import Claim
-from synctrl.paper.claims_a460 import a460_claims
-from synctrl.paper.claims_planar import own_findings, planar_four_claims
-from synctrl.paper.judge_section import judge_section
+from synctrl.paper.claims_of_cells import a460_claims, own_findings, planar_four_claims
+from synctrl.paper.judge import judge_section
 from synctrl.paper.paper_sections import (
     a460_section,
     honesty_section,
@@ -28,12 +27,15 @@ from synctrl.paper.paper_sections import (
     planar_section,
     trial_section,
 )
-from synctrl.paper.plant_sections import friction_section, full_a460_section, identification_section
+from synctrl.paper.plant_sections import (
+    friction_section,
+    full_a460_section,
+    identification_section,
+    step_section,
+)
 from synctrl.paper.report import Links, Section, write_page
-from synctrl.paper.reproduction import PLANNED, judge_runs, judged
-from synctrl.paper.step_section import step_section
-from synctrl.paper.theory import examine
-from synctrl.paper.theory_sections import baseline_section, certificate_section
+from synctrl.paper.reproduction import PLANNED, PlannedRun, judge_runs, judged, run_all
+from synctrl.paper.theory import baseline_section, certificate_section, examine
 from synctrl.show.animation import payload_pair_scene, planar_scene
 from synctrl.show.style import display
 from synctrl.simulation.result import Result
@@ -98,7 +100,7 @@ def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun]) -> Pat
     write_metrics(
         out / "metrics.json",
         {n: as_data(run, metrics(run, settling_bands(*peers(every, n)))) for n, run in every.items()},
-        [claim.as_data() for claim in claims],
+        [asdict(claim) for claim in claims],
         certificates={name: certificate.as_dict() for name, certificate in certificates.items()},
         comparisons=[comparison.as_dict() for comparison in comparisons],
         identification={title: [robot.as_dict() for robot in robots] for title, robots in learned.items()},

@@ -28,7 +28,7 @@ from synctrl.show.plots import new_figure, save, style
 from synctrl.show.style import ACCENT, PALETTE
 from synctrl.sweep import LogUniform, Sweep, Uniform, gain, load, model_error
 from synctrl.sweep.measures import MEASURES, measures
-from synctrl.sweep.prepared import Prepared
+from synctrl.sweep.worker import Prepared
 
 DURATION, DT = 2.0, 2e-3  # s
 FACTORS = (

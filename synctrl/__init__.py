@@ -15,10 +15,9 @@ from .robots.friction import Friction
 from .robots.friction_parameters import FrictionParameters
 from .robots.parameters import FullParameters, LinearParameters
 from .robots.robot import Robot
-from .simulation.disturbances import Disturbance
-from .simulation.mujoco_model import mujoco_model
-from .simulation.payloads import Payload
+from .simulation.mujoco import mujoco_model
 from .simulation.result import Result
+from .simulation.schedules import Disturbance, Payload
 from .simulation.simulate import Experiment, simulate
 from .tasks.inverse_kinematics import inverse_kinematics
 from .tasks.pose import PoseSpace

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from typing import Any
 from unicodedata import category
 
 import numpy as np
@@ -133,6 +134,27 @@ def instance(name: str, value: object, kind: type | tuple[type, ...], expected: 
     """
     if not isinstance(value, kind):
         raise InputError(f"expected {expected}, found {type(value).__name__}", subject=name)
+
+
+def offers(name: str, value: Any, parts: tuple[str, ...], expected: str) -> None:
+    """Refuse what does not offer all of some attributes, and a class in place of an object.
+
+    Raises:
+        InputError: `value` is a class, or lacks one.
+    """
+    if isinstance(value, type) or not all(hasattr(value, part) for part in parts):
+        raise InputError(f"expected {expected}, found {value!r}", subject=name)
+
+
+def shaped(name: str, value: Any, shape: tuple[int, ...]) -> None:
+    """Refuse an array of another shape.
+
+    Raises:
+        InputError: `value` has another shape.
+    """
+    if np.shape(value) != shape:
+        found = np.shape(value)
+        raise InputError(f"expected an array of shape {shape}, found {found}", subject=name, found=found)
 
 
 def choice(name: str, value: object, known: tuple[str, ...]) -> str:

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import Any, Self
 
 
 class Portable(BaseException):
@@ -65,6 +65,11 @@ class SynctrlError(Portable, Exception):
         vars(self).update({name: value for name, value in data.items() if value is not None})
         self.problem = message
         super().__init__(self._whole(message))
+
+    def about(self, subject: str | None = None, **data: Any) -> Self:
+        """This error with more data, for one whose message says in words of its own what it is about."""
+        vars(self).update(subject=subject, **data)
+        return self
 
     def _whole(self, message: str) -> str:
         """The message with what it begins with."""
@@ -243,9 +248,7 @@ def failed(what: str, t: float, error: Exception, robot: int | None = None) -> S
         robot: index of the robot concerned, counted from 0, or None.
     """
     message = f"{what} failed at t = {t:g} s with {type(error).__name__}: {error}"
-    stop = SimulationError(message, time=t, robot=robot)
-    stop.subject = what
-    return stop
+    return SimulationError(message, time=t, robot=robot).about(what)
 
 
 def _remade(kind: type[BaseException], args: tuple) -> BaseException:

@@ -14,34 +14,50 @@ from .errors import warn
 
 T = TypeVar("T")
 
-#: rooms that modules have left, the room they are in now, and their names
-_MOVES = (
-    (
-        "tasks",
-        "coupling",
-        "cell coupling desired expansion graphs member_checks member_parameters motion_checks reachability "
-        "synchronization weight_checks weights",
-    ),
-    ("analysis", "paper", "baselines claims claims_a460 claims_planar judge matching trials"),
-    ("experiments", "paper", "batch reproduction theory"),
-    (
-        "show",
-        "paper",
-        "formulas judge_section paper_sections plant_sections report step_section theory_sections",
-    ),
-    ("simulation", "sweep", "prepared"),
-)
+#: the room that modules have left, the one they are in now, and their names
+_MOVES = {
+    "tasks coupling": "cell coupling desired expansion graphs member_checks reachability "
+    "synchronization weights",
+    "analysis paper": "baselines claims judge trials",
+    "experiments paper": "reproduction theory",
+    "show paper": "paper_sections plant_sections report",
+}
 _URDF = "checks", "document", "meshes", "reader", "writer", "xml"
-#: modules that are a part of another one now
-_PARTS = {"experiments.judged": "paper.judge", "show.judge_plots": "paper.judge_section"}
+#: modules of today, and those that are a part of them now
+_PARTS = {
+    "analysis.convergence": "analysis.identification",
+    "tasks.measurement": "tasks.tips",
+    "coupling.desired": "tasks.weight_checks",
+    "coupling.member_checks": "tasks.member_parameters",
+    "coupling.reachability": "tasks.motion_checks",
+    "experiments.a460_pair": "experiments.a460_full",
+    "experiments.panda_four": "experiments.circles",
+    "paper.claims_of_cells": "analysis.claims_a460 analysis.claims_planar",
+    "paper.judge": "experiments.judged show.judge_plots show.judge_section",
+    "paper.plant_sections": "show.step_section",
+    "paper.report": "show.formulas",
+    "paper.reproduction": "experiments.batch",
+    "paper.theory": "show.theory_sections",
+    "paper.trials": "analysis.matching",
+    "simulation.closed_loop": "simulation.state",
+    "simulation.controls": "simulation.sampled",
+    "simulation.limits": "simulation.damping",
+    "simulation.mujoco": "simulation.mujoco_plant",
+    "simulation.schedules": "simulation.disturbances simulation.payloads",
+    "sweep.description": "sweep.identity",
+    "sweep.journal": "sweep.table",
+    "sweep.sweep": "sweep.study",
+    "sweep.worker": "simulation.prepared",
+}
 
 
 def _pairs() -> Iterator[tuple[str, str]]:
     """Old and new names, within the package."""
-    for old, new, names in _MOVES:
+    for rooms, names in _MOVES.items():
+        old, new = rooms.split()
         yield from ((f"{old}.{name}", f"{new}.{name}") for name in names.split())
     yield from ((f"robots.urdf_{name}", f"robots.urdf.{name}") for name in _URDF)
-    yield from _PARTS.items()
+    yield from ((old, new) for new, names in _PARTS.items() for old in names.split())
 
 
 #: old names and new ones

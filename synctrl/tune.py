@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -20,14 +21,13 @@ from .control.gains import Gains
 from .errors import InputError, SweepError
 from .simulation.simulate import Experiment
 from .sweep.distributions import LogUniform, Uniform
-from .sweep.draws import Generations
-from .sweep.evaluation import CrewOptions, Evaluation, progress_bar
+from .sweep.evaluation import Evaluation, Evaluator, progress_bar
 from .sweep.factors import Factor, gain
 from .sweep.journal import Journal
-from .sweep.measures import MEASURES, torque_unit
-from .sweep.rows import COMPLETED, columns
-from .sweep.study import Study, StudyOptions
-from .sweep.worker import Job, Task
+from .sweep.measures import MEASURES, torque_unit, warn_of
+from .sweep.rows import COMPLETED, Generations, columns
+from .sweep.sweep import Study, StudyOptions
+from .sweep.worker import Task
 
 Range = Uniform | LogUniform
 
@@ -95,7 +95,7 @@ def tune(
         SweepError: no run stayed within the torque limit, ran to its end and has the measure.
     """
     finder = _Search(Study(experiment, _factors(search), **options), minimize, torque_limit, population)
-    crew = CrewOptions(workers=workers, backend=backend, client=client)
+    crew = partial(Evaluation, workers=workers, backend=backend, client=client)
     return finder.find(count("generations", generations), folder, progress, crew)
 
 
@@ -110,27 +110,23 @@ class _Search:
         self.runs = Generations({factor.name: factor.values for factor in study.factors}, self.population)
         self.history: list[dict[str, Any]] = []
 
-    def about(self, job: Job) -> dict[str, Any]:
-        """What the search is, but not how long: it can go on for more generations."""
+    def find(self, generations: int, folder: str | Path | None, progress: bool, crew: Evaluator) -> Tuned:
+        """Make all runs, in a folder if there is one, and return the best; more generations may follow."""
         limit = self.limit if np.isfinite(self.limit) else None
-        more = {"minimize": self.minimize, "torque_limit": limit, "population": self.population}
-        return self.study.about(job, search=more)
-
-    def find(self, generations: int, folder: str | Path | None, progress: bool, crew: CrewOptions) -> Tuned:
-        """Make all runs, in a folder if there is one, and return the best."""
+        search = {"minimize": self.minimize, "torque_limit": limit, "population": self.population}
         with contextlib.ExitStack() as stack:
             journal = None if folder is None else stack.enter_context(Journal(folder))
             job = self.study.job(None if journal is None else journal.known())
             if journal is not None:
-                journal.begin(self.about(job), self.runs)
-            evaluation = Evaluation(job, journal, **crew)
+                journal.begin(self.study.about(job, search=search), self.runs)
+            evaluation = crew(job, journal)
             stack.enter_context(evaluation.open())
             runs = self.population * (1 + generations)
             bar = stack.enter_context(progress_bar(runs, 0, progress))
             self.run(generations, evaluation, bar)
             if journal is not None:
                 journal.finish()
-        evaluation.doubts.warn("tune", self.study.base.dt)
+        warn_of(evaluation.doubts, "tune", self.study.base.dt)
         return self.best()
 
     def run(self, generations: int, evaluation: Evaluation, bar: Any) -> None:
@@ -176,14 +172,13 @@ class _Search:
         best = min(self.history, key=self.cost)
         if self.cost(best) >= 1:
             unit = torque_unit(self.study.base.experiment.cell)
-            torques = [row["peak_torque"] for row in self.history if row["peak_torque"] is not None]
-            least = (
-                f"the smallest peak torque was {min(torques):.4g} {unit}" if torques else "all runs stopped"
-            )
+            torque = min((x for row in self.history if (x := row["peak_torque"]) is not None), default=None)
+            least = f"the smallest peak torque was {torque:.4g} {unit}" if torque else "all runs stopped"
             raise SweepError(
                 f"none of {len(self.history)} runs stayed within a torque of {self.limit:g} {unit} to its "
                 f"end and has a {self.minimize}; {least}; search other ranges, or allow more torque",
-                subject="tune",
+                subject="search" if torque is None else "torque_limit" if torque > self.limit else "minimize",
+                found=torque,
             )
         values = {factor.name: best[factor.name] for factor in self.study.factors}
         experiment = self.study.base.experiment
@@ -192,23 +187,15 @@ class _Search:
         return Tuned(values, experiment, {name: best[name] for name in MEASURES}, self.history)
 
     def _generation(self, shares: np.ndarray, evaluation: Evaluation, bar: Any) -> list[dict[str, Any]]:
-        tasks = [
-            Task(
-                len(self.history) + k,
-                tuple(self._value(f, s) for f, s in zip(self.study.factors, share, strict=True)),
-            )
-            for k, share in enumerate(shares)
-        ]
+        ranges: list[Any] = [factor.values for factor in self.study.factors]
+        values = [tuple(x.at(float(s)) for x, s in zip(ranges, share, strict=True)) for share in shares]
+        tasks = [Task(run, each) for run, each in enumerate(values, start=len(self.history))]
         for _ in evaluation.run(tasks):
             pass
         bar.update(len(tasks))
         rows = [dict(zip(self.columns, evaluation.rows[task.run], strict=True)) for task in tasks]
         self.history += rows
         return rows
-
-    @staticmethod
-    def _value(factor: Factor, share: float) -> float:
-        return factor.values.at(float(share))  # type: ignore[attr-defined]
 
 
 def _factors(search: Mapping[str, Range] | Sequence[Factor]) -> list[Factor]:

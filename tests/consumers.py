@@ -7,15 +7,13 @@ from collections.abc import Callable
 from typing import Any
 
 from synctrl.analysis.certify import certify
-from synctrl.analysis.convergence import convergence
+from synctrl.analysis.convergence import convergence, identify
 from synctrl.analysis.gain_condition import gain_condition
-from synctrl.analysis.identification import identify
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.analysis.metrics import as_data, metrics, row_names, settling_bands
 from synctrl.errors import SynctrlError
-from synctrl.paper.judge import compare_runs
-from synctrl.paper.judge_section import differences
-from synctrl.paper.step_section import step_section
+from synctrl.paper.judge import compare_runs, differences
+from synctrl.paper.plant_sections import step_section
 from synctrl.show import scene_of
 from synctrl.show.animation import payload_pair_scene, planar_scene
 from synctrl.show.layout import cell_layout

@@ -37,12 +37,12 @@ from synctrl.experiments import (
     planar_four,
     ur5_payload,
 )
-from synctrl.experiments.circles import circle_cell
 from synctrl.experiments.mixed_four import STATIONS
+from synctrl.experiments.panda_four import circle_cell
 from synctrl.show.plots import joint_trajectories, save, sync_errors, tracking_errors
-from synctrl.simulation.payloads import Payload
 from synctrl.simulation.result import LAYOUT
-from synctrl.sweep.prepared import Prepared
+from synctrl.simulation.schedules import Payload
+from synctrl.sweep.worker import Prepared
 
 DT = 1e-3
 
@@ -93,7 +93,7 @@ def loaded() -> Experiment:
 def in_turn() -> Experiment:
     """Different arms in the order ABAB."""
     a, b, c, d = STATIONS
-    return circle_cell((a, c, b, d), "mixed cell, in turn", None, synchronized=True)
+    return circle_cell((a, c, b, d), "mixed cell, in turn", None, synchronized=True, parts={})
 
 
 #: every kind of space, weight, parameter and plant, in the engines that have it

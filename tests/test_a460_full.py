@@ -14,7 +14,7 @@ from synctrl.analysis.certify import certify
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.errors import InputError, NonFiniteError
 from synctrl.experiments import a460_full_pair, a460_pair
-from synctrl.experiments.a460_full import WRIST
+from synctrl.experiments.a460_pair import WRIST
 from synctrl.robots.documents import lock
 from synctrl.robots.limits import joint_limits
 from synctrl.robots.urdf import describe
@@ -227,7 +227,7 @@ def test_a_wrist_that_is_no_longer_finite_stops_the_run() -> None:
     loop = a460_full_pair().closed_loop()
     y = loop.initial_state()
     y[-1] = np.nan
-    with pytest.raises(NonFiniteError, match="plant's own state"):
+    with refused(NonFiniteError, time=0.3, robot=None):
         Guard(loop).check(Sample(0.3, y, np.zeros((2, 3)), None))
 
 

@@ -24,7 +24,7 @@ from synctrl import (
     Robot,
     load_robot,
 )
-from synctrl.analysis.identification import LEARNED, identify
+from synctrl.analysis.convergence import LEARNED, identify
 from synctrl.errors import InputError, RobotError
 from synctrl.experiments import a460_pair
 from synctrl.robots.base_parameters import group_columns, grouping, parameters_of

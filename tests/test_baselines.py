@@ -12,8 +12,7 @@ from theory_cells import GAINS, coupling, experiment
 from synctrl.errors import InputError, SimulationError
 from synctrl.experiments import a460_pair, planar_four
 from synctrl.paper.baselines import Comparison, ablation, compare
-from synctrl.paper.matching import match_peak_torque
-from synctrl.paper.trials import Bench, measure
+from synctrl.paper.trials import Bench, match_peak_torque, measure
 
 SHORT = {"duration": 0.05, "dt": 1e-3}
 

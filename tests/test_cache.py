@@ -19,7 +19,7 @@ import pytest
 import test_imports
 from refusals import refused
 
-from synctrl.compiled import build, cache, compiler, elf
+from synctrl.compiled import build, cache, compiler
 from synctrl.errors import CompilationError, InputError, MissingDependencyError
 
 SOURCE = "int answer(void) { return 42; }"
@@ -93,10 +93,9 @@ def test_the_folder_and_what_is_in_it_are_for_this_user_alone(folder, umask):
 def test_a_folder_that_others_may_write_is_refused_and_nothing_in_it_is_run(folder, tmp_path, bits):
     plant(folder, tmp_path / "ran")
     folder.chmod(bits)
-    with pytest.raises(CompilationError) as caught:
+    with refused(CompilationError, file=str(folder), found="can be written by others") as caught:
         fetch()
     said = str(caught.value)
-    assert f"'{folder}'" in said
     assert f"mode {bits:04o}" in said
     assert "chmod go-w" in said
     assert "SYNCTRL_CACHE" in said
@@ -242,8 +241,8 @@ def test_a_library_cut_short_under_a_digest_that_fits_is_built_again(folder, mon
 def test_no_part_of_a_library_counts_as_a_whole_one(folder):
     fetch()
     whole = (folder / "key.so").read_bytes()
-    assert elf.is_whole(whole)
-    assert not any(elf.is_whole(whole[:k]) for k in range(len(whole)))
+    assert build.is_whole(whole)
+    assert not any(build.is_whole(whole[:k]) for k in range(len(whole)))
 
 
 def test_headers_of_any_content_are_judged_without_an_error():
@@ -251,7 +250,7 @@ def test_headers_of_any_content_are_judged_without_an_error():
         for order in (1, 2, 3):
             for filler in (b"\x00", b"\x01", b"\xff"):
                 content = b"\x7fELF" + bytes([wide, order]) + filler * 200
-                assert elf.is_whole(content) in (False, True)
+                assert build.is_whole(content) in (False, True)
 
 
 @pytest.mark.parametrize("content", [b"", b"nonsense", b"\xff" * 64, b"0" * 1000])
@@ -292,7 +291,7 @@ def test_what_happens_to_the_file_later_does_not_reach_a_process_that_has_loaded
 
 def wrong(library: ctypes.CDLL) -> None:
     if library.answer() != 42:
-        raise CompilationError("another answer")
+        raise CompilationError("another answer", subject="answer")
 
 
 def test_what_comes_from_the_cache_is_checked_and_built_again_if_it_fails(folder, tmp_path):
@@ -302,7 +301,7 @@ def test_what_comes_from_the_cache_is_checked_and_built_again_if_it_fails(folder
 
 
 def test_code_that_fails_the_check_is_not_kept(folder):
-    with pytest.raises(CompilationError, match="another answer"):
+    with refused(CompilationError, "answer"):
         fetch(source="int answer(void) { return 13; }", check=wrong)
     assert not list(folder.iterdir())
 
@@ -337,7 +336,7 @@ def as_compiler(tmp_path: Path, monkeypatch, body: str) -> None:
     ("named", "said"),
     [
         ("''", "'' is no name"),
-        ("gcc 'half", "cannot be split into words"),
+        ("gcc 'half", '"gcc \'half" cannot be split into words'),
         ("no-such-compiler", "'no-such-compiler' was not found"),
         ("/no/such/compiler -O2", "'/no/such/compiler' was not found"),
         ("/usr", "'/usr' is a folder"),
@@ -346,10 +345,8 @@ def as_compiler(tmp_path: Path, monkeypatch, body: str) -> None:
 )
 def test_a_compiler_that_cannot_be_used_is_named(folder, monkeypatch, named, said):
     monkeypatch.setenv("CC", named)
-    with pytest.raises(MissingDependencyError) as caught:
+    with refused(MissingDependencyError, "CC", found=said):
         fetch()
-    assert said in str(caught.value)
-    assert "CC" in str(caught.value)
 
 
 @pytest.mark.parametrize("named", ["", "   "])
@@ -360,13 +357,19 @@ def test_an_empty_name_is_none(folder, monkeypatch, named):
 
 FAULTS = {
     "writes nothing": ("exit 0", "ended without an error, but wrote no 'part0.o'"),
-    "writes an empty file": (': > "$(eval echo \\${$#})"', "wrote no 'part0.o'"),
+    "writes an empty file": (
+        ': > "$(eval echo \\${$#})"',
+        "ended without an error, but wrote no 'part0.o'",
+    ),
     "writes junk": ('echo junk > "$(eval echo \\${$#})"', "wrote what cannot be loaded as a library"),
-    "links nothing": ('case "$*" in *-shared*) ;; *) cc "$@";; esac', "wrote no 'library.so'"),
-    "refuses": ("echo no such flag >&2; exit 3", "refused generated code:\nno such flag"),
-    "refuses without a word": ("exit 3", "refused generated code with status 3"),
+    "links nothing": (
+        'case "$*" in *-shared*) ;; *) cc "$@";; esac',
+        "ended without an error, but wrote no 'library.so'",
+    ),
+    "refuses": ("echo no such flag >&2; exit 3", "refused generated code"),
+    "refuses without a word": ("exit 3", "refused generated code"),
     "prints bytes that are no text": ("printf '\\377\\376'; exit 3", "refused generated code"),
-    "prints without end": ("exec yes", "printed without end"),
+    "prints without end": ("exec yes", "printed without end and was stopped"),
     "dies": ("kill -9 $$", "was ended by signal 9"),
 }
 
@@ -375,15 +378,20 @@ FAULTS = {
 def test_a_compiler_that_does_not_compile_is_told_from_other_faults(folder, tmp_path, monkeypatch, name):
     body, said = FAULTS[name]
     as_compiler(tmp_path, monkeypatch, body)
-    with pytest.raises(CompilationError) as caught:
+    with refused(CompilationError, "C compiler", found=said):
         fetch()
-    assert said in str(caught.value)
     assert not list(folder.iterdir())
+
+
+def test_what_a_compiler_has_printed_is_told(folder, tmp_path, monkeypatch):
+    as_compiler(tmp_path, monkeypatch, "echo no such flag >&2; exit 3")
+    with pytest.raises(CompilationError, match="no such flag"):
+        fetch()
 
 
 def test_a_file_that_is_no_program_is_said(folder, tmp_path, monkeypatch):
     monkeypatch.setenv("CC", str(script(tmp_path / "compiler", "\x00\x01\x02")))
-    with pytest.raises(CompilationError, match="cannot be run"):
+    with refused(CompilationError, "C compiler", found="cannot be run"):
         build.content_key("code")
 
 
@@ -414,7 +422,7 @@ HANGS = {
 def test_a_compiler_that_hangs_is_stopped_with_its_children(folder, tmp_path, monkeypatch, name):
     as_compiler(tmp_path, monkeypatch, HANGS[name].format(pid=tmp_path / "pid"))
     monkeypatch.setattr(compiler, "LONGEST", 0.5)
-    with pytest.raises(CompilationError, match=r"did not end within 0\.5 s and was stopped"):
+    with refused(CompilationError, "C compiler", found="did not end within 0.5 s and was stopped"):
         fetch()
     wait_until_gone(int((tmp_path / "pid").read_text()))
     assert not list(folder.iterdir())
@@ -429,7 +437,7 @@ def test_a_child_that_a_compiler_leaves_behind_is_ended_and_not_waited_for(folde
 def test_a_compiler_that_does_not_say_its_version_is_stopped(folder, tmp_path, monkeypatch):
     monkeypatch.setenv("CC", str(script(tmp_path / "compiler", "#!/bin/sh\nexec sleep 1000\n")))
     monkeypatch.setattr(compiler, "LONGEST_VERSION", 0.2)
-    with pytest.raises(CompilationError, match="did not end"):
+    with refused(CompilationError, "C compiler", found="did not end within 0.2 s and was stopped"):
         build.content_key("code")
 
 
@@ -530,9 +538,8 @@ def test_a_home_that_is_not_known_is_said(monkeypatch):
 
 def test_a_file_in_the_place_of_the_folder_is_said(folder):
     folder.write_text("a file")
-    with refused(CompilationError, found=os.strerror(errno.ENOTDIR)) as caught:
+    with refused(CompilationError, file=str(folder), found=os.strerror(errno.ENOTDIR)):
         fetch()
-    assert str(folder) in str(caught.value)
     os.environ["SYNCTRL_CACHE"] = str(folder / "below")
     with refused(CompilationError, found=os.strerror(errno.ENOTDIR)):
         fetch()
@@ -584,7 +591,7 @@ def test_a_private_folder_that_somebody_else_has_made_is_refused(temporary, monk
     temporary.chmod(0o1777)
     (temporary / f"synctrl-{os.geteuid()}").mkdir()
     os.chown(temporary / f"synctrl-{os.geteuid()}", OTHER, OTHER)
-    with pytest.raises(CompilationError, match="belongs to another user"):
+    with refused(CompilationError, found="belongs to another user"):
         fetch()
 
 
@@ -634,10 +641,8 @@ def test_a_cache_where_nothing_may_be_executed_works_by_way_of_the_temporary_fil
 def test_where_nothing_may_be_executed_at_all_is_said(temporary, noexec, monkeypatch):
     monkeypatch.setenv("SYNCTRL_CACHE", str(noexec))
     monkeypatch.setattr(tempfile, "tempdir", str(noexec))
-    with pytest.raises(CompilationError, match="nothing may be written and executed") as caught:
+    with refused(CompilationError, file=str(noexec), found="noexec"):
         fetch()
-    assert f"'{noexec}'" in str(caught.value)
-    assert "noexec" in str(caught.value)
 
 
 def test_what_the_system_says_of_places_is_believed(temporary, folder, monkeypatch):
@@ -646,7 +651,7 @@ def test_what_the_system_says_of_places_is_believed(temporary, folder, monkeypat
     assert fetch().answer() == 42
     forget(monkeypatch)
     monkeypatch.setattr(cache, "_is_executable", lambda place: False)
-    with pytest.raises(CompilationError, match="nothing may be written and executed"):
+    with refused(CompilationError, file=str(folder), found="noexec"):
         fetch()
 
 
@@ -655,9 +660,8 @@ def test_a_full_disk_is_said(folder, monkeypatch):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(Path, "replace", full)
-    with pytest.raises(CompilationError, match=os.strerror(errno.ENOSPC)) as caught:
+    with refused(CompilationError, file=str(folder), found=os.strerror(errno.ENOSPC)):
         fetch()
-    assert f"cannot write to the cache '{folder}'" in str(caught.value)
     assert not list(folder.iterdir())
 
 

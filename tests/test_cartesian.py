@@ -7,6 +7,7 @@ import pytest
 from flows import derivative, desired_flow, joint_flow
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 from theory_cells import planar_arm
 
 from synctrl import (
@@ -142,7 +143,7 @@ def through_the_base(singularity: str | Damping, gains: Gains = GAINS) -> Experi
 
 
 def test_a_run_stops_at_a_singular_jacobian_and_says_where():
-    with pytest.raises(SingularJacobianError, match=r"robot 2 is singular at t = ") as caught:
+    with refused(SingularJacobianError, robot=1, cause="singular") as caught:
         through_the_base("stop", GAINS.independent()).simulate(dt=5e-3)
     assert caught.value.robot == 1 and 0 < caught.value.time < 2
     assert caught.value.result.t[-1] < caught.value.time + 1e-9
@@ -184,7 +185,7 @@ def test_a_redundant_arm_at_the_border_of_its_workspace_stops_the_run():
     stretched = np.array([0.3, 1e-5, 1e-5])
     member = Member(THREE, Hold(THREE.tip_position(stretched)[:2]), stretched)
     cell = Cell([member, member], Coupling.pair(), CartesianSpace("xy"))
-    with pytest.raises(SingularJacobianError, match="robot 1 is singular at t = 0 s"):
+    with refused(SingularJacobianError, robot=0, time=0.0):
         Experiment(cell, GAINS, 1.0).simulate()
 
 
@@ -194,7 +195,7 @@ def test_an_orientation_error_near_half_a_turn_stops_the_run_and_names_the_robot
     turned = pose.rotation @ np.diag([-1.0, -1.0, 1.0])
     motions = [PoseTrajectory(Hold(pose.translation), AxisRotation.fixed(R)) for R in (pose.rotation, turned)]
     cell = Cell([Member(UR5, motion, q) for motion in motions], Coupling.pair(), PoseSpace())
-    with pytest.raises(OrientationError, match=r"robot 2 is 3\.14 rad at t = 0 s") as caught:
+    with refused(OrientationError, robot=1, time=0.0) as caught:
         Experiment(cell, GAINS, 1.0).simulate()
     assert caught.value.robot == 1 and caught.value.time == 0
 
@@ -203,21 +204,21 @@ def test_an_orientation_error_near_half_a_turn_stops_the_run_and_names_the_robot
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    "options",
     [
-        ({"axes": "xw"}, "different letters out of x, y, z, found 'xw'"),
-        ({"axes": ""}, "different letters"),
-        ({"axes": "xx"}, "different letters"),
-        ({"singularity": "ignore"}, "expected one of 'stop', 'damped', found 'ignore'"),
-        ({"max_condition": 0}, "max_condition: expected a number above 0"),
-        ({"redundancy": 3}, "redundancy: expected a Redundancy, found int"),
+        {"axes": "xw"},
+        {"axes": ""},
+        {"axes": "xx"},
+        {"singularity": "ignore"},
+        {"max_condition": 0},
+        {"redundancy": 3},
     ],
 )
-def test_options_that_mean_nothing_are_refused(options, message):
-    with pytest.raises(InputError, match=message):
+def test_options_that_mean_nothing_are_refused_by_name(options):
+    with refused(InputError, *options):
         CartesianSpace(**options)
 
 
 def test_robots_of_different_kinds_are_sent_to_cartesian_space():
-    with pytest.raises(InputError, match="Cartesian space"):
+    with refused(InputError, "joint space"):
         JointSpace().bind([UR5, PANDA])

@@ -226,5 +226,5 @@ def test_a_compiled_run_from_rest_on_its_path_is_known_again_and_keeps_the_ident
 def test_a_run_with_slightly_other_gains_is_another_one() -> None:
     run = experiment(coupling("pair", 2, 2))
     other = replace(run, gains=replace(GAINS, Lambda=1.001 * GAINS.Lambda))
-    with pytest.raises(InputError, match="expected the one that made the result"):
+    with refused(InputError, "experiment", found="v_error"):
         replay(run.simulate(0.03, 1e-3), other)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 from refusals import refused
 
 from synctrl.errors import InputError
-from synctrl.paper import claims, claims_a460, claims_planar
+from synctrl.paper import claims, claims_of_cells
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def with_error(run, **arrays):
 
 
 def test_the_claims_on_the_four_arms_hold(planar):
-    found = claims_planar.planar_four_claims(planar)
+    found = claims_of_cells.planar_four_claims(planar)
     assert len(found) == 7
     for claim in found:
         assert claim.holds, claim.text
@@ -37,21 +37,21 @@ def test_the_claims_on_the_four_arms_hold(planar):
 
 def test_a_touched_robot_is_noticed(planar):
     before, after = planar["independent"], planar["independent_disturbed"]
-    assert claims_planar.others_are_untouched(before, after).holds
+    assert claims_of_cells.others_are_untouched(before, after).holds
     x = np.array(after.x)
     x[-1, 2, 0] = np.nextafter(x[-1, 2, 0], np.inf)
-    assert not claims_planar.others_are_untouched(before, with_error(after, x=x)).holds
-    assert not claims_planar.others_are_untouched(before, before).holds, "nothing was disturbed"
+    assert not claims_of_cells.others_are_untouched(before, with_error(after, x=x)).holds
+    assert not claims_of_cells.others_are_untouched(before, before).holds, "nothing was disturbed"
 
 
 def test_a_changed_synchronization_error_is_noticed(planar):
     before, after = planar["independent"], planar["independent_disturbed"]
     epsilon = np.array(after.sync_error)
     epsilon[7, 1, 0] += 1e-12
-    assert not claims_planar.only_adjacent_sync_errors_grow(
+    assert not claims_of_cells.only_adjacent_sync_errors_grow(
         before, with_error(after, sync_error=epsilon)
     ).holds
-    assert not claims_planar.only_adjacent_sync_errors_grow(before, before).holds
+    assert not claims_of_cells.only_adjacent_sync_errors_grow(before, before).holds
 
 
 def test_an_error_that_stays_does_not_converge(planar):
@@ -70,16 +70,16 @@ def test_synchronization_that_helps_one_axis_only_is_not_enough(planar):
 
 
 def test_robots_that_do_not_follow_are_noticed(planar):
-    assert not claims_planar.others_move_along(planar["independent"], planar["independent_disturbed"]).holds
+    assert not claims_of_cells.others_move_along(planar["independent"], planar["independent_disturbed"]).holds
 
 
 def test_missing_runs_are_named():
     with refused(InputError, "claims", found=("independent", "frictionless")):
-        claims_a460.a460_claims({"synchronized": None})
+        claims_of_cells.a460_claims({"synchronized": None})
 
 
 def test_a_claim_is_plain_data(planar):
-    data = claims.errors_converge(planar["synchronized"], "theorem 2").as_data()
+    data = asdict(claims.errors_converge(planar["synchronized"], "theorem 2"))
     assert data["holds"] is True
     assert data["source"] == "theorem 2"
     assert {"name", "value", "unit"} == set(data["figures"][0])

@@ -24,8 +24,8 @@ from synctrl import (
     Result,
     load_robot,
 )
+from synctrl.analysis.convergence import identify
 from synctrl.analysis.gain_condition import gain_condition
-from synctrl.analysis.identification import identify
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.coupling.weights import Weights
 from synctrl.errors import InputError, SimulationError
@@ -105,20 +105,20 @@ def test_damping_in_task_space_has_as_many_entries_for_every_robot() -> None:
 
 
 @pytest.mark.parametrize(
-    ("K_r", "says"),
+    ("K_r", "subject", "data"),
     [
-        (([1.0], [1.0, 2.0, 3.0]), r"a row for each robot, of 2, 3 entries, found rows of 1, 3"),
-        (([1.0, 2.0, 3.0], [1.0, 2.0]), r"of 2, 3 entries, found rows of 3, 2"),
-        (([1.0, 2.0],), r"\(2, 3\), or a row for each robot, of 2, 3 entries, found \(1, 2\)"),
-        (([1.0, 2.0], [1.0, 2.0, 3.0], [1.0]), "found rows of 2, 3, 1"),
-        (([1.0, 2.0], [1.0, np.nan, 3.0]), r"K_r: row 2: expected finite"),
-        (([1.0, 2.0], [1.0, 0.0, 3.0]), "K_r: expected entries above 0, found 0"),
-        (([1.0, "2"], [1.0, 0.0, 3.0]), "K_r: row 1: expected numbers"),
-        (([[1.0], [2.0]], [[1.0], [0.0], [3.0]]), "K_r: expected numbers"),
+        (([1.0], [1.0, 2.0, 3.0]), "K_r", {"found": (1, 3)}),
+        (([1.0, 2.0, 3.0], [1.0, 2.0]), "K_r", {"found": (3, 2)}),
+        (([1.0, 2.0],), "K_r", {"found": (1, 2)}),
+        (([1.0, 2.0], [1.0, 2.0, 3.0], [1.0]), "K_r", {"found": (2, 3, 1)}),
+        (([1.0, 2.0], [1.0, np.nan, 3.0]), "K_r: row 2", {}),
+        (([1.0, 2.0], [1.0, 0.0, 3.0]), "K_r", {"found": 0.0}),
+        (([1.0, "2"], [1.0, 0.0, 3.0]), "K_r: row 1", {}),
+        (([[1.0], [2.0]], [[1.0], [0.0], [3.0]]), "K_r", {}),
     ],
 )
-def test_rows_that_do_not_fit_the_robots_are_told_what_does(K_r, says: str) -> None:
-    with pytest.raises(InputError, match=says):
+def test_rows_that_do_not_fit_the_robots_are_refused(K_r, subject: str, data: dict) -> None:
+    with refused(InputError, subject, **data):
         mixed(K_r)
 
 
@@ -173,21 +173,21 @@ def test_evaluate_refuses_other_sizes(name: str, wrong) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "says"),
+    ("change", "subject"),
     [
-        (lambda r: None, "reference: expected a Reference"),
-        (lambda r: replace(r, desired=r.desired[:2]), r"xd, xd' and xd'': expected shape \(3, 3, 2\)"),
-        (lambda r: replace(r, desired=np.nan * r.desired), "xd, xd' and xd'': expected finite"),
-        (lambda r: replace(r, weights=Weights(*(w[:2] for w in r.weights))), "reference: c: expected shape"),
+        (lambda r: None, "reference"),
+        (lambda r: replace(r, desired=r.desired[:2]), "reference: xd, xd' and xd''"),
+        (lambda r: replace(r, desired=np.nan * r.desired), "reference: xd, xd' and xd''"),
+        (lambda r: replace(r, weights=Weights(*(w[:2] for w in r.weights))), "reference: c"),
         (
             lambda r: replace(r, weights=r.weights._replace(c_inv=np.full_like(r.c, np.inf))),
-            r"c\^-1: expected finite",
+            "reference: c^-1",
         ),
     ],
 )
-def test_evaluate_refuses_what_is_no_reference(change, says: str) -> None:
+def test_evaluate_refuses_what_is_no_reference(change, subject: str) -> None:
     given = arguments(CONTROLLER)
-    with pytest.raises(InputError, match=says):
+    with refused(InputError, subject):
         CONTROLLER.evaluate(**{**given, "reference": change(given["reference"])})
 
 

@@ -36,8 +36,8 @@ from synctrl.errors import (
     SingularJacobianError,
 )
 from synctrl.experiments import a460_pair, planar_four, ur5_payload
-from synctrl.simulation.disturbances import DisturbanceSchedule
 from synctrl.simulation.rates import HELD, loop_rates
+from synctrl.simulation.schedules import DisturbanceSchedule
 from synctrl.simulation.stop import Stop
 from synctrl.tasks.trajectories import Motion
 

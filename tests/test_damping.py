@@ -23,7 +23,7 @@ from synctrl import (
     load_robot,
 )
 from synctrl.control.laws import SunMills
-from synctrl.simulation.damping import spans
+from synctrl.simulation.limits import spans
 from synctrl.simulation.result import LAYOUT
 
 pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")

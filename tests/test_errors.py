@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from refusals import refused
@@ -19,7 +21,7 @@ from synctrl import (
     checks,
     load_robot,
 )
-from synctrl.errors import InputError, RobotError, SynctrlError
+from synctrl.errors import CouplingError, InputError, RobotError, SynctrlError
 
 ARM = load_robot("planar2r")
 
@@ -37,6 +39,9 @@ REFUSALS = {
     "no later end": (checks.window, ("dt", 0.2, 0.1), None),
     "no truth value": (checks.boolean, ("dt", 1), None),
     "another type": (checks.instance, ("dt", 1, str, "a text"), None),
+    "no such part": (checks.offers, ("dt", 1, ("bind",), "a part"), None),
+    "a class for an object": (checks.offers, ("dt", str, ("split",), "a text"), None),
+    "an array of another shape": (checks.shaped, ("dt", [1.0], (2,)), (1,)),
     "unknown word": (checks.choice, ("dt", "c", ("a", "b")), None),
     "two lines": (checks.label, ("dt", "a\nb"), None),
 }
@@ -99,3 +104,11 @@ def test_a_kind_of_ones_own_keeps_what_it_set_before_the_message():
             super().__init__("what is wrong")
 
     assert Own(3).found == 3
+
+
+def test_data_that_are_added_leave_the_message_and_travel_along():
+    error = CouplingError("the weight has no inverse").about("c", robot=1, time=0.5)
+    again = pickle.loads(pickle.dumps(error))
+    for each in (error, again):
+        assert str(each) == "the weight has no inverse"
+        assert (each.subject, each.robot, each.time) == ("c", 1, 0.5)

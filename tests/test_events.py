@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
@@ -13,7 +14,7 @@ from seams.catching_plant import Catching
 from seams.posted_network import BoundPosted, Posted
 
 from synctrl import Cell, Coupling, Cubic, Disturbance, Experiment, Gains, Member, Payload, Result, load_robot
-from synctrl.simulation.advance import Agenda
+from synctrl.simulation.advance import due
 from synctrl.simulation.closed_loop import ClosedLoop
 from synctrl.simulation.plant import Plant
 from synctrl.simulation.result import LAYOUT
@@ -290,5 +291,5 @@ def test_an_event_that_changes_nothing_leaves_the_bits_of_a_run_alone():
 
 
 def test_an_agenda_has_every_instant_once_and_in_order():
-    agenda = Agenda([0.3, -0.1, 0.0, 0.2, 0.2])
-    assert [agenda.until(t) for t in (0.1, 0.15, 0.2, 1.0, 2.0)] == [[0.0], [], [0.2, 0.2], [0.3], []]
+    agenda = deque([0.0, 0.2, 0.2, 0.3])
+    assert [due(agenda, t) for t in (0.1, 0.15, 0.2, 1.0, 2.0)] == [[0.0], [], [0.2, 0.2], [0.3], []]

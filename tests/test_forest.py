@@ -20,7 +20,7 @@ from synctrl.robots.friction_parameters import FrictionParameters
 from synctrl.robots.parameters import FullParameters, planar_two_link_parameters
 from synctrl.robots.regressors import _groups, make_regressors
 from synctrl.simulation.plant import pinocchio_dynamics
-from synctrl.tasks.tips import Tips
+from synctrl.tasks.measurement import Tips
 
 NAMES = ("planar2r", "a460", "ur5", "panda", "kinova")
 

@@ -7,6 +7,7 @@ import pytest
 from cells import SMALL_GAINS, small_cell
 from hypothesis import given
 from hypothesis import strategies as st
+from refusals import refused
 
 from synctrl import Cell, Coupling, Cubic, Disturbance, Experiment, Gains, Member, load_robot
 from synctrl.errors import InputError
@@ -170,5 +171,6 @@ def test_the_last_step_may_be_shorter():
     [(0.0, 0.1), (-1.0, 0.1), (1.0, 0.0), (1.0, -0.1), (1.0, 2.0), (np.nan, 0.1), (1.0, np.inf), (1.0, 1e-9)],
 )
 def test_steps_that_make_no_clock_are_refused(duration, dt):
-    with pytest.raises(InputError, match=r"duration|dt"):
+    with refused(InputError) as caught:
         make_clock(duration, dt, [])
+    assert caught.value.subject in ("duration", "dt")

@@ -29,10 +29,10 @@ from synctrl import (
 )
 from synctrl.compiled import engine as compiled
 from synctrl.errors import CouplingError, NonFiniteError, RunInterrupted, SimulationError, TrajectoryError
-from synctrl.simulation import run as runs
-from synctrl.simulation import steps
+from synctrl.simulation import advance
+from synctrl.simulation import engines as runs
+from synctrl.simulation.advance import up_to_a_failure
 from synctrl.simulation.closed_loop import ClosedLoop
-from synctrl.simulation.handover import up_to_a_failure
 from synctrl.simulation.plant import Plant
 from synctrl.simulation.result import LAYOUT
 
@@ -358,7 +358,7 @@ def test_an_interrupt_before_the_start_hands_over_nothing_but_an_empty_result(mo
     def interrupt(*arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("synctrl.simulation.run.check_reachable", interrupt)
+    monkeypatch.setattr("synctrl.simulation.engines.check_reachable", interrupt)
     with pytest.raises(RunInterrupted) as stop:
         experiment().simulate()
     assert len(stop.value.result.t) == 0
@@ -468,7 +468,7 @@ def test_bits_do_not_depend_on_the_blocks_in_which_a_run_is_made(engine, control
     for block, away in ((1, 0.05), (7, 1e-12), (1000, 1e-12), (1000, 1e9)):
         monkeypatch.setattr(compiled, "BLOCK_STEPS", block)
         monkeypatch.setattr(compiled, "AWAY", away)
-        monkeypatch.setattr(steps, "BLOCK", block)
+        monkeypatch.setattr(advance, "BLOCK", block)
         assert run.simulate(**options) == expected
 
 

@@ -14,6 +14,7 @@ from synctrl import Cell, Coupling, simulate
 from synctrl.control import law
 from synctrl.control.laws import Errors
 from synctrl.control.laws.sun_mills import BoundSunMills
+from synctrl.coupling.weights import Weights
 from synctrl.errors import CouplingWarning
 from synctrl.simulation.simulate import Experiment
 
@@ -285,7 +286,9 @@ def whole_order(reference_acceleration, k_r_space, numbers):
     """All lines from errors to torque, for arrays of any numbers, with or without a leading axis."""
     x = dict(numbers)
     Lambda, beta, K_eps, K_r, v = (x.pop(name) for name in ("Lambda", "beta", "K_eps", "K_r", "v"))
-    w, w_dot = law.compute_weighted_errors(x["c"], x["c_dot"], np.array((x["e"], x["e_dot"])))
+    w, w_dot = law.compute_weighted_errors(
+        Weights(x["c"], x["c_dot"], x["c_ddot"], x["c_inv"]), np.array((x["e"], x["e_dot"]))
+    )
     errors = Errors.from_rows(**x, w=w, w_dot=w_dot)
     asked = BoundSunMills(Lambda, beta, K_eps, reference_acceleration).command(errors)
     return *asked, *law.compute_joint_command(asked, errors, v, Bent(), K_r, k_r_space)

@@ -25,9 +25,8 @@ from synctrl import (
     load_robot,
 )
 from synctrl.analysis.certify import certify
-from synctrl.analysis.convergence import convergence
+from synctrl.analysis.convergence import convergence, identify
 from synctrl.analysis.gain_condition import gain_condition, gain_condition_in_box
-from synctrl.analysis.identification import identify
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.analysis.metrics import as_data, metrics, row_names, settling_bands
 from synctrl.analysis.replay import replay
@@ -38,7 +37,7 @@ from synctrl.paper.judge import compare_runs
 from synctrl.paper.paper_sections import metrics_tables
 from synctrl.paper.plant_sections import identification_section
 from synctrl.paper.report import Section, Text, Verdicts, write_page
-from synctrl.paper.theory_sections import baseline_section, certificate_section, draw_certificate
+from synctrl.paper.theory import baseline_section, certificate_section, draw_certificate
 from synctrl.show import scene_of
 from synctrl.show.animation import planar_scene
 from synctrl.show.layout import cell_layout
@@ -47,11 +46,11 @@ from synctrl.show.plots import common_limits, joint_trajectories, sync_errors, t
 from synctrl.show.real_cells import formation_scene
 from synctrl.simulation.guard import Finding
 from synctrl.simulation.guard import stopped as stopped_by
+from synctrl.sweep.description import describe_base
 from synctrl.sweep.factors import Setup
-from synctrl.sweep.identity import describe_base
 from synctrl.sweep.measures import MEASURES, definitions, measures
-from synctrl.sweep.prepared import Prepared
 from synctrl.sweep.variations import with_scaled_weights
+from synctrl.sweep.worker import Prepared
 
 DURATION, DT = 0.01, 1e-3  # s
 needs_casadi = pytest.mark.skipif(

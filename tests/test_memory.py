@@ -16,7 +16,7 @@ from synctrl import Experiment, simulate
 from synctrl.errors import InputError, SynctrlError
 from synctrl.simulation import memory
 from synctrl.simulation.clock import Clock, make_clock
-from synctrl.sweep.prepared import Prepared
+from synctrl.sweep.worker import Prepared
 
 MB = 1_000_000
 

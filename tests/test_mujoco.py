@@ -28,7 +28,7 @@ from synctrl.experiments import a460_pair, planar_four
 from synctrl.robots.documents import planar_arm
 from synctrl.robots.urdf import describe
 from synctrl.robots.urdf.document import Document, Inertial, Pose
-from synctrl.simulation.mujoco_plant import MujocoArm, _for_mujoco
+from synctrl.simulation.mujoco import MujocoArm, _for_mujoco
 
 #: equal accelerations up to rounding in chains of seven bodies
 SAME = 1e-10
@@ -211,7 +211,7 @@ def test_a_robot_that_mujoco_cannot_read_is_refused_before_anything_runs() -> No
 
 def test_without_mujoco_the_message_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(MissingDependencyError, match=r"synctrl\[mujoco\]"):
+    with refused(MissingDependencyError, "MuJoCo"):
         pair("a460").simulate(0.01, plant="mujoco")
 
 

@@ -29,8 +29,7 @@ from synctrl import (
 )
 from synctrl.errors import InputError, MissingDependencyError
 from synctrl.experiments import ur5_payload
-from synctrl.simulation.mujoco_model import JointMap
-from synctrl.simulation.mujoco_plant import MujocoArm
+from synctrl.simulation.mujoco import JointMap, MujocoArm
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is an extra: pip install 'synctrl[mujoco]'")
 
@@ -240,7 +239,7 @@ def test_a_timestep_that_is_none_is_refused(timestep):
 
 def test_without_mujoco_the_message_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(MissingDependencyError, match=r"synctrl\[mujoco\]"):
+    with refused(MissingDependencyError, "MuJoCo"):
         mujoco_model(small_cell())
 
 

@@ -7,12 +7,12 @@ from functools import partial
 
 import numpy as np
 import pytest
+from refusals import refused
 
-from synctrl.analysis.identification import identify
+from synctrl.analysis.convergence import identify
 from synctrl.errors import InputError
 from synctrl.experiments import a460_full_pair, a460_pair
-from synctrl.paper.judge import AGREEMENT, compare_runs, joint_pair
-from synctrl.paper.judge_section import differences, judge_section
+from synctrl.paper.judge import AGREEMENT, compare_runs, differences, joint_pair, judge_section
 from synctrl.paper.plant_sections import friction_section, full_a460_section, identification_section
 from synctrl.paper.report import SideBySide, write_page
 from synctrl.paper.reproduction import PLANNED, judge_runs, judged
@@ -78,7 +78,7 @@ def test_runs_that_differ_are_told_from_those_that_agree(runs) -> None:
     other = compare_runs(run, shifted)
     assert not other.agrees
     np.testing.assert_allclose(other.sync, 2 * AGREEMENT)
-    with pytest.raises(InputError, match="same instants"):
+    with refused(InputError, "runs"):
         compare_runs(run, a460_pair().simulate(0.04))
 
 

@@ -97,11 +97,6 @@ def test_the_series_have_the_digits_of_the_closed_form_where_that_has_them_all(a
     np.testing.assert_allclose(np.ravel(found), (b, slope), rtol=2e-13)
 
 
-@given(rpy=st.tuples(*[st.floats(-3, 3)] * 3))
-def test_rpy_is_pinocchios(rpy):
-    np.testing.assert_allclose(rotations.rotation_from_rpy(rpy), pin.rpy.rpyToMatrix(*rpy), atol=1e-14)
-
-
 # -- desired motion --------------------------------------------------------------------------------------
 
 
@@ -195,20 +190,20 @@ def test_what_is_no_part_of_a_pose_trajectory_is_refused_by_name(subject, make):
 
 
 def test_malformed_pose_trajectories_are_refused():
-    with pytest.raises(InputError, match="a trajectory of 3 numbers, found one of 2"):
+    with refused(InputError, "position", found=2):
         PoseTrajectory(Hold([0, 0]))
-    with pytest.raises(InputError, match=r"differs from 1 by"):
+    with refused(InputError, "start"):
         AxisRotation.fixed(2 * np.eye(3))
-    with pytest.raises(InputError, match="a reflection"):
+    with refused(InputError, "start"):
         AxisRotation.fixed(-np.eye(3))
-    with pytest.raises(InputError, match="axis"):
+    with refused(InputError, "length of axis"):
         AxisRotation.steady(np.eye(3), (0, 0, 0), 1.0)
-    with pytest.raises(InputError, match="1 number, found one of 2"):
+    with refused(InputError, "angle", found=2):
         AxisRotation(np.eye(3), (0, 0, 1), Hold([0, 0]))
-    with pytest.raises(InputError, match="PoseTrajectory"):
+    with refused(InputError, "body"):
         Attached(Hold([0, 0, 0]))
     zero = np.zeros(3)
-    with pytest.raises(TrajectoryError, match=r"t = 0 s: velocity: expected shape \(3,\)"):
+    with refused(TrajectoryError, "velocity", found=(2,)):
         FunctionOrientation(lambda t: np.eye(3), lambda t: zero[:2], lambda t: zero)
 
 

@@ -7,6 +7,7 @@ import pytest
 from flows import Sines, derivative, desired_flow, joint_flow
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from refusals import refused
 
 from synctrl import CartesianSpace, Damping, PoseSpace, Redundancy, load_robot
 from synctrl.errors import InputError
@@ -191,23 +192,23 @@ def test_a_robot_whose_jacobian_is_no_number_leaves_the_damping_of_the_others_as
 
 def test_weights_and_postures_that_do_not_fit_are_refused_with_the_robot_named():
     cases = {
-        Redundancy(posture=np.zeros(6)): "posture of 'panda'.*shape \\(7,\\), found \\(6,\\)",
-        Redundancy(posture=[np.zeros(7)]): "expected 2 rows, one per robot, found 1",
-        Redundancy(weights=-np.ones(7)): "expected numbers above 0, found -1",
-        Redundancy(weights=3.0): "expected .* rows",
-        Redundancy(weights=np.array(3.0)): "expected .* rows",
-        Redundancy(posture=[]): "expected .* rows",
-        Redundancy(posture=np.zeros((0, 7))): "expected .* rows",
+        Redundancy(posture=np.zeros(6)): "redundancy, posture of 'panda'",
+        Redundancy(posture=[np.zeros(7)]): "redundancy, posture",
+        Redundancy(weights=-np.ones(7)): "redundancy, weights",
+        Redundancy(weights=3.0): "redundancy, weights",
+        Redundancy(weights=np.array(3.0)): "redundancy, weights",
+        Redundancy(posture=[]): "redundancy, posture",
+        Redundancy(posture=np.zeros((0, 7))): "redundancy, posture",
     }
-    for wrong, message in cases.items():
-        with pytest.raises(InputError, match=message):
+    for wrong, subject in cases.items():
+        with refused(InputError, subject):
             CartesianSpace("xyz", redundancy=wrong).bind([PANDA, PANDA])
-    with pytest.raises(InputError, match="gain"):
+    with refused(InputError, "redundancy, gain"):
         Redundancy(gain=-1)
-    with pytest.raises(InputError, match="threshold"):
+    with refused(InputError, "damping, threshold"):
         Damping(threshold=0)
 
 
 def test_a_robot_with_too_few_joints_is_refused():
-    with pytest.raises(InputError, match=r"at least 6 joints.*'planar2r' with 2"):
+    with refused(InputError, "PoseSpace()"):
         PoseSpace().bind([UR5, PLANAR])

@@ -20,8 +20,8 @@ MOVED = {
     "synctrl.control.controller": ("synctrl.control.laws.sun_mills", ["REFERENCE_ACCELERATIONS"]),
     "synctrl.show.lyapunov_plots": ("synctrl.analysis.lyapunov", ["ENERGIES", "POWERS", "THEOREM"]),
     "synctrl.show.plots": ("synctrl.show.legends", ["WIDE", "NARROW"]),
-    "synctrl.simulation.simulate": ("synctrl.simulation.run", ["run_reference"]),
-    "synctrl.coupling.weights": ("synctrl.coupling.weight_checks", ["check_weights"]),
+    "synctrl.simulation.simulate": ("synctrl.simulation.engines", ["run_reference"]),
+    "synctrl.coupling.weights": ("synctrl.coupling.desired", ["check_weights"]),
 }
 #: names by the module that had them, the module that has them now, and what they are called there
 RENAMED = [
@@ -35,7 +35,7 @@ RENAMED = [
     ),
     ("synctrl.analysis.claims", "Quantity", "synctrl.paper.claims", "Finding"),
     ("synctrl.analysis.judge", "Comparison", "synctrl.paper.judge", "Agreement"),
-    ("synctrl.experiments.batch", "Job", "synctrl.paper.batch", "PlannedRun"),
+    ("synctrl.experiments.batch", "Job", "synctrl.paper.reproduction", "PlannedRun"),
     ("synctrl.experiments.reproduction", "JOBS", "synctrl.paper.reproduction", "PLANNED"),
     ("synctrl.experiments.reproduction", "judge_jobs", "synctrl.paper.reproduction", "judge_runs"),
     ("synctrl.show.report", "Row", "synctrl.paper.report", "SideBySide"),

@@ -10,8 +10,8 @@ import pytest
 
 from synctrl import Cell, Coupling, Cubic, Experiment, Gains, Member, Result, load_robot
 from synctrl.errors import SaturationWarning, SimulationError
-from synctrl.simulation.limits import applied_torque, torque_limits
-from synctrl.simulation.saturation import warn_of_saturation
+from synctrl.simulation.limits import applied_torque, warn_of_saturation
+from synctrl.simulation.plant import torque_limits
 
 ARM = load_robot("planar2r")
 LIMITS = torque_limits(Cell([Member(ARM, Cubic([0, 0], [1, 1], 1.0))] * 2, Coupling.pair()))[0]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refused
 from seams.heun_engine import Heun
 
 from synctrl.analysis.certify import certify
@@ -32,13 +33,13 @@ def test_its_runs_are_logged_saved_and_certified_as_others(tmp_path):
 
 
 def test_it_refuses_what_it_does_not_have_by_name():
-    with pytest.raises(InputError, match="Heun does not have sampled control"):
+    with refused(InputError, "engine"):
         planar_four().simulate(0.05, engine=Heun(), control_period=2e-3)
 
 
 @pytest.mark.parametrize("wrong", ["fast", 3, None, Heun])
 def test_what_is_no_engine_is_refused(wrong):
-    with pytest.raises(InputError, match="engine"):
+    with refused(InputError, "engine"):
         planar_four().simulate(0.05, engine=wrong)
 
 

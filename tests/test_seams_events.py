@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from refusals import refused
 from seams.catching_plant import Catching
 from seams.posted_network import BoundPosted, Posted
 
@@ -161,15 +162,15 @@ def test_the_folder_of_a_sweep_takes_no_runs_with_other_events(kind, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("experiment", "name"),
+    ("experiment", "part", "name"),
     [
-        (catching(), r"plant seams\.catching_plant\.Catching"),
-        (replace(a460_pair(), network=Posted(0.02)), r"network seams\.posted_network\.BoundPosted"),
+        (catching(), "plant", "seams.catching_plant.Catching"),
+        (replace(a460_pair(), network=Posted(0.02)), "network", "seams.posted_network.BoundPosted"),
     ],
     ids=["plant", "network"],
 )
-def test_the_compiled_engine_refuses_parts_with_events_by_name(experiment, name):
-    with pytest.raises(InputError, match=name):
+def test_the_compiled_engine_refuses_parts_with_events_by_name(experiment, part, name):
+    with refused(InputError, part, found=name):
         experiment.simulate(0.01, engine="compiled")
 
 
@@ -204,23 +205,19 @@ class Silent(BoundPosted):
 
 
 @pytest.mark.parametrize(
-    ("kind", "says"),
+    ("kind", "method"),
     [
-        (Shifted, r"Shifted, messages: expected instants in order with 0 <= t < .* s, found"),
-        (Backwards, "Backwards, messages: expected instants in order"),
-        (Timeless, "Timeless, messages: expected finite numbers, found nan"),
-        (Wordy, "Wordy, messages: expected numbers, found .*soon"),
-        (Silent, "Silent, messages: expected numbers, found None"),
-        (Narrow, r"Narrow, meet: expected memory of shape \(5, 3\), found \(4, 3\)"),
+        *((kind, "messages") for kind in (Shifted, Backwards, Timeless, Wordy, Silent)),
+        (Narrow, "meet"),
     ],
 )
 @pytest.mark.parametrize("options", [{}, {"control_period": 2e-3}], ids=["continuous", "sampled"])
-def test_messages_that_are_none_are_refused_with_their_network(kind, says, options):
+def test_messages_that_are_none_are_refused_with_their_network(kind, method, options):
     class Wrong(Posted):
         def bind(self, cell):
             return kind(self.T, cell.coupling, cell.m)
 
-    with pytest.raises(InputError, match=says):
+    with refused(InputError, f"network {kind.__qualname__}, {method}"):
         replace(a460_pair(), network=Wrong(1e-3)).simulate(0.01, **options)
 
 
@@ -253,18 +250,19 @@ class Torn(Flat):
 
 @pytest.mark.parametrize("options", WAYS.values(), ids=WAYS)
 @pytest.mark.parametrize(
-    ("kind", "error", "says"),
+    ("kind", "error", "data"),
     [
-        (Flat, InputError, r"Flat: expected \(2, 3\) numbers as its velocities after the event at 0\.002 s"),
-        (Short, InputError, r"Short: expected 3, \(positions, .*\) after the event at 0\.002 s, found 2"),
-        (Mute, InputError, r"Mute: expected 3, \(positions, .*\) after the event .*, found NoneType"),
-        (Broken, SimulationError, r"Broken\.meet.*no hands"),
-        (Torn, NonFiniteError, r"Torn gives .*inf.* as its velocities after the event at 0\.002 s"),
+        (Flat, InputError, {"subject": "plant Flat", "found": (3,)}),
+        (Short, InputError, {"subject": "plant Short", "found": 2}),
+        (Mute, InputError, {"subject": "plant Mute", "found": "NoneType"}),
+        (Broken, SimulationError, {"cause": None}),
+        (Torn, NonFiniteError, {"cause": "part", "time": 2e-3}),
     ],
 )
-def test_an_event_that_goes_wrong_ends_the_run_which_hands_over_what_it_has(kind, error, says, options):
-    with pytest.raises(error, match=says) as stop:
+def test_an_event_that_goes_wrong_ends_the_run_which_hands_over_what_it_has(kind, error, data, options):
+    with refused(error, **data) as stop:
         replace(a460_pair(), plant_type=kind).simulate(0.02, dt=1e-3, **options)
+    assert kind.__name__ in str(stop.value)
     assert len(stop.value.result.t) == 2 and stop.value.result.status.startswith("stopped")
 
 
@@ -274,5 +272,6 @@ def test_events_that_are_no_instants_are_refused(events):
         pass
 
     Vague.events = events
-    with pytest.raises(InputError, match=r"events of the plant .*Vague"):
+    with refused(InputError) as caught:
         replace(a460_pair(), plant_type=Vague)
+    assert caught.value.subject.startswith("events of the plant")

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 from seams.lagging_network import Lagging
 from seams.pulling_law import Pulling
 from theory_cells import coupling, experiment
@@ -31,7 +32,7 @@ from synctrl.experiments import (
     rigid_object,
     ur5_payload,
 )
-from synctrl.sweep.prepared import Prepared
+from synctrl.sweep.worker import Prepared
 
 compiled = pytest.mark.skipif(
     find_spec("casadi") is None, reason="CasADi is an extra: pip install 'synctrl[compiled]'"
@@ -127,9 +128,9 @@ def test_damping_between_robots_keeps_them_together():
 def test_gains_it_has_no_place_for_are_refused():
     with pytest.raises(InputError, match="beta = 0 with the law ChungSlotine"):
         replace(planar_four(), law=ChungSlotine(0.3))
-    with pytest.raises(InputError, match="K_2"):
+    with refused(InputError, "K_2"):
         ChungSlotine(-1.0)
-    with pytest.raises(InputError, match="K_2"):
+    with refused(InputError, "K_2"):
         replace(planar_four(synchronized=False), law=ChungSlotine((1.0, 2.0, 3.0)))
 
 
@@ -167,13 +168,13 @@ def test_options_beside_the_law_are_shorthand_for_its_own(engine, acceleration, 
     ],
 )
 def test_an_option_that_the_law_contradicts_is_refused(options):
-    with pytest.raises(InputError, match="which is what the law"):
+    with refused(InputError, [*options][-1]):
         replace(planar_four(), **options)
 
 
 @pytest.mark.parametrize("options", [{"law": SunMills}, {"law": "mine"}, {"network": Ideal}, {"network": 3}])
 def test_what_is_no_law_and_no_network_is_refused_by_name(options):
-    with pytest.raises(InputError, match=f"{next(iter(options))}: expected, for example"):
+    with refused(InputError, *options):
         replace(planar_four(), **options)
 
 
@@ -251,8 +252,9 @@ class Gossip(Pulling):
 @pytest.mark.parametrize("law", [Clockwork(1.0), Gossip(1.0)])
 def test_a_law_that_cannot_be_traced_is_refused_by_name_and_runs_in_the_reference_engine(law):
     run = replace(planar_four(), law=law)
-    with pytest.raises(InputError, match=r"cannot trace the law .*(Ticking|Listening)"):
+    with refused(InputError, "law") as caught:
         run.simulate(0.01, engine="compiled")
+    assert caught.value.found.endswith((".Ticking", ".Listening"))
     assert run.simulate(0.01).status == "completed"
 
 
@@ -316,7 +318,7 @@ def test_a_law_that_gives_another_shape_is_refused_by_name_before_it_runs():
             bound.command = lambda errors: Asked(errors.e, errors.e, errors.e[0])
             return bound
 
-    with pytest.raises(InputError, match="BoundPulling, force"):
+    with refused(InputError, "law BoundPulling, force", found=(2,)):
         replace(planar_four(), law=Wrong(1.0))
 
 
@@ -338,11 +340,11 @@ def test_a_part_that_gives_something_of_another_kind_is_refused_by_name(nothing)
         def as_dict(self):
             return nothing
 
-    with pytest.raises(InputError, match="BoundPulling, command: expected an Asked"):
+    with refused(InputError, "law BoundPulling, command"):
         replace(planar_four(), law=Empty(1.0))
-    with pytest.raises(InputError, match="BoundLagging, exchange: expected a Received"):
+    with refused(InputError, "network BoundLagging, exchange"):
         replace(planar_four(), network=Deaf(0.1))
-    with pytest.raises(InputError, match="Untold, as_dict"):
+    with refused(InputError, f"{Untold.__qualname__}, as_dict"):
         replace(planar_four(), law=Untold(1.0))
 
 
@@ -411,7 +413,7 @@ def test_another_network_than_the_one_that_made_a_result_is_noticed():
 
 @compiled
 def test_a_network_of_ones_own_is_refused_by_name_in_the_compiled_engine():
-    with pytest.raises(InputError, match=r"network .*BoundLagging.*engine='pinocchio'"):
+    with refused(InputError, "network", found="seams.lagging_network.BoundLagging"):
         lagging().simulate(0.01, engine="compiled")
 
 
@@ -422,7 +424,7 @@ def test_a_network_that_gives_another_shape_is_refused_by_name_before_it_runs():
             bound.integral = lambda memory: memory
             return bound
 
-    with pytest.raises(InputError, match="BoundLagging, integral"):
+    with refused(InputError, "network BoundLagging, integral"):
         replace(planar_four(), network=Wrong(0.1))
 
 

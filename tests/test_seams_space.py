@@ -65,7 +65,7 @@ def test_a_space_may_say_where_a_robot_begins_and_is_asked_only_without_a_start(
     members = [Member(ARM, way), Member(ARM, way, q0=START + 0.2)]
     cell = Cell(members, Coupling.pair(), DegreesFromTheirPath())
     np.testing.assert_allclose(cell.q0, [START, START + 0.2])
-    with pytest.raises(InputError, match="robot 1, q0: expected joint positions to start from"):
+    with refused(InputError, "robot 1, q0"):
         Cell(members, Coupling.pair(), Degrees())
 
 
@@ -75,7 +75,7 @@ def test_a_start_that_a_space_gives_has_to_be_one_of_the_robot():
             return x[:1]
 
     way = Cubic(DEGREES * START, DEGREES * (START + 0.1), 0.5)
-    with pytest.raises(InputError, match="robot 1, q0: expected shape"):
+    with refused(InputError, "robot 1, q0", found=(1,)):
         Cell([Member(ARM, way)] * 2, Coupling.pair(), Short())
 
 
@@ -110,7 +110,7 @@ def test_a_sweep_takes_a_space_of_ones_own(tmp_path):
 
 
 def test_the_compiled_engine_refuses_a_space_of_ones_own_by_name():
-    with pytest.raises(InputError, match=r"space seams\.degrees\.Degrees"):
+    with refused(InputError, "space", found="seams.degrees.Degrees"):
         experiment(Degrees()).simulate(engine="compiled")
 
 
@@ -214,13 +214,13 @@ def test_inverse_kinematics_follow_any_space_that_says_how_far_a_target_is_misse
 def test_a_path_out_of_reach_is_refused_in_any_space_that_says_how_far_a_target_is_missed():
     members = [Member(ARM, Hold([9.0, 9.0]), q0=START) for _ in range(2)]
     cell = Cell(members, Coupling.pair(), Shifted([0.0, 0.0]))
-    with pytest.raises(UnreachableError, match="along = 9 m, across = 9 m"):
+    with refused(UnreachableError, "robot 1, trajectory", time=0.0, found=[9.0, 9.0]):
         Experiment(cell, Gains(1.0, 0.0, 1.0, 0.0, 0.1), 0.1).simulate()
 
 
 @pytest.mark.parametrize("space", [JointSpace(), JointSpace, Degrees(), 5])
 def test_inverse_kinematics_refuse_a_space_that_does_not(space):
-    with pytest.raises(InputError, match="`miss`"):
+    with refused(InputError, "space"):
         inverse_kinematics(ARM, [0.1, 0.2], START, space)
 
 

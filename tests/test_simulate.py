@@ -7,6 +7,7 @@ import inspect
 import numpy as np
 import pytest
 from cells import SMALL_GAINS, small_cell
+from refusals import refused
 
 from synctrl import (
     CartesianSpace,
@@ -206,9 +207,9 @@ def test_a_run_stops_at_the_same_instant_whatever_is_logged():
     np.testing.assert_array_equal(thin.result.q, whole.result.q[::10])
 
 
-@pytest.mark.parametrize(("log_dt", "found"), [(0, "0"), (-1.0, "-1"), (1.5e-3, "0.0015"), (np.nan, "nan")])
-def test_an_interval_that_is_no_multiple_of_the_step_is_refused(log_dt, found):
-    with pytest.raises(InputError, match=f"log_dt: expected .*found {found}"):
+@pytest.mark.parametrize("log_dt", [0, -1.0, 1.5e-3, np.nan])
+def test_an_interval_that_is_no_multiple_of_the_step_is_refused(log_dt):
+    with refused(InputError, "log_dt"):
         planar_four().simulate(0.1, log_dt=log_dt)
 
 

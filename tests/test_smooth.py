@@ -14,6 +14,7 @@ from synctrl import Coupling, Cubic, FunctionOrientation, SmoothOrientation, Smo
 from synctrl.coupling.weights import SmoothWeights
 from synctrl.errors import CouplingError, InputError, TrajectoryError
 from synctrl.tasks.rotations import exp, skew
+from synctrl.tasks.trajectories import MOTION_PARTS
 
 TIMES = np.linspace(0, 2, 301)
 
@@ -52,24 +53,26 @@ def test_a_motion_may_have_a_hundred_breaks() -> None:
 
 
 def test_a_motion_that_jumps_itself_at_a_break_is_refused() -> None:
-    with pytest.raises(TrajectoryError, match=r"the position cannot be found: near t = 0\.[67]"):
+    with refused(TrajectoryError, "position") as caught:
         SmoothTrajectory(lambda t: [float(t >= 0.7)], 2.0, breaks=(0.7,))
+    assert caught.value.time == pytest.approx(0.7, abs=0.1)
 
 
 @pytest.mark.parametrize(
-    ("position", "says"),
+    ("position", "first", "last"),
     [
-        (lambda t: Cubic([0.0], [1.0], 1.3)(t).x, r"near t = (1\.29|1\.3)"),
-        (lambda t: [abs(t - 0.7)], r"near t = 0\.7"),
-        (lambda t: [float(t > 0.7)], r"the position .* near t = 0\.7"),
-        (lambda t: [np.sin(t) + 1e-6 * np.sin(1e6 * t)], "cannot be found"),
-        (lambda t: [np.sin(t), 0.0][: 1 + (t < 1)], r"position: expected shape \(2,\).* at t = "),
-        (lambda t: [np.nan if t > 1 else 0.0], "position: expected finite"),
+        (lambda t: Cubic([0.0], [1.0], 1.3)(t).x, 1.29, 1.31),
+        (lambda t: [abs(t - 0.7)], 0.69, 0.71),
+        (lambda t: [float(t > 0.7)], 0.69, 0.71),
+        (lambda t: [np.sin(t) + 1e-6 * np.sin(1e6 * t)], 0.0, 2.0),
+        (lambda t: [np.sin(t), 0.0][: 1 + (t < 1)], 1.0, 2.0),
+        (lambda t: [np.nan if t > 1 else 0.0], 1.0, 2.0),
     ],
 )
-def test_a_motion_without_derivatives_is_refused_with_its_time(position, says: str) -> None:
-    with pytest.raises(TrajectoryError, match=says):
+def test_a_motion_without_derivatives_is_refused_with_its_time(position, first, last) -> None:
+    with pytest.raises(TrajectoryError) as caught:
         SmoothTrajectory(position, 2.0)
+    assert caught.value.subject in MOTION_PARTS and first <= caught.value.time <= last
 
 
 @pytest.mark.parametrize("t", [-0.1, 2.1, [0.0, 2.1]])
@@ -78,7 +81,7 @@ def test_a_time_for_which_the_motion_was_not_made_is_refused(t) -> None:
         SmoothTrajectory(lambda t: [t], 2.0),
         SmoothOrientation(lambda t: np.eye(3), 2.0),
     ):
-        with pytest.raises(TrajectoryError, match=r"from 0 to 2 s.*longer duration"):
+        with refused(TrajectoryError, "t", found=float(np.ravel(t)[-1])):
             made(t)
 
 
@@ -105,10 +108,11 @@ def test_the_angular_velocity_of_a_smooth_orientation_is_found(seed: int) -> Non
 
 
 def test_an_orientation_that_is_none_is_refused() -> None:
-    with pytest.raises(TrajectoryError, match="orientation at t = "):
+    with refused(TrajectoryError, "rotation"):
         SmoothOrientation(lambda t: (1 + t) * np.eye(3), 2.0)
-    with pytest.raises(TrajectoryError, match="cannot be found"):
+    with pytest.raises(TrajectoryError) as caught:
         SmoothOrientation(lambda t: exp(np.array([abs(t - 0.7), 0, 0])), 2.0)
+    assert caught.value.time == pytest.approx(0.7, abs=0.01)
 
 
 @pytest.mark.parametrize("kind", [SmoothTrajectory, SmoothOrientation])
@@ -139,8 +143,9 @@ def test_smooth_weights_for_another_number_of_coordinates_are_refused() -> None:
 
 
 def test_weights_that_have_no_derivatives_are_refused() -> None:
-    with pytest.raises(CouplingError, match=r"index 1 .* near t = 0\.7"):
+    with refused(CouplingError, "c", robot=1) as caught:
         SmoothWeights.from_function(lambda t: [1.0, 2 + abs(t - 0.7)], 2.0, 2)
+    assert caught.value.time == pytest.approx(0.7, abs=0.01)
     for wrong in (lambda t: 1.0, lambda t: "x", lambda t: [1.0, np.nan], lambda t: np.ones((2, 3))):
         with pytest.raises(InputError, match=r"^c"):
             SmoothWeights.from_function(wrong, 2.0, 2)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from machines import random_robot, rate, rod_arm, seeds
+from refusals import refused
 
 from synctrl import CartesianSpace, Cell, Coupling, Hold, JointSpace, Member, load_robot
 from synctrl.errors import InputError
@@ -119,24 +120,24 @@ def test_coordinates_have_names_and_units():
 
 @pytest.mark.parametrize("axes", ["", "xw", "xx", "XY", 3, None, ["x", "y"]])
 def test_axes_that_are_none_are_refused(axes):
-    with pytest.raises(InputError, match="axes"):
+    with refused(InputError, "axes"):
         CartesianSpace(axes)
 
 
 @pytest.mark.parametrize("limit", [0.0, -1.0, np.nan, np.inf, "large"])
 def test_a_limit_of_the_condition_number_is_a_positive_number(limit):
-    with pytest.raises(InputError, match="max_condition"):
+    with refused(InputError, "max_condition"):
         CartesianSpace("xy", max_condition=limit)
 
 
 def test_arms_with_too_few_joints_are_named():
     arm = load_robot("planar2r")
     members = [Member(arm, Hold([0.3, 0.3, 0.0]), [0.0, 1.0])] * 2
-    with pytest.raises(InputError, match=r"'planar2r' with 2"):
+    with refused(InputError, "CartesianSpace('xyz')"):
         Cell(members, Coupling.pair(), CartesianSpace("xyz"))
 
 
 def test_joint_space_needs_the_same_number_of_joints():
     members = [Member(load_robot("planar2r"), Hold([0.0, 1.0])), Member(load_robot("a460"), Hold([0, 0, 0]))]
-    with pytest.raises(InputError, match=r"'planar2r': 2, 'a460': 3"):
+    with refused(InputError, "joint space"):
         Cell(members, Coupling.pair())

@@ -267,8 +267,8 @@ def test_a_plant_that_a_factor_plugs_in_is_refused_where_a_single_run_refuses_it
 def test_a_gain_that_an_adaptation_has_replaced_cannot_be_varied(factor, tmp_path):
     factors = [adaptation(Grid([Natural(0.1)])), factor("Gamma", Grid([2.0]))]
     for order in (factors, factors[::-1]):
-        with pytest.raises(InputError, match="Gamma"):
+        with refused(InputError, "factors"):
             Sweep(start(), order, bands=BANDS)
     naturally = replace(start(), adaptation=Natural(0.1), gains=start().gains.replace(Gamma=None))
-    with pytest.raises(InputError, match="Gamma"):
+    with refused(InputError, "adaptation" if factor is gain else "Gamma_scale"):
         Sweep(naturally, factors[1:], bands=BANDS).experiment(0)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 
 from synctrl import Circle, Coupling, FunctionTrajectory, Hold, SynchronizationFunction
 from synctrl.errors import CouplingError, CouplingWarning, InputError, SynchronizationError
@@ -162,26 +163,31 @@ def test_a_large_offset_does_not_swallow_the_weights():
 
 
 @pytest.mark.parametrize(
-    ("weight", "where"),
+    ("weight", "subject", "time"),
     [
-        (lambda t: 2 + abs(t - 2.5), r"c' of robot 1: near t = 2\.[45]\d* s"),
-        (lambda t: 2 + abs(t - np.e), r"of robot 1: near t = 2\.7\d* s"),
-        (lambda t: 2 + (t > 1.7), r"c of robot 1: near t = 1\.(69|7)\d* s"),
-        (lambda t: 2 + np.sin(t) + 1e-9 * np.sin(1e6 * t), "of robot 1: .* its relative error is"),
+        (lambda t: 2 + abs(t - 2.5), "c'", 2.5),
+        (lambda t: 2 + abs(t - np.e), "c", np.e),
+        (lambda t: 2 + (t > 1.7), "c", 1.7),
     ],
-    ids=["kink at a border of pieces", "kink", "jump", "noise"],
+    ids=["kink at a border of pieces", "kink", "jump"],
 )
-def test_weights_whose_derivatives_cannot_be_certified_are_refused(weight, where):
+def test_weights_whose_derivatives_cannot_be_certified_are_refused(weight, subject, time):
     f = SynchronizationFunction(lambda x, y, t: weight(t) * x - y, 2, 1)
-    with pytest.raises(SynchronizationError, match=where) as caught:
+    with refused(SynchronizationError, subject, robot=0) as caught:
         f.coupling(still(2), DURATION)
-    assert "from_matrices" in str(caught.value)
+    assert caught.value.time == pytest.approx(time, abs=0.02)
+
+
+def test_weights_with_noise_are_refused():
+    f = SynchronizationFunction(lambda x, y, t: (2 + np.sin(t) + 1e-9 * np.sin(1e6 * t)) * x - y, 2, 1)
+    with refused(SynchronizationError, robot=0):
+        f.coupling(still(2), DURATION)
 
 
 def test_weights_end_with_the_duration_they_were_made_for():
     f = SynchronizationFunction(lambda x, y, t: (2 + np.sin(t)) * x - y, 2, 1)
     coupling = f.coupling(still(2), DURATION)
-    with pytest.raises(CouplingError, match=r"from 0 to 5 s, asked for t = 5\.5 s.*longer duration"):
+    with refused(CouplingError, "c", time=5.5):
         coupling.check_weights(np.linspace(0, 5.5, 3), 1)
 
 
@@ -229,7 +235,7 @@ def test_an_odd_ring_is_allowed_with_a_warning():
     ids=["signed ring", "complete", "chain of three", "sum with another sign"],
 )
 def test_a_graph_whose_errors_vanish_without_the_function_is_refused(graph):
-    with pytest.raises(SynchronizationError, match=r"does not imply f = 0.*Coupling.sum"):
+    with refused(SynchronizationError, "graph"):
         total(3).coupling(still(3), 1.0, graph=graph)
 
 
@@ -245,30 +251,30 @@ def test_a_graph_on_which_equal_shares_cancel_is_accepted():
 
 
 @pytest.mark.parametrize(
-    ("f", "message"),
+    ("f", "subject", "data"),
     [
-        (lambda x, y, t: x * x - y, r"\(assumption 1\) in the coordinates of robot 1: at t = 0 s"),
-        (lambda x, y, t: x - np.sin(y), "coordinates of robot 2"),
-        (lambda x, y, t: x * y - 1, "coordinates of robots 1 and 2 together"),
-        (lambda x, y, t: x - y + 1e-6 * y**3, "coordinates of robot 2"),
-        (lambda x, y, t: x - np.abs(y), "coordinates of robot 2"),
-        (lambda x, y, t: [x[0], y[0]], "returns 2 numbers for coordinates of dimension 1.*2 by 1"),
-        (lambda x, y, t: x, "robot at index 1 has no inverse"),
-        (lambda x, y, t: (t - np.e) * x - y, r"robot at index 0 loses its inverse near t = 2\.7"),
-        (lambda x, y: x - y, r"f\(x_1, ..., x_2, t\) cannot be evaluated at t = 0 s: .*argument"),
-        (lambda x, y, t: x - y * np.nan, "cannot be evaluated at t = 0 s: .*nan"),
-        (lambda x, y, t: "zero", "cannot be evaluated .*expected numbers, found 'zero'"),
+        (lambda x, y, t: x * x - y, "function", {"robots": (0,)}),
+        (lambda x, y, t: x - np.sin(y), "function", {"robots": (1,)}),
+        (lambda x, y, t: x * y - 1, "function", {"robots": (0, 1)}),
+        (lambda x, y, t: x - y + 1e-6 * y**3, "function", {"robots": (1,)}),
+        (lambda x, y, t: x - np.abs(y), "function", {"robots": (1,)}),
+        (lambda x, y, t: [x[0], y[0]], "function", {"found": 2, "robots": ()}),
+        (lambda x, y, t: x, "c", {"robot": 1}),
+        (lambda x, y, t: (t - np.e) * x - y, "c", {"robot": 0}),
+        (lambda x, y: x - y, "function", {"time": 0.0}),
+        (lambda x, y, t: x - y * np.nan, "function", {"time": 0.0}),
+        (lambda x, y, t: "zero", "function", {"time": 0.0}),
     ],
 )
-def test_functions_outside_the_theorem_are_refused_with_the_reason(f, message):
-    with pytest.raises(SynchronizationError, match=message):
+def test_functions_outside_the_theorem_are_refused_with_the_reason(f, subject, data):
+    with refused(SynchronizationError, subject, **data):
         SynchronizationFunction(f, 2, 1).coupling(still(2), DURATION)
 
 
 def test_a_desired_motion_off_the_function_is_refused_with_robot_time_and_amount():
     f = SynchronizationFunction(lambda x, y, t: 2 * x - y, 2, 1)
     late = FunctionTrajectory(lambda t: [max(0.0, t - 3) ** 2], lambda t: [0.0], lambda t: [0.0])
-    with pytest.raises(SynchronizationError, match=r"eq. \(3\): at t = 5 s f is \[8\.0\]") as caught:
+    with refused(SynchronizationError, "trajectories", time=5.0, found=[8.0]) as caught:
         f.coupling([late, Hold([0.0])], DURATION)
     assert "robot 1 alone would have to be moved by [-4.0] from [4.0]" in str(caught.value)
 
@@ -283,33 +289,32 @@ def test_moving_the_robot_named_by_the_amount_named_satisfies_the_function(seed)
         return
     with pytest.raises(SynchronizationError) as caught:
         f.coupling([Hold(x) for x in xd], 1.0)
-    words = str(caught.value).split("for f = 0 robot ")[1]
     moved = xd.copy()
-    moved[int(words[0]) - 1] += float(words.split("moved by [")[1].split("]")[0])
+    moved[caught.value.robot] += caught.value.shift
     np.testing.assert_allclose(f(moved, 0.0), 0, atol=1e-12)
 
 
 @pytest.mark.parametrize(
-    ("make", "message"),
+    ("make", "subject"),
     [
-        (lambda: SynchronizationFunction(1.0, 2, 1), "expected f"),
-        (lambda: SynchronizationFunction(lambda *a: a[0], 1, 1), "robots: expected at least 2, found 1"),
-        (lambda: SynchronizationFunction(lambda *a: a[0], 2, 0), "dimension: expected at least 1, found 0"),
-        (lambda: SynchronizationFunction(lambda *a: a[0], 2, 1.5), "a whole number"),
-        (lambda: SynchronizationFunction.from_matrices([1.0, np.inf], 1), "finite"),
-        (lambda: SynchronizationFunction.from_matrices(matrices, 2, A_dot=matrices), "both or none"),
-        (lambda: total(2).coupling(still(3), 1.0), "one for each of 2 robots, found 3"),
-        (lambda: total(2).coupling(still(2, 2), 1.0), r"robot 1, trajectory: .* 1 coordinates .* found 2"),
-        (lambda: total(2).coupling(None, 1.0), "trajectories: expected one for each robot"),
-        (lambda: total(2).coupling([1.0, 2.0], 1.0), "robot 1, trajectory: expected a trajectory"),
-        (lambda: total(2).coupling(still(2), 1.0, graph=3), "graph: expected, for example, Coupling.ring"),
-        (lambda: SynchronizationFunction.from_matrices(3.0, 1), "robots: expected at least 2, found 1"),
-        (lambda: total(2).coupling(still(2), -1.0), "duration: expected a number above 0"),
-        (lambda: total(2)(np.zeros(3), 0.0), r"x: expected shape \(2, 1\)"),
+        (lambda: SynchronizationFunction(1.0, 2, 1), "function"),
+        (lambda: SynchronizationFunction(lambda *a: a[0], 1, 1), "robots"),
+        (lambda: SynchronizationFunction(lambda *a: a[0], 2, 0), "dimension"),
+        (lambda: SynchronizationFunction(lambda *a: a[0], 2, 1.5), "dimension"),
+        (lambda: SynchronizationFunction.from_matrices([1.0, np.inf], 1), "matrices"),
+        (lambda: SynchronizationFunction.from_matrices(matrices, 2, A_dot=matrices), "A_dot, A_ddot"),
+        (lambda: total(2).coupling(still(3), 1.0), "trajectories"),
+        (lambda: total(2).coupling(still(2, 2), 1.0), "robot 1, trajectory"),
+        (lambda: total(2).coupling(None, 1.0), "trajectories"),
+        (lambda: total(2).coupling([1.0, 2.0], 1.0), "robot 1, trajectory"),
+        (lambda: total(2).coupling(still(2), 1.0, graph=3), "graph"),
+        (lambda: SynchronizationFunction.from_matrices(3.0, 1), "robots"),
+        (lambda: total(2).coupling(still(2), -1.0), "duration"),
+        (lambda: total(2)(np.zeros(3), 0.0), "x"),
     ],
 )
-def test_arguments_that_do_not_fit_are_refused(make, message):
-    with pytest.raises(InputError, match=message):
+def test_arguments_that_do_not_fit_are_refused(make, subject):
+    with refused(InputError, subject):
         make()
 
 
@@ -317,7 +322,7 @@ def test_given_derivatives_that_are_none_are_refused():
     f = SynchronizationFunction.from_matrices(
         matrices, 2, A_dot=lambda t: -matrices(t, 1), A_ddot=lambda t: matrices(t, 2)
     )
-    with pytest.raises(SynchronizationError, match=r"c' of the robot at index \d is not the derivative of c"):
+    with refused(SynchronizationError, "c'"):
         f.coupling(still(3, 2), DURATION)
 
 
@@ -368,7 +373,7 @@ def test_second_order_terms_are_named_robot_by_robot():
 
 def test_a_function_with_a_kink_on_the_desired_motion_has_no_expansion():
     function = SynchronizationFunction(lambda x, y, t: x - np.abs(y), 2, 1)
-    with pytest.raises(SynchronizationError, match="no second derivatives"):
+    with refused(SynchronizationError, "function", time=0.0):
         function.expand([[0.0], [0.0]])
     assert function.expand([[1.0], [1.0]]).linear
 

@@ -17,8 +17,7 @@ from synctrl.errors import ResultError
 from synctrl.paper.baselines import Comparison, compare
 from synctrl.paper.report import SideBySide, Table, Text, write_page
 from synctrl.paper.reproduction import PLANNED
-from synctrl.paper.theory import CERTIFIED, examine
-from synctrl.paper.theory_sections import baseline_section, certificate_section, draw_certificate
+from synctrl.paper.theory import CERTIFIED, baseline_section, certificate_section, draw_certificate, examine
 from synctrl.show.lyapunov_plots import growth_mark, lyapunov_figure
 
 PUSH = Disturbance(robot=0, torque=-60.0, start=0.01, stop=0.03)

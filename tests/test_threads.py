@@ -17,6 +17,7 @@ import pytest
 import scipy
 from at_once import at_once, differing
 from cells import look
+from refusals import refused
 from shared_work import (
     KINDS,
     base_parameters,
@@ -150,5 +151,5 @@ def test_lsoda_of_an_older_scipy_is_for_the_main_thread_only(monkeypatch):
     experiment.simulate(duration=2e-3, integrator="LSODA")
     with ThreadPoolExecutor(1) as pool:
         run = pool.submit(experiment.simulate, duration=2e-3, integrator="LSODA")
-        with pytest.raises(InputError, match=r"main thread.*1\.17"):
+        with refused(InputError, "integrator"):
             run.result()

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import rate, seeds
+from refusals import refused
 
 from synctrl import Circle, Cubic, ExponentialApproach, FunctionTrajectory, Hold
 from synctrl.errors import InputError, TrajectoryError
@@ -141,59 +142,53 @@ def test_a_motion_cannot_be_changed_from_outside():
 
 
 @pytest.mark.parametrize(
-    ("make", "says"),
+    ("make", "subject"),
     [
-        (lambda: Cubic([0.0], [1.0, 2.0], 1.0), r"end: expected shape \(1,\), found \(2,\)"),
+        (lambda: Cubic([0.0], [1.0, 2.0], 1.0), "end"),
         (lambda: Cubic([0.0], [1.0], 0.0), "duration"),
         (lambda: Cubic([0.0], [1.0], -1.0), "duration"),
         (lambda: Cubic([0.0], [1.0], np.nan), "duration"),
         (lambda: Cubic([0.0], [1.0], "long"), "duration"),
         (lambda: Cubic([np.inf], [1.0], 1.0), "start"),
         (lambda: Cubic(0.0, 1.0, 1.0), "start"),
-        (lambda: Hold([[1.0]]), "start|position"),
-        (lambda: Hold([np.nan]), "finite"),
-        (lambda: Hold("here"), "numbers"),
+        (lambda: Hold([[1.0]]), "start"),
+        (lambda: Hold([np.nan]), "start"),
+        (lambda: Hold("here"), "start"),
         (lambda: ExponentialApproach([0.0], [1.0], rate=0.0), "rate"),
         (lambda: ExponentialApproach([0.0], [1.0], rate=-2.0), "rate"),
         (lambda: Circle([0.0, 0.0], radius=0.0, speed=1.0), "radius"),
         (lambda: Circle([0.0, 0.0], radius=1.0, speed=np.inf), "speed"),
         (lambda: Circle([0.0, 0.0], radius=1.0, speed=1.0, phase=np.nan), "phase"),
         (lambda: Circle([0.0, 0.0], 1.0, 1.0, first=[1.0, 0.0, 0.0]), "first"),
-        (lambda: FunctionTrajectory(np.atleast_1d, 1.0, np.atleast_1d), "velocity: expected a function"),
-        (lambda: FunctionTrajectory(*[np.atleast_1d] * 3, breaks=3), "breaks: expected shape"),
-        (lambda: FunctionTrajectory(*[np.atleast_1d] * 3, breaks=("soon",)), "breaks: expected numbers"),
+        (lambda: FunctionTrajectory(np.atleast_1d, 1.0, np.atleast_1d), "velocity"),
+        (lambda: FunctionTrajectory(*[np.atleast_1d] * 3, breaks=3), "breaks"),
+        (lambda: FunctionTrajectory(*[np.atleast_1d] * 3, breaks=("soon",)), "breaks"),
     ],
 )
-def test_numbers_that_make_no_motion_are_refused(make, says):
-    with pytest.raises(InputError, match=says):
+def test_numbers_that_make_no_motion_are_refused(make, subject):
+    with refused(InputError, subject):
         make()
 
 
 @pytest.mark.parametrize(
-    ("make", "says"),
+    ("make", "subject"),
     [
-        (lambda: Circle([0.0], radius=1.0, speed=1.0), "at least 2 dimensions"),
-        (lambda: Circle([0.0, 0.0], 1.0, 1.0, first=[1.0, 0.0], second=[1.0, 0.0]), "orthonormal"),
-        (lambda: Circle([0.0, 0.0], 1.0, 1.0, first=[2.0, 0.0], second=[0.0, 1.0]), "orthonormal"),
-        (
-            lambda: FunctionTrajectory(np.atleast_1d, np.atleast_1d, lambda t: [t, t]),
-            "acceleration: expected shape",
-        ),
+        (lambda: Circle([0.0], radius=1.0, speed=1.0), "center"),
+        (lambda: Circle([0.0, 0.0], 1.0, 1.0, first=[1.0, 0.0], second=[1.0, 0.0]), "first, second"),
+        (lambda: Circle([0.0, 0.0], 1.0, 1.0, first=[2.0, 0.0], second=[0.0, 1.0]), "first, second"),
+        (lambda: FunctionTrajectory(np.atleast_1d, np.atleast_1d, lambda t: [t, t]), "acceleration"),
         (lambda: FunctionTrajectory(np.atleast_1d, np.atleast_1d, lambda t: [np.nan]), "acceleration"),
         (lambda: FunctionTrajectory(lambda t: ["x"], np.atleast_1d, np.atleast_1d), "position"),
-        (
-            lambda: FunctionTrajectory(lambda t: t, lambda t: [t, t], np.atleast_1d),
-            "position: expected shape",
-        ),
+        (lambda: FunctionTrajectory(lambda t: t, lambda t: [t, t], np.atleast_1d), "position"),
     ],
 )
-def test_motions_that_contradict_themselves_are_refused(make, says):
-    with pytest.raises(TrajectoryError, match=says):
+def test_motions_that_contradict_themselves_are_refused(make, subject):
+    with refused(TrajectoryError, subject):
         make()
 
 
 def test_a_function_that_fails_later_is_named_with_the_time():
     path = FunctionTrajectory(lambda t: [t if t < 2 else np.nan], np.atleast_1d, np.atleast_1d)
     np.testing.assert_array_equal(path([0.0, 1.0]).x, [[0.0], [1.0]])
-    with pytest.raises(TrajectoryError, match=r"position: expected finite numbers, found nan.*t = 2 s"):
+    with refused(TrajectoryError, "position", time=2.0):
         path([0.0, 1.0, 2.0])

@@ -7,11 +7,12 @@ import pytest
 from cells import SMALL_GAINS
 from hypothesis import given
 from hypothesis import strategies as st
+from refusals import refused
 from sweeps import DT, base
 
 from synctrl.errors import InputError, SweepError
 from synctrl.sweep import Grid, LogUniform, Uniform, control_period, gain, load, model_error
-from synctrl.sweep.study import Study
+from synctrl.sweep.sweep import Study
 from synctrl.tune import _Search, tune
 
 pytest.importorskip("scipy")
@@ -84,13 +85,14 @@ def test_the_torque_limit_is_kept(free):
 
 
 def test_a_torque_limit_that_no_run_keeps_is_an_error_with_the_smallest_torque():
-    with pytest.raises(SweepError, match=r"smallest peak torque was \d"):
+    with refused(SweepError, "torque_limit") as caught:
         tuned(torque_limit=1e-6)
+    assert caught.value.found > 1e-6
 
 
 def test_a_measure_that_no_run_has_is_named_as_the_cause():
     bands = {"tracking_error": 1e-12, "sync_error": 1e-12}
-    with pytest.raises(SweepError, match="has a sync_settling_time"):
+    with refused(SweepError, "minimize"):
         tuned(minimize="sync_settling_time", bands=bands, generations=1)
 
 

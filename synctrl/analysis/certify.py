@@ -12,9 +12,8 @@ from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .convergence import Convergence, convergence
 from .gain_condition import GainCondition, gain_condition
-from .lyapunov import OUTSIDE, Growth, Lyapunov, first_growth, lyapunov
+from .lyapunov import Growth, Lyapunov, first_growth, lyapunov, outside
 from .metrics import finite_or_none
-from .proofs import unproven_parts
 from .replay import Replay, replay
 
 VERDICTS = ("certified", "outside the theorem", "not certified")
@@ -62,24 +61,43 @@ class Certificate:
 
     def as_dict(self) -> dict[str, Any]:
         """The same as plain numbers, words and lists, without the arrays over time."""
-        record = self.lyapunov
+        record, condition = self.lyapunov, asdict(self.gain_condition)
+        condition = {k: finite_or_none(v) if isinstance(v, float) else v for k, v in condition.items()}
         return {
             "title": self.title,
             "verdict": self.verdict,
             "outside": list(self.outside),
             "doubts": list(self.doubts),
             "growth": None if self.growth is None else asdict(self.growth),
-            "V": {"start": float(record.V[0]), "end": float(record.V[-1]), **_ends(record)},
+            "V": _ends(record.V) | {name: _ends(term) for name, term in record.energy.items()},
             "V_dot": {"largest": float(record.V_dot.max()), "rounding": float(record.rounding.max())},
             "energy": {name: float(value) for name, value in record.supplied.items()},
             "balance": {"closes": self.closes, "drift": record.largest_drift, "bound": record.drift_bound},
             "steps_per_instant": self.every,
-            "gain_condition": {**_finite(asdict(self.gain_condition)), "holds": self.gain_condition.holds},
+            "gain_condition": {**condition, "holds": self.gain_condition.holds},
             "convergence": asdict(self.convergence),
         }
 
     def __str__(self) -> str:
-        return "\n".join(_lines(self))
+        record, errors = self.lyapunov, self.convergence
+        acting = [name for name, power in record.power.items() if (np.abs(power) > record.rounding).any()]
+        supplied = ", ".join(f"{name} {record.supplied[name]:.3g}" for name in acting)
+        final = ", ".join(f"{name} {value:.3g}" for name, value in errors.final.items())
+        lines = [
+            f"{self.title}: {self.verdict}",
+            *(f"  outside: {text}" for text in self.outside),
+            *(f"  doubt: {text}" for text in self.doubts),
+            f"  V goes from {record.V[0]:.5g} to {record.V[-1]:.5g}",
+            f"  by term: {supplied or 'no change'}",
+            f"  V' is at most {record.V_dot.max():.3g} (rounding {record.rounding.max():.1g})",
+            f"  balance: {_balance(self)}",
+            f"  gain condition: {_state(self.gain_condition)}",
+            f"  at the end: {final}",
+            f"  w = N e* + S+ epsilon: off by {errors.identity:.1g}",
+        ]
+        if self.growth is not None:
+            lines.append(f"  V first grows at t = {self.growth.time:g} s, by the term '{self.growth.term}'")
+        return "\n".join(lines)
 
 
 def certify(result: Result, experiment: Experiment | None = None) -> Certificate:
@@ -95,9 +113,9 @@ def certify(result: Result, experiment: Experiment | None = None) -> Certificate
     run = replay(result, experiment)
     record, condition, errors = lyapunov(run), gain_condition(run), convergence(run)
     growth = first_growth(record)
-    unproven = unproven_parts(run)
+    unproven = _unproven(run)
     found = (*_outside(run, record, condition), *unproven)
-    doubts = tuple(_doubts(run, record, errors, growth, bool(found), bool(unproven)))
+    doubts = tuple(_doubts(run, record, errors, None if found else growth, bool(unproven)))
     verdict = VERDICTS[2] if doubts else VERDICTS[1] if found else VERDICTS[0]
     title = str(result.info["title"])
     return Certificate(title, verdict, found, doubts, growth, record, condition, errors, _every(result))
@@ -142,6 +160,16 @@ def _events(run: Replay) -> list[str]:
     return [f"events of {names} move the state in {share}, first until t = {t:g} s: V jumps there"]
 
 
+def _unproven(run: Replay) -> list[str]:
+    """Parts of the controller for which no proof is known, by name."""
+    controller, found = run.loop.controller, []
+    if not hasattr(controller.law, "proof"):
+        found.append(f"the law {controller.law_settings['name']}: it has no energies, and no proof is known")
+    if (words := outside(controller.network)) is not None:
+        found.append(f"the network {controller.network_settings['name']}: {words}")
+    return found
+
+
 def _in_words(run: Replay, name: str) -> str:
     """A power that the theorem does not know, with the plant that it comes from if that is a special one."""
     plant = type(run.loop.plant)
@@ -164,14 +192,9 @@ _WORDS = {
 
 
 def _doubts(
-    run: Replay,
-    record: Lyapunov,
-    errors: Convergence,
-    growth: Growth | None,
-    outside: bool,
-    unproven: bool,
+    run: Replay, record: Lyapunov, errors: Convergence, growth: Growth | None, unproven: bool
 ) -> list[str]:
-    """What should not be even outside the theorem, and growth of V inside it."""
+    """What should not be even outside the theorem, and growth of V where it has no excuse."""
     found = []
     sampled, every = run.result.info.get("control_period") is not None, _every(run.result)
     if every > 1:
@@ -185,7 +208,7 @@ def _doubts(
             f"numerical errors explain {record.drift_bound:.3g}; the step is too long to follow this motion"
             + _advice(run.result)
         )
-    if growth is not None and not outside:
+    if growth is not None:
         found.append(f"V grows at t = {growth.time:g} s by the term '{growth.term}'")
     if not (errors.identity_holds or unproven):
         found.append(f"w = N e* + S+ epsilon is off by {errors.identity:.3g}")
@@ -210,32 +233,8 @@ def _condition_in_words(run: Replay, condition: GainCondition) -> str:
 # -- in words ---------------------------------------------------------------------------------------------
 
 
-def _ends(record: Lyapunov) -> dict[str, dict[str, float]]:
-    return {name: {"start": float(term[0]), "end": float(term[-1])} for name, term in record.energy.items()}
-
-
-def _finite(values: dict[str, Any]) -> dict[str, Any]:
-    """None for what is infinite, so that strict JSON can hold it."""
-    return {k: finite_or_none(v) if isinstance(v, float) else v for k, v in values.items()}
-
-
-def _lines(c: Certificate) -> list[str]:
-    record, errors = c.lyapunov, c.convergence
-    acting = [name for name, power in record.power.items() if (np.abs(power) > record.rounding).any()]
-    supplied = ", ".join(f"{name} {record.supplied[name]:.3g}" for name in acting)
-    lines = [f"{c.title}: {c.verdict}"]
-    lines += [f"  outside: {text}" for text in c.outside] + [f"  doubt: {text}" for text in c.doubts]
-    lines.append(f"  V goes from {record.V[0]:.5g} to {record.V[-1]:.5g}")
-    lines.append(f"  by term: {supplied or 'no change'}")
-    lines.append(f"  V' is at most {record.V_dot.max():.3g} (rounding {record.rounding.max():.1g})")
-    lines.append(f"  balance: {_balance(c)}")
-    lines.append(f"  gain condition: {_state(c.gain_condition)}")
-    final = ", ".join(f"{name} {value:.3g}" for name, value in errors.final.items())
-    lines.append(f"  at the end: {final}")
-    lines.append(f"  w = N e* + S+ epsilon: off by {errors.identity:.1g}")
-    if c.growth is not None:
-        lines.append(f"  V first grows at t = {c.growth.time:g} s, by the term '{c.growth.term}'")
-    return lines
+def _ends(term: np.ndarray) -> dict[str, float]:
+    return {"start": float(term[0]), "end": float(term[-1])}
 
 
 def _balance(c: Certificate) -> str:
@@ -250,6 +249,3 @@ def _state(condition: GainCondition) -> str:
     if not condition.needed:
         return f"not needed with the exact reference acceleration ({margin})"
     return f"{'holds' if condition.holds else 'fails'}, {margin}"
-
-
-__all__ = ["OUTSIDE", "VERDICTS", "Certificate", "certify"]

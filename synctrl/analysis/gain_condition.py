@@ -14,17 +14,23 @@ none of this.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, instance, positive_number
+from ..checks import count, finite_array, instance, positive_number
+from ..control.controller import Controller
+from ..control.gains import spread
 from ..errors import InputError
 from ..renamed import names_elsewhere
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .replay import Replay, replay
+
+Margins = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""What `margins` gives."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +83,7 @@ def rate_matrix(
     return -M @ J_inv @ c_inv @ c_dot @ J
 
 
-def margins(B: np.ndarray, K_r: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def margins(B: np.ndarray, K_r: np.ndarray) -> Margins:
     """Margin, lambda_max(sym(B)) and the largest real part of an eigenvalue of B.
 
     Args:
@@ -104,18 +110,16 @@ def gain_condition(result: Result | Replay, experiment: Experiment | None = None
         InputError: no experiment, or another than the one that made the result.
     """
     run = replay(result, experiment)
-    x, loop = run.rows, run.loop
+    x, controller = run.rows, run.loop.controller
     found = []
-    for i, robot in enumerate(loop.cell.robots):
+    for i, robot in enumerate(run.loop.cell.robots):
         k = robot.nv
         M, J, J_inv = x.M[:, i, :k, :k], x.J[:, i, :, :k], x.J_inv[:, i, :k]
-        values = _values(
-            loop.controller.k_r_space, loop.controller.K_r[i], M, x.c_inv[:, i], x.c_dot[:, i], J, J_inv
-        )
+        values = _values(controller, i, M, x.c_inv[:, i], x.c_dot[:, i], J, J_inv)
         row = int(np.argmin(values[0]))
-        instant = int(np.searchsorted(run.logged, row))
-        place = float(run.result.t[instant]), run.result.q[instant, i, :k]
-        found.append(_condition(run.experiment, i, place, [float(value[row]) for value in values]))
+        at = int(np.searchsorted(run.logged, row))
+        smallest = [float(value[row]) for value in values]
+        found.append(_condition(controller, i, run.result.t[at], run.result.q[at, i, :k], smallest))
     return min(found, key=lambda condition: condition.margin)
 
 
@@ -133,7 +137,7 @@ def gain_condition_in_box(
 
     Args:
         experiment: the cell and its gains.
-        lower, upper: corners of the box, (nv,) for every robot or (n, nv), rad.
+        lower, upper: corners of the box, (nv,) for every robot or (n, nv), or a number, rad.
         duration: the weights are those of 0 <= t <= duration, s; by default the experiment's.
         samples: number of samples per robot.
 
@@ -141,109 +145,86 @@ def gain_condition_in_box(
         InputError: a box of the wrong size or with lower above upper, or a number that is not positive.
     """
     instance("experiment", experiment, Experiment, "an Experiment")
-    instance("samples", samples, (int, np.integer), "a whole number")
-    positive_number("samples", samples)
+    count("samples", samples)
     cell = experiment.cell
-    low, high = (_corner(name, corner, cell) for name, corner in (("lower", lower), ("upper", upper)))
+    corners = {name: finite_array(name, corner) for name, corner in (("lower", lower), ("upper", upper))}
+    low, high = (spread(name, corner, (cell.n, cell.nv)) for name, corner in corners.items())
     if (low > high).any():
         raise InputError(
             f"expected lower <= upper, found {low.tolist()} and {high.tolist()}", subject="lower, upper"
         )
     span = positive_number("duration", experiment.duration if duration is None else duration)
-    found = []
+    controller, found = experiment.closed_loop().controller, []
     for i, robot in enumerate(cell.robots):
-        k = robot.nv
-        evaluate = _Evaluation(experiment, i)
-        point = evaluate.worst(np.append(low[i, :k], 0.0), np.append(high[i, :k], span), samples)
-        values = [float(value) for value in evaluate(point)]
-        found.append(_condition(experiment, i, (float(point[-1]), point[:-1]), values))
+        k, evaluate = robot.nv, _evaluation(controller, i)
+        point = _worst(evaluate, np.append(low[i, :k], 0.0), np.append(high[i, :k], span), samples)
+        found.append(_condition(controller, i, point[-1], point[:-1], [float(v) for v in evaluate(point)]))
     return min(found, key=lambda condition: condition.margin)
 
 
-class _Evaluation:
-    """Margins of one robot at (q, t)."""
+def _evaluation(controller: Controller, i: int) -> Callable[[np.ndarray], Margins]:
+    """`_values` of one robot as a function of q and t, one after the other in an array."""
+    cell, robot = controller.cell, controller.cell.robots[i]
+    space, m = cell.space.bind([robot]), cell.m
 
-    def __init__(self, experiment: Experiment, i: int):
-        cell, self._i = experiment.cell, i
-        self._robot, self._coupling, self._m = cell.robots[i], cell.coupling, cell.m
-        controller = experiment.closed_loop().controller
-        self._task, self._space = cell.space.bind([self._robot]), controller.k_r_space
-        self._K_r = controller.K_r[i]
+    def evaluate(point: np.ndarray) -> Margins:
+        q, weights = point[:-1], cell.coupling.weights(point[-1:], m)
+        task = space.measure(np.stack((q[None], np.zeros((1, q.size)))), np.zeros((3, 1, m)))
+        J, J_inv = (np.eye(m),) * 2 if task.J is None or task.J_inv is None else (task.J[0], task.J_inv[0])
+        M, c_inv, c_dot = robot.mass_matrix(q), weights.c_inv[0, i], weights.c_dot[0, i]
+        return _values(controller, i, M, c_inv, c_dot, J, J_inv)
 
-    def __call__(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        q, t = point[:-1], point[-1:]
-        weights = self._coupling.weights(t, self._m)
-        motion = np.stack((q[None], np.zeros((1, q.size))))
-        task = self._task.measure(motion, np.zeros((3, 1, self._m)))
-        J, J_inv = (
-            (np.eye(self._m),) * 2 if task.J is None or task.J_inv is None else (task.J[0], task.J_inv[0])
-        )
-        c_inv, c_dot = weights.c_inv[0, self._i], weights.c_dot[0, self._i]
-        return _values(self._space, self._K_r, self._robot.mass_matrix(q), c_inv, c_dot, J, J_inv)
+    return evaluate
 
-    def margin(self, point: np.ndarray) -> float:
-        return float(self(point)[0])
 
-    def worst(self, low: np.ndarray, high: np.ndarray, samples: int) -> np.ndarray:
-        """The point of the box with the smallest margin found."""
-        from scipy.optimize import minimize
-        from scipy.stats.qmc import Halton
+def _worst(
+    evaluate: Callable[[np.ndarray], Margins], low: np.ndarray, high: np.ndarray, samples: int
+) -> np.ndarray:
+    """The point of a box with the smallest margin found."""
+    from scipy.optimize import minimize
+    from scipy.stats.qmc import Halton
 
-        points = low + (high - low) * Halton(low.size, scramble=False).random(samples)
-        points = np.array(sorted(points, key=self.margin)[:3])
-        refined = [
-            minimize(self.margin, p, method="Nelder-Mead", bounds=list(zip(low, high, strict=True))).x
-            for p in points
-            if np.isfinite(self.margin(p))
-        ]
-        return min([*points, *refined], key=self.margin)
+    def margin(point: np.ndarray) -> float:
+        return float(evaluate(point)[0])
+
+    points = low + (high - low) * Halton(low.size, scramble=False).random(samples)
+    points = np.array(sorted(points, key=margin)[:3])
+    bounds = list(zip(low, high, strict=True))
+    finite = [p for p in points if np.isfinite(margin(p))]
+    refined = [minimize(margin, p, method="Nelder-Mead", bounds=bounds).x for p in finite]
+    return min([*points, *refined], key=margin)
 
 
 def _values(
-    space: str,
-    K_r: np.ndarray,
+    controller: Controller,
+    i: int,
     M: np.ndarray,
     c_inv: np.ndarray,
     c_dot: np.ndarray,
     J: np.ndarray,
     J_inv: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> Margins:
     """`margins` in the coordinates in which K_r acts.
 
     No K_r in task space bounds the motion that a redundant arm's task does not see: the margin is then minus
     infinity. So it is at a singular Jacobian.
     """
-    redundant = J.shape[-1] > J.shape[-2]
-    if space == "task":
+    redundant, in_task = J.shape[-1] > J.shape[-2], controller.k_r_space == "task"
+    if in_task:
         M, J, J_inv = np.swapaxes(J_inv, -1, -2) @ M @ J_inv, *2 * (np.eye(J.shape[-2]),)
     B = rate_matrix(M, c_inv, c_dot, J, J_inv)
     if not np.isfinite(B).all():
         return np.array(-np.inf), np.array(np.inf), np.array(np.inf)
-    margin, corrected, printed = margins(B, K_r[: B.shape[-1]])
-    unbounded = redundant and space == "task" and B.any(axis=(-2, -1))
+    margin, corrected, printed = margins(B, controller.K_r[i, : B.shape[-1]])
+    unbounded = redundant and in_task and B.any(axis=(-2, -1))
     return np.where(unbounded, -np.inf, margin), corrected, printed
 
 
-def _condition(
-    experiment: Experiment, robot: int, place: tuple[float, np.ndarray], values: list[float]
-) -> GainCondition:
+def _condition(controller: Controller, i: int, t: float, q: np.ndarray, values: list[float]) -> GainCondition:
+    size = len(q) if controller.k_r_space == "joint" else controller.cell.m
+    K_r_min, needed = float(controller.K_r[i, :size].min()), controller.reference_acceleration == "paper"
     margin, corrected, printed = values
-    controller = experiment.closed_loop().controller
-    K_r = controller.K_r[robot]
-    size = experiment.cell.robots[robot].nv if controller.k_r_space == "joint" else experiment.cell.m
-    time, q = place
-    return GainCondition(
-        margin, corrected, printed, float(K_r[:size].min()), robot, time, tuple(map(float, q)),
-        controller.reference_acceleration == "paper",
-    )  # fmt: skip
-
-
-def _corner(name: str, corner: ArrayLike, cell: object) -> np.ndarray:
-    shape = cell.n, cell.nv  # type: ignore[attr-defined]
-    array = finite_array(name, corner)
-    if array.shape not in (shape, shape[1:]):
-        raise InputError(f"expected shape {shape[1:]} or {shape}, found {array.shape}", subject=name)
-    return np.broadcast_to(array, shape)
+    return GainCondition(margin, corrected, printed, K_r_min, i, float(t), tuple(map(float, q)), needed)
 
 
 __getattr__ = names_elsewhere(__name__, ".gain_condition", gain_condition_of="gain_condition")

@@ -13,10 +13,10 @@ import numpy as np
 
 from ..control.discrete import GRID
 from ..simulation.closed_loop import ClosedLoop
-from ..simulation.disturbances import DisturbanceSchedule
+from ..simulation.schedules import DisturbanceSchedule
 
 
-class Stretch(NamedTuple):
+class Piece(NamedTuple):
     """A part of the log in which nothing jumps: instants `first` to `last`, and their rows."""
 
     first: int
@@ -24,29 +24,35 @@ class Stretch(NamedTuple):
     rows: slice
 
 
-def jumps_in(t: np.ndarray, loop: ClosedLoop, schedule: DisturbanceSchedule) -> tuple[list[int], list[int]]:
-    """Logged instants at which something jumps, and those before a jump that falls between two."""
-    edges = (*schedule.edges, *loop.plant.schedule.edges)
-    close = tolerance(t)
-    on_log, between = set(), set()
-    for jump in (*edges, *loop.cell.breaks):
-        if t[0] < jump < t[-1]:
-            nearest = int(np.abs(t - jump).argmin())
-            if abs(t[nearest] - jump) <= close:
-                on_log.add(nearest)
-            else:
-                between.add(int(np.searchsorted(t, jump)) - 1)
-    return sorted(on_log - {0, len(t) - 1}), sorted(between)
-
-
-def events_in(t: np.ndarray, loop: ClosedLoop, period: float | None) -> list[int]:
-    """Logged instants between which and the next one the state jumps.
+def jumps_in(
+    t: np.ndarray, loop: ClosedLoop, schedule: DisturbanceSchedule, period: float | None
+) -> tuple[list[int], list[int], list[int]]:
+    """Where something jumps.
 
     Args:
         t: logged instants, (T,), s.
         loop: the closed loop.
+        schedule: torques from outside.
         period: of sampled control, with which messages arrive at samples, s, or None.
+
+    Returns:
+        Logged instants at which something jumps; those before a jump that falls between two, an event among
+        them; and those before an event.
     """
+    events = _events_in(t, loop, period)
+    on_log, between = set(), {*events}
+    for jump in (*schedule.edges, *loop.plant.schedule.edges, *loop.cell.breaks):
+        if t[0] < jump < t[-1]:
+            nearest = int(np.abs(t - jump).argmin())
+            if abs(t[nearest] - jump) <= tolerance(t):
+                on_log.add(nearest)
+            else:
+                between.add(int(np.searchsorted(t, jump)) - 1)
+    return sorted(on_log - {0, len(t) - 1} - {k + 1 for k in events}), sorted(between), events
+
+
+def _events_in(t: np.ndarray, loop: ClosedLoop, period: float | None) -> list[int]:
+    """Logged instants between which and the next one the state jumps."""
     events, messages = np.sort(loop.events), np.array(loop.messages.between(0.0, float(t[-1])))
     if period is not None:
         messages = period * np.ceil(messages / period - GRID)
@@ -59,7 +65,7 @@ def tolerance(t: np.ndarray) -> float:
     return 1e-9 * float(np.diff(t).max(initial=0.0))
 
 
-def stretches(logged: np.ndarray, jumps: list[int], crossed: list[int]) -> tuple[Stretch, ...]:
+def pieces(logged: np.ndarray, jumps: list[int], crossed: list[int]) -> tuple[Piece, ...]:
     """The parts of a log between jumps.
 
     Args:
@@ -69,7 +75,7 @@ def stretches(logged: np.ndarray, jumps: list[int], crossed: list[int]) -> tuple
     starts = sorted([0, *jumps, *(k + 1 for k in crossed)])
     ends = sorted([*jumps, *crossed, len(logged) - 1])
     return tuple(
-        Stretch(a, b, slice(int(logged[a]), int(logged[b]) + 1 - (b in jumps)))
+        Piece(a, b, slice(int(logged[a]), int(logged[b]) + 1 - (b in jumps)))
         for a, b in zip(starts, ends, strict=True)
         if b > a
     )

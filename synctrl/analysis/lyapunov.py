@@ -13,7 +13,8 @@
        + power of what is outside the theorem
 
 with tilde = theta - theta_hat, E = S^T int eps, sigma = S^T eps; (19), (24), (34) and (39) for any coupling.
-Synchronization, integral and coupling are the part of the paper's law; another law says what its own is.
+Synchronization, integral and coupling are the part of the paper's law; another law says by its method `proof`
+what its own is.
 V' is not taken from that formula: it is the chain rule applied to V with the accelerations of the plant. What
 the formula does not explain is the power called "other", and is rounding when the model is complete.
 """
@@ -22,15 +23,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 
-from ..control.laws import Proof
+from ..control.laws import Along, Proof
+from ..control.network import BoundNetwork
 from ..renamed import names_elsewhere
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .proofs import proof_of, unproven_powers
 from .replay import Replay, replay
 
 #: energies of the paper's law; those of another law stand in place of the last two
@@ -46,9 +48,7 @@ EPS = float(np.finfo(float).eps)
 
 @dataclass(frozen=True, eq=False)
 class Lyapunov:
-    """V and V' of a run at its T logged instants, at a jump with values from the right.
-
-    V has the unit of energy, N·m, when the weights have none.
+    """V, N·m if weights have no unit, and V' at the T logged instants, at a jump with values from the right.
 
     Attributes:
         t: (T,), s.
@@ -129,16 +129,17 @@ def lyapunov(result: Result | Replay, experiment: Experiment | None = None) -> L
         InputError: no experiment, or another than the one that made the result.
     """
     run = replay(result, experiment)
-    proof = proof_of(run)
-    energy, power = _energy(run, proof), _power(run, proof)
+    proof = _proof(run)
+    x, power = run.rows, _power(run, proof)
+    energy = {"kinetic": 0.5 * _sum(x.s_q * np.matvec(x.M, x.s_q)), "parameter": x.storage}
+    energy |= {name: _sum(term) for name, term in proof.energies.items()}
     V, V_dot = (np.sum(list(terms.values()), axis=0) for terms in (energy, power))
     drift, bound = _drift(run, proof, V, V_dot)
-    at = run.logged
     return Lyapunov(
         run.result.t,
-        {name: term[at] for name, term in energy.items()},
-        {name: term[at] for name, term in power.items()},
-        operations(run.loop) * EPS * _magnitude(run, proof)[at],
+        {name: term[run.logged] for name, term in energy.items()},
+        {name: term[run.logged] for name, term in power.items()},
+        operations(run.loop) * EPS * _magnitude(run, proof)[run.logged],
         drift,
         bound + operations(run.loop) * EPS * float(np.max(V)),
         {name: _supplied(run, term) for name, term in power.items()},
@@ -169,20 +170,25 @@ def first_growth(record: Lyapunov) -> Growth | None:
     return Growth(float(record.t[k]), k, rate, term if grows else "integration")
 
 
+def outside(network: BoundNetwork) -> str | None:
+    """What the theorem does not know of a network, in words; None if there is nothing."""
+    ask = getattr(network, "outside", None)
+    return "no proof is known" if ask is None else ask()
+
+
 def operations(loop: ClosedLoop) -> int:
     """Roundings behind one entry of V': ten chained sums over joints, axes and parameters."""
-    cell = loop.cell
-    return 10 * (cell.nv + cell.m + cell.theta.shape[1])
+    return 10 * (loop.cell.nv + loop.cell.m + loop.cell.theta.shape[1])
 
 
 # -- terms ------------------------------------------------------------------------------------------------
 
 
-def _energy(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
-    """Terms of V, one value per row."""
-    x = run.rows
-    energy = {"kinetic": 0.5 * _sum(x.s_q * np.matvec(x.M, x.s_q)), "parameter": x.storage}
-    return energy | {name: _sum(term) for name, term in proof.energies.items()}
+def _proof(run: Replay) -> Proof:
+    """The law's part in V and V'; nothing of a law that has no proof."""
+    x, law = run.rows, cast(Any, run.loop.controller.law)
+    along = Along(x.epsilon, x.epsilon_dot, x.E, x.sigma, x.sigma_dot, x.e_star, x.r, x.c)
+    return law.proof(along) if hasattr(law, "proof") else Proof({}, {}, {})
 
 
 def _rates(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
@@ -214,7 +220,12 @@ def _power(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
     }
     power = {name: _sum(term) for name, term in terms.items()}
     power |= dict(zip(run.learning, x.learning.T, strict=True))
-    power |= unproven_powers(run, proof, _sum(s * x.force))
+    pushed = _sum(s * x.force)  # the rates of the proof less its powers, where it holds
+    if not hasattr(controller.law, "proof"):
+        power["law"] = -pushed
+    elif outside(controller.network) is not None:
+        rates, powers = (sum(map(_sum, terms.values())) for terms in (proof.rates, proof.powers))
+        power["network"] = rates - powers - pushed
     power["other"] = np.sum(_rates(run, proof), axis=0) - np.sum(list(power.values()), axis=0)
     return power
 
@@ -258,7 +269,7 @@ def _drift(run: Replay, proof: Proof, V: np.ndarray, V_dot: np.ndarray) -> tuple
     """
     drift, bound = np.zeros(len(run.logged)), 0.0
     rates = _rates(run, proof)
-    for first, last, rows in run.stretches:
+    for first, last, rows in run.pieces:
         t = run.result.t[first : last + 1]
         missing = V[rows] - V[rows][0] - _integral(t, V_dot[rows])
         drift[last + 1 :] = drift[first] + missing[-1]
@@ -268,9 +279,9 @@ def _drift(run: Replay, proof: Proof, V: np.ndarray, V_dot: np.ndarray) -> tuple
 
 
 def _supplied(run: Replay, rate: np.ndarray) -> float:
-    """Integral of a power over all stretches of the run."""
+    """Integral of a power over all pieces of the run."""
     t = run.result.t
-    return sum(float(_integral(t[first : last + 1], rate[rows])[-1]) for first, last, rows in run.stretches)
+    return sum(float(_integral(t[first : last + 1], rate[rows])[-1]) for first, last, rows in run.pieces)
 
 
 def _integral(t: np.ndarray, rate: np.ndarray) -> np.ndarray:

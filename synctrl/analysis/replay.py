@@ -15,11 +15,11 @@ from ..errors import InputError
 from ..robots.forest import Forest, Selection, forests
 from ..simulation.clock import before
 from ..simulation.closed_loop import ClosedLoop
-from ..simulation.disturbances import DisturbanceSchedule
 from ..simulation.recorder import ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE, own_states
 from ..simulation.result import LAYOUT, Result
+from ..simulation.schedules import DisturbanceSchedule
 from ..simulation.simulate import Experiment
-from .jumps import Stretch, events_in, jumps_in, stretches, tolerance
+from .jumps import Piece, jumps_in, pieces, tolerance
 
 #: instants whose references are evaluated together
 BLOCK = 256
@@ -36,7 +36,7 @@ Bodies = Sequence[tuple[Selection, Forest]]
 """The robots of a cell as `forests` groups them."""
 
 
-class Row(NamedTuple):
+class Moment(NamedTuple):
     """What the closed loop computes at one instant; with one more axis in front, at all of them.
 
     Attributes:
@@ -98,7 +98,7 @@ class Replay:
         loop: its closed loop.
         rows: states and signals, one row per instant, and two where something jumps: from the left and right.
         logged: row of every logged instant, (T,); at a jump the one from the right.
-        stretches: parts of the log in which nothing jumps.
+        pieces: parts of the log in which nothing jumps.
         events: instants between which and the next one the state jumps, by events of plant or network.
         learning: names of the powers of the adaptation.
     """
@@ -106,9 +106,9 @@ class Replay:
     result: Result
     experiment: Experiment
     loop: ClosedLoop
-    rows: Row
+    rows: Moment
     logged: np.ndarray
-    stretches: tuple[Stretch, ...]
+    pieces: tuple[Piece, ...]
     events: tuple[int, ...]
     learning: tuple[str, ...]
 
@@ -132,15 +132,13 @@ def replay(result: Result | Replay, experiment: Experiment | None = None) -> Rep
     _check_sizes(result, loop)
     _check_numbers(result)
     schedule = DisturbanceSchedule(loop.cell, experiment.disturbances)
-    events = events_in(result.t, loop, result.info.get("control_period"))
-    jumps, crossed = jumps_in(result.t, loop, schedule)
-    jumps, crossed = sorted({*jumps} - {k + 1 for k in events}), sorted({*crossed, *events})
-    rows = Row(*(np.array(column) for column in zip(*_rows(result, loop, schedule, jumps), strict=True)))
+    jumps, crossed, events = jumps_in(result.t, loop, schedule, result.info.get("control_period"))
+    rows = Moment(*map(np.array, zip(*_rows(result, loop, schedule, jumps), strict=True)))
     instants = np.arange(len(result.t))
     logged = instants + np.searchsorted(jumps, instants, side="right")
-    _check_same(result, Row(*(column[logged] for column in rows)))
+    _check_same(result, Moment(*(column[logged] for column in rows)))
     learning = _learning(loop, result)
-    parts = stretches(logged, jumps, crossed)
+    parts = pieces(logged, jumps, crossed)
     return Replay(result, experiment, loop, rows, logged, parts, tuple(events), learning)
 
 
@@ -164,7 +162,9 @@ def experiment_of(result: Result, experiment: Experiment | None) -> Experiment:
 # -- rows -------------------------------------------------------------------------------------------------
 
 
-def _rows(result: Result, loop: ClosedLoop, schedule: DisturbanceSchedule, jumps: list[int]) -> Iterator[Row]:
+def _rows(
+    result: Result, loop: ClosedLoop, schedule: DisturbanceSchedule, jumps: list[int]
+) -> Iterator[Moment]:
     t, references, bodies = result.t, loop.cell.references, forests(loop.cell.robots)
     for start in range(0, len(t), BLOCK):
         for k, reference in enumerate(references(t[start : start + BLOCK]), start):
@@ -176,14 +176,14 @@ def _rows(result: Result, loop: ClosedLoop, schedule: DisturbanceSchedule, jumps
 
 def _row(
     result: Result, loop: ClosedLoop, bodies: Bodies, k: int, reference: Reference, disturbance: np.ndarray
-) -> Row:
+) -> Moment:
     q, v, y = result.q[k], result.v[k], _state(result, k)
     y_dot, s = loop.evaluate(reference, y, disturbance)
     theta, adaptation, z = loop.cell.theta, loop.controller.adaptation, loop.state(y).z
     J, J_inv = _jacobians(loop, s)
     M, C_s = _dynamics(bodies, q, v, s.s_q)
     friction, friction_damping = _friction(loop, bodies, q, v, s)
-    return Row(
+    return Moment(
         v, loop.split(y_dot)[1], s.v_ref, s.a_ref, s.s_q, s.tau, disturbance, friction, friction_damping,
         s.tau - loop.plant.applied(s.tau), np.array(adaptation.storage(z, theta)),
         np.array(adaptation.storage_rate(z, s.z_dot, theta)),
@@ -260,7 +260,7 @@ def _check_sizes(result: Result, loop: ClosedLoop) -> None:
         array = result.outputs.get(name) if name in own else getattr(result, name)
         found = None if array is None else array.shape[1:]
         if found != shape:
-            raise _another(f"its {name} has the shape {shape} at an instant, but the result's has {found}")
+            raise _another(f"its {name} has the shape {shape} at an instant, the result's {found}", name)
     if not len(result.t):
         raise InputError("expected at least one logged instant, found none", subject="result")
 
@@ -277,7 +277,7 @@ def _check_numbers(result: Result) -> None:
             )
 
 
-def _check_same(result: Result, rows: Row) -> None:
+def _check_same(result: Result, rows: Moment) -> None:
     """Compare velocity errors; where robots are at rest and on their path, these are nothing but rounding."""
     difference = np.abs(rows.s_q - result.v_error).max(axis=(1, 2))
     speed = (np.abs(rows.v_ref) + np.abs(rows.v)).max(axis=(1, 2))
@@ -287,10 +287,11 @@ def _check_same(result: Result, rows: Row) -> None:
         k = int(np.argmax(wrong))
         raise _another(
             f"at t = {result.t[k]:g} s it gives a velocity error of {rows.s_q[k].tolist()}, but the result "
-            f"has {result.v_error[k].tolist()}"
+            f"has {result.v_error[k].tolist()}",
+            "v_error",
         )
 
 
-def _another(reason: str) -> InputError:
-    """The error about an experiment that is another one than that of the result."""
-    return InputError(f"expected the one that made the result; {reason}", subject="experiment")
+def _another(reason: str, part: str) -> InputError:
+    """The error about an experiment that is another one than that of the result, with what differs."""
+    return InputError(f"expected the one that made the result; {reason}", subject="experiment", found=part)

@@ -5,14 +5,14 @@ comes out is written as C. The loop through time is written in C by hand, and ev
 to run, such as gains, desired motions, true parameters and loads, is handed to it in arrays. The way of a run
 goes through these modules:
 
-1. `run`: the engine, as `simulate(engine="compiled")` finds it;
+1. `engine`: as `simulate(engine="compiled")` finds it;
 2. `known`: is every part of the closed loop the package's own, or one that can be traced? If not, the run is
    refused, and the part named;
 3. `kind`: which robots are equal, and can share code;
-4. `trace`, with `lawful` for laws and `learning` for adaptations: the functions of a robot of a kind;
-5. `header` and `structs`, made from the table in `quantities`: what stands in C before `driver.c`;
-6. `build`, with `compiler`, `cache` and `elf`: from C to a library that is loaded;
+4. `trace`, with `plugged` for laws and adaptations of a user's own: the functions of a robot of a kind;
+5. `structs`, made from the table in `quantities`: what stands in C before `driver.c`;
+6. `build`, with `compiler` and `cache`: from C to a library that is loaded;
 7. `program`: library and arrays together. Once in every process, before it is used, the library is compared
    with the reference engine, on the small closed loop of `specimen`;
-8. `engine`: takes the run through time, some steps with every call of `advance` in `driver.c`.
+8. `engine` again: takes the run through time, some steps with every call of `advance` in `driver.c`.
 """

@@ -12,14 +12,17 @@ import hashlib
 import json
 import os
 import platform
+import struct
+import sys
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 from ..errors import CompilationError, MissingDependencyError
-from .cache import building_folder, load, open_cache, read_file, remove_leftovers
-from .compiler import FLAGS, compile_library, compiler, compiler_version
+from .cache import building_folder, executable_place, open_cache, read_file, remove_leftovers
+from .compiler import FLAGS, compile_library, compiler, compiler_version, fault
 
 #: rooms of the package that generated code is made from, or compared with
 ROOMS = ("robots", "tasks", "coupling", "control", "simulation", "compiled")
@@ -32,6 +35,24 @@ Check = Callable[[ctypes.CDLL], None]
 _CHECKED: dict[tuple[str, str], ctypes.CDLL] = {}
 
 
+class _Layout(NamedTuple):
+    """Where numbers stand in the headers of 32 or 64 bits: formats and offsets."""
+
+    size: int
+    tables: tuple[str, int]
+    counts: tuple[str, int]
+    segment: str
+
+
+_LAYOUTS = {
+    1: _Layout(52, ("II", 28), ("4H", 42), "II8xI"),
+    2: _Layout(64, ("QQ", 32), ("4H", 54), "I4xQ16xQ"),
+}
+_ORDERS = {1: "<", 2: ">"}
+#: segments of this type are mapped into memory
+_LOAD = 1
+
+
 def require_casadi() -> str:
     """Version of CasADi.
 
@@ -42,7 +63,8 @@ def require_casadi() -> str:
         from casadi import CasadiMeta
     except ImportError as error:
         raise MissingDependencyError(
-            "engine='compiled' needs CasADi: pip install 'synctrl[compiled]'; or use engine='pinocchio'"
+            "engine='compiled' needs it: pip install 'synctrl[compiled]'; or use engine='pinocchio'",
+            subject="CasADi",
         ) from error
     return str(CasadiMeta.version())
 
@@ -88,7 +110,50 @@ def cached_library(key: str, generate: Callable[[], Iterable[str]], check: Check
     try:
         return _stored(folder, key, check) or _built(folder, key, generate, check)
     except OSError as error:
-        raise CompilationError(f"cannot write to the cache '{folder}': {error}") from error
+        raise CompilationError(
+            f"cannot write to the cache '{folder}': {error}", file=folder, found=error.strerror
+        ) from error
+
+
+def load(content: bytes, folder: Path) -> ctypes.CDLL:
+    """A library with this content, from a copy that only this process knows.
+
+    What happens to the file in the cache later has no effect on it.
+
+    Raises:
+        CompilationError: nothing may be executed, neither in the cache nor among the temporary files.
+        OSError: it is no library.
+    """
+    if sys.platform == "linux" and not is_whole(content):
+        raise OSError("no shared library, or only a part of one")
+    with building_folder(executable_place(folder)) as place:
+        copy = place / "library.so"
+        copy.write_bytes(content)
+        return ctypes.CDLL(str(copy))
+
+
+def is_whole(content: bytes) -> bool:
+    """Whether a shared library of Linux, in ELF format, has every part that its headers speak of.
+
+    The system's loader believes them; where they promise more than there is, the process dies.
+    """
+    if len(content) < 6 or content[:4] != b"\x7fELF":
+        return False
+    layout, order = _LAYOUTS.get(content[4]), _ORDERS.get(content[5])
+    if layout is None or order is None or len(content) < layout.size:
+        return False
+    segments, sections = struct.unpack_from(order + layout.tables[0], content, layout.tables[1])
+    size, count, section_size, section_count = struct.unpack_from(
+        order + layout.counts[0], content, layout.counts[1]
+    )
+    ends = [segments + size * count, sections + section_size * section_count]
+    if max(ends) > len(content) or size < struct.calcsize(order + layout.segment):
+        return False
+    for k in range(count):
+        kind, start, length = struct.unpack_from(order + layout.segment, content, segments + k * size)
+        if kind == _LOAD:
+            ends.append(start + length)
+    return max(ends) <= len(content)
 
 
 # -- internals --------------------------------------------------------------------------------------------
@@ -114,9 +179,7 @@ def _built(folder: Path, key: str, generate: Callable[[], Iterable[str]], check:
         try:
             library = _checked(folder, key, content, check)
         except OSError as error:
-            raise CompilationError(
-                f"the C compiler '{compiler()[0]}' wrote what cannot be loaded as a library: {error}"
-            ) from error
+            raise fault(compiler()[0], "wrote what cannot be loaded as a library", f": {error}") from error
         _publish(place, folder / key, key, content)
     return library
 

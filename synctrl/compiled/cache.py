@@ -7,7 +7,6 @@ administrator, and nobody else may write there. What is then read is loaded from
 
 from __future__ import annotations
 
-import ctypes
 import errno
 import fcntl
 import os
@@ -21,7 +20,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import CompilationError, InputError
-from .elf import is_whole
 
 #: a library that is larger than this, bytes, is none of ours
 LARGEST = 500_000_000
@@ -131,21 +129,25 @@ def remove_leftovers(cache: Path) -> None:
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def load(content: bytes, cache: Path) -> ctypes.CDLL:
-    """A library with this content, from a copy that only this process knows.
-
-    What happens to the file in the cache later has no effect on it.
+def executable_place(cache: Path) -> Path:
+    """Where a library can be written and loaded: the cache, or else among the temporary files.
 
     Raises:
-        CompilationError: nothing may be executed, neither in the cache nor among the temporary files.
-        OSError: it is no library.
+        CompilationError: in neither of them.
     """
-    if sys.platform == "linux" and not is_whole(content):
-        raise OSError("no shared library, or only a part of one")
-    with building_folder(_executable_place(cache)) as folder:
-        copy = folder / "library.so"
-        copy.write_bytes(content)
-        return ctypes.CDLL(str(copy))
+    if _is_executable(cache):
+        return cache
+    other = _temporary()
+    if not _is_executable(other):
+        raise CompilationError(
+            f"nothing may be written and executed in the cache '{cache}', nor in '{other}' (mounted noexec, "
+            "or read-only?): name a folder where it may by SYNCTRL_CACHE or TMPDIR, or use "
+            "engine='pinocchio'",
+            file=cache,
+            found="noexec",
+        )
+    _check_way(other)
+    return other
 
 
 # -- who may have written it ------------------------------------------------------------------------------
@@ -257,22 +259,6 @@ def _temporary() -> Path:
         return Path(tempfile.gettempdir())
     except OSError as error:
         raise CompilationError(f"no folder for temporary files: {error}; name one by TMPDIR") from error
-
-
-def _executable_place(cache: Path) -> Path:
-    """Where a library can be written and loaded."""
-    if _is_executable(cache):
-        return cache
-    other = _temporary()
-    if not _is_executable(other):
-        raise CompilationError(
-            f"nothing may be written and executed in the cache '{cache}', nor in '{other}' (mounted noexec, "
-            "or read-only?): name a folder where it may by SYNCTRL_CACHE or TMPDIR, or use "
-            "engine='pinocchio'",
-            file=cache,
-        )
-    _check_way(other)
-    return other
 
 
 def _is_executable(place: Path) -> bool:

@@ -43,8 +43,8 @@ def compiler() -> tuple[str, ...]:
     if named:
         raise _bad_cc(f"'{named[0]}' {_why_not(named[0])}")
     raise MissingDependencyError(
-        "engine='compiled' needs a C compiler (cc, gcc or clang), and none was found; "
-        "install one, or use engine='pinocchio'"
+        "engine='compiled' needs cc, gcc or clang, and found none; install one, or use engine='pinocchio'",
+        subject="C compiler",
     )
 
 
@@ -104,7 +104,7 @@ def run(command: Iterable[str], seconds: float, stop: threading.Event | None = N
             start_new_session=True,
         )
     except (OSError, ValueError) as error:
-        raise CompilationError(f"the C compiler '{command[0]}' cannot be run: {error}") from error
+        raise fault(command[0], "cannot be run", f": {error}") from error
     with process:
         try:
             printed = _follow(process, command[0], seconds, stop or threading.Event())
@@ -112,6 +112,11 @@ def run(command: Iterable[str], seconds: float, stop: threading.Event | None = N
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(process.pid, signal.SIGKILL)  # with the children that it has left
     return process.returncode, printed.decode(errors="replace").strip()
+
+
+def fault(program: str, found: str, more: str = "") -> CompilationError:
+    """The error about a compiler that does something else than to compile."""
+    return CompilationError(f"'{program}' {found}{more}", subject="C compiler", found=found)
 
 
 # -- internals --------------------------------------------------------------------------------------------
@@ -123,13 +128,15 @@ def _named() -> tuple[str, ...]:
     try:
         return tuple(shlex.split(text))
     except ValueError as error:
-        raise _bad_cc(f"{text!r} cannot be split into words ({error})") from error
+        raise _bad_cc(f"{text!r} cannot be split into words") from error
 
 
 def _bad_cc(found: str) -> MissingDependencyError:
     return MissingDependencyError(
-        f"engine='compiled' needs a C compiler, and the one named by CC cannot be used: {found}; expected a "
-        "command such as gcc or clang; correct or unset CC, or use engine='pinocchio'"
+        "engine='compiled' needs a C compiler, expected a command such as gcc or clang; "
+        f"{found}: correct or unset CC, or use engine='pinocchio'",
+        subject="CC",
+        found=found,
     )
 
 
@@ -161,14 +168,12 @@ def _make(target: Path, command: list[str], stop: threading.Event) -> Path:
     status, printed = run([*command, "-o", str(target)], LONGEST, stop)
     said = f":\n{printed[:2000]}" if printed else ""
     if status < 0:
-        raise CompilationError(f"the C compiler '{command[0]}' was ended by signal {-status}{said}")
+        raise fault(command[0], f"was ended by signal {-status}", said)
     if status != 0:
-        raise CompilationError(f"the C compiler refused generated code{said or f' with status {status}'}")
+        raise fault(command[0], "refused generated code", said or f" with status {status}")
     if not (target.is_file() and target.stat().st_size):
-        raise CompilationError(
-            f"the C compiler '{command[0]}' ended without an error, but wrote no '{target.name}'; is it a "
-            f"compiler? It was named by {'CC' if os.environ.get('CC') else 'PATH'}{said}"
-        )
+        named = f"; is it a compiler? It was named by {'CC' if os.environ.get('CC') else 'PATH'}"
+        raise fault(command[0], f"ended without an error, but wrote no '{target.name}'", named + said)
     return target
 
 
@@ -195,16 +200,13 @@ def _follow(process: subprocess.Popen[bytes], name: str, seconds: float, stop: t
 
 def _check_limits(name: str, printed: int, seconds: float, deadline: float, stop: threading.Event) -> None:
     """Raise if a running program must be stopped."""
-    way_out = "name another one by CC, or use engine='pinocchio'"
+    way_out = " with the processes that it had started; name another one by CC, or use engine='pinocchio'"
     if stop.is_set():
-        raise CompilationError(f"the C compiler '{name}' was stopped, because something else failed")
+        raise fault(name, "was stopped", ", because something else failed")
     if printed > MOST_PRINTED:
-        raise CompilationError(f"the C compiler '{name}' printed without end and was stopped; {way_out}")
+        raise fault(name, "printed without end and was stopped", way_out)
     if monotonic() > deadline:
-        raise CompilationError(
-            f"the C compiler '{name}' did not end within {seconds:g} s and was stopped, with the processes "
-            f"that it had started; {way_out}"
-        )
+        raise fault(name, f"did not end within {seconds:g} s and was stopped", way_out)
 
 
 def _ends_soon(process: subprocess.Popen[bytes]) -> bool:

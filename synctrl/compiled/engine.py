@@ -1,23 +1,24 @@
-"""Runs of the compiled engine: blocks of steps through the library, and the same Result as the reference."""
+"""The compiled engine: blocks of steps through the library, and the same Result as the reference."""
 
 from __future__ import annotations
 
 import ctypes
 import operator
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..coupling.cell import Cell
+from ..simulation.advance import up_to_a_failure
 from ..simulation.clock import Clock, Stretch
-from ..simulation.disturbances import DisturbanceSchedule
-from ..simulation.guard import Finding, checks, limits_of, stopped
-from ..simulation.handover import tell, up_to_a_failure
+from ..simulation.engines import Run, before_the_start, finish
+from ..simulation.guard import Finding, Progress, checks, limits_of, stopped, tell
 from ..simulation.recorder import Recorder
-from ..simulation.step_error import StepError
+from ..simulation.result import Result
 from . import structs
+from .known import check_known
 from .program import Program, one_after_another
 from .quantities import DESIRED, LOGS
 from .structs import Mark
@@ -45,27 +46,15 @@ def blocks(program: Program, clock: Clock) -> Iterator[Block]:
         stretch = clock.stretch(first, last)
         return Block(stretch, _tables(cell, stretch.stages))
 
-    for first, last in clock.stretches(_length(cell)):
+    length = min(BLOCK_STEPS, max(1, BLOCK_BYTES // _step_bytes(cell)))
+    for first, last in clock.stretches(length):
         yield from up_to_a_failure(make, first, last)
-
-
-def _length(cell: Cell) -> int:
-    """Steps of a block."""
-    return min(BLOCK_STEPS, max(1, BLOCK_BYTES // _step_bytes(cell)))
 
 
 def _step_bytes(cell: Cell) -> int:
     """Bytes of what is desired in one step."""
     weights = 0 if cell.coupling.is_constant else 4 * cell.m**2
     return 3 * 8 * cell.n * (3 * cell.m + weights)
-
-
-class Kept(NamedTuple):
-    """The blocks of a run, and what they were made for: motions and weights, the clock, and its log."""
-
-    made_for: tuple[Any, ...]
-    instants: tuple[Clock, int] | None
-    blocks: list[Block]
 
 
 class Tables:
@@ -75,26 +64,27 @@ class Tables:
     """
 
     def __init__(self) -> None:
-        self._kept = Kept((), None, [])
+        self._kept: tuple[list[Any], tuple, list[Block]] = [], (), []
 
     def blocks(self, program: Program, clock: Clock) -> Iterable[Block]:
         """The steps of a run, made anew if the run before had other motions, weights or instants."""
-        cell, kept = program.loop.cell, self._kept
+        cell = program.loop.cell
         if clock.steps * _step_bytes(cell) > BLOCK_BYTES:
             return blocks(program, clock)
-        wanted = (cell.coupling, *(member.trajectory for member in cell.members))
-        same = len(wanted) == len(kept.made_for) and all(map(operator.is_, wanted, kept.made_for))
-        if same and kept.instants == (clock, clock.every):
-            return kept.blocks
-        return self._keep(blocks(program, clock), wanted, clock)
+        parts = [cell.coupling, *(member.trajectory for member in cell.members)]
+        known, instants, kept = self._kept
+        same = len(parts) == len(known) and all(map(operator.is_, parts, known))
+        if same and instants == (clock, clock.every):
+            return kept
+        return self._keep(parts, clock, blocks(program, clock))
 
-    def _keep(self, fresh: Iterable[Block], wanted: tuple[Any, ...], clock: Clock) -> Iterator[Block]:
+    def _keep(self, parts: list[Any], clock: Clock, fresh: Iterable[Block]) -> Iterator[Block]:
         """Fresh blocks, which are known from when the last of them has been made."""
         found = []
         for block in fresh:
             found.append(block)
             yield block
-        self._kept = Kept(wanted, (clock, clock.every), found)
+        self._kept = parts, (clock, clock.every), found
 
 
 class Pace:
@@ -117,98 +107,92 @@ class Pace:
         self._steps = max(1, min(8 * self._steps, fitting))
 
 
-def advance(
-    program: Program,
-    clock: Clock,
-    schedule: DisturbanceSchedule,
-    recorder: Recorder,
-    step_error: StepError,
-    every: int | None = None,
-    progress: Callable[[float], Any] | None = None,
-    tables: Tables | None = None,
-) -> None:
-    """Run a compiled program and log into the recorder.
+class Compiled:
+    """The closed loop as generated C, as one engine among others.
 
     Args:
-        program: the closed loop.
-        clock: its instants.
-        schedule: disturbances.
-        recorder: where logged instants go; after a failure it has those before it.
-        step_error: told what the worst step was.
-        every: with sampled control, how many steps of dt one sample lasts.
-        progress: called with the time reached, s, several times a second.
-        tables: those of earlier runs.
-
-    Raises:
-        NonFiniteError, SingularJacobianError, OrientationError: as the reference engine.
-        SynctrlError: a desired motion or weight fails.
+        libraries: what earlier runs have loaded, by what it was made for.
+        tables: what was desired in earlier runs.
     """
-    y, pace = recorder.state, Pace()
-    steps = _Steps(program, clock, schedule, recorder, step_error, every)
-    for block in blocks(program, clock) if tables is None else tables.blocks(program, clock):
-        for first, last in pace.parts(len(block.steps.starts)):
-            start = perf_counter()
-            steps.advance(block, first, last, y)
-            pace.learn(last - first, perf_counter() - start)
-            recorder.reached = float(block.steps.times[last])
-            tell(progress, recorder.reached)
-    steps.finish(y)
+
+    def __init__(self, libraries: dict[str, ctypes.CDLL] | None = None, tables: Tables | None = None):
+        self._libraries, self._blocks = libraries, blocks if tables is None else tables.blocks
+
+    def refuses(self, run: Run) -> None:
+        """See `Engine`.
+
+        Raises:
+            InputError: the closed loop cannot be generated; it has what and why.
+        """
+        check_known(run.loop)
+
+    def load(self, run: Run) -> Program:
+        """The program of a run, found or built.
+
+        Raises:
+            see `Program`
+        """
+        return Program(run.loop, self._libraries)
+
+    def run(self, run: Run, progress: Progress | None = None) -> Result:
+        """Make a run; see `Engine`."""
+        run.info["engine"] = "compiled"
+        recorder = Recorder(run.loop, run.clock)
+        with before_the_start(run):
+            program = self.load(run)
+
+        def log() -> None:
+            steps, pace = _Steps(program, run, recorder), Pace()
+            for block in self._blocks(program, run.clock):
+                for first, last in pace.parts(len(block.steps.starts)):
+                    start = perf_counter()
+                    steps.advance(block, first, last)
+                    pace.learn(last - first, perf_counter() - start)
+                    recorder.reached = float(block.steps.times[last])
+                    tell(progress, recorder.reached)
+            steps.finish()
+
+        return finish(run, recorder, log)
 
 
 class _Steps:
-    """The library's `advance` with everything it needs for one run."""
+    """The library's `advance` with everything it needs for one run; the state is the recorder's."""
 
-    def __init__(
-        self,
-        program: Program,
-        clock: Clock,
-        schedule: DisturbanceSchedule,
-        recorder: Recorder,
-        step_error: StepError,
-        every: int | None,
-    ):
-        self._program, self._clock, self._every = program, clock, every
-        self._schedule, self._recorder, self._step_error = schedule, recorder, step_error
-        v0, work = program.loop.cell.v0, program.work
+    def __init__(self, program: Program, run: Run, recorder: Recorder):
+        self._program, self._run, self._recorder = program, run, recorder
+        v0, work = run.loop.cell.v0, program.work
         self._before = np.zeros((2, 2, v0.size))
         buffers = (part.ctypes.data for part in self._before)
         work.step_error = structs.StepError(0, np.abs(v0).max(), 0, 0, 0, *buffers)
-        self._steps = structs.Steps(holds=every is not None)
+        self._steps = structs.Steps(holds=run.every is not None)
         self._block: Block | None = None
-        program.tell(self._steps, {"disturbance": schedule.torques, "pi": program.carried})
-        ctypes.memset(work.side, 0, 8 * program.loop.cell.n)
+        program.tell(self._steps, {"disturbance": run.schedule.torques, "pi": program.carried})
+        ctypes.memset(work.side, 0, 8 * run.loop.cell.n)
 
-    def advance(self, block: Block, first: int, last: int, y: np.ndarray) -> None:
-        """Move y through some steps of a block, in place."""
-        steps = block.steps
-        part = slice(first, last)
-        joined = self._clock.joined(steps.first + first, steps.starts[part])
+    def advance(self, block: Block, first: int, last: int) -> None:
+        """Make some steps of a block."""
+        steps, part = block.steps, slice(first, last)
+        joined = self._run.clock.joined(steps.first + first, steps.starts[part])
         marks = _marks(steps.checked[part], steps.logged[part], self._sampled(steps, part), joined)
-        windows = self._windows(steps.middles[part])
-        self._call(block, first, steps.times[first : last + 1], marks, windows, y)
+        self._call(block, first, steps.times[first : last + 1], marks, steps.middles[part])
 
-    def finish(self, y: np.ndarray) -> None:
-        """Log the end of the run: one step of no length."""
-        end, clock = np.array([self._clock.end]), self._clock
-        at = np.array([clock.count])
-        nothing = Stretch(clock.steps, np.repeat(end, 2), at > 0, at > 0, at)
-        block = Block(nothing, _tables(self._program.loop.cell, np.array([end] * 3)))
-        due = np.array([self._every is None or clock.sampled_at_end(self._every)])
-        windows = self._windows(clock.stretch(clock.steps - 1, clock.steps).middles)
-        self._call(block, 0, nothing.times, _marks(at > 0, at > 0, due, at < 0), windows, y)
-
-    def _windows(self, middles: np.ndarray) -> list[np.ndarray]:
-        """Which disturbance acts in each step, and which load is carried."""
-        schedules = self._schedule, self._program.loop.plant.schedule
-        return [schedule.windows(middles).astype(np.intc) for schedule in schedules]
+    def finish(self) -> None:
+        """Log the end of the run: one step of no length, in which acts what acted in the last step."""
+        clock, every = self._run.clock, self._run.every
+        end, yes, no = np.array([clock.end]), np.array([True]), np.array([False])
+        nothing = Stretch(clock.steps, np.repeat(end, 2), yes, yes, np.array([clock.count]))
+        block = Block(nothing, _tables(self._run.loop.cell, np.array([end] * 3)))
+        due = np.array([every is None or clock.sampled_at_end(every)])
+        before = clock.stretch(clock.steps - 1, clock.steps).middles
+        self._call(block, 0, nothing.times, _marks(yes, yes, due, no), before)
 
     def _sampled(self, steps: Stretch, part: slice) -> np.ndarray:
         """Whether each step begins with a sample: on multiples of dt, or always if control is continuous."""
-        if self._every is None:
+        if self._run.every is None:
             return np.ones(len(steps.starts[part]), dtype=bool)
-        return steps.checked[part] & (steps.number[part] % self._every == 0)
+        return steps.checked[part] & (steps.number[part] % self._run.every == 0)
 
-    def _of(self, block: Block) -> structs.Steps:
+    def _look_at(self, block: Block) -> structs.Steps:
         """The steps of a block."""
         if block is not self._block:
             self._program.tell(self._steps, block.desired)
@@ -216,34 +200,28 @@ class _Steps:
         return self._steps
 
     def _call(
-        self,
-        block: Block,
-        first: int,
-        times: np.ndarray,
-        marks: np.ndarray,
-        windows: list[np.ndarray],
-        y: np.ndarray,
+        self, block: Block, first: int, times: np.ndarray, marks: np.ndarray, middles: np.ndarray
     ) -> None:
+        """Make steps between these times; what acts in the middle of one acts in all of it."""
         program, recorder, report = self._program, self._recorder, structs.Report()
-        steps, times, (disturbed, loaded) = self._of(block), np.ascontiguousarray(times), windows
-        steps.first, steps.count, steps.t, steps.marks = (
-            first,
-            len(marks),
-            times.ctypes.data,
-            marks.ctypes.data,
-        )
-        steps.disturbed, steps.loaded = disturbed.ctypes.data, loaded.ctypes.data
+        schedules = self._run.schedule, program.loop.plant.schedule
+        windows = [schedule.windows(middles).astype(np.intc) for schedule in schedules]
+        steps, times = self._look_at(block), np.ascontiguousarray(times)
+        steps.first, steps.count = first, len(marks)
+        arrays = (times, marks, *windows)
+        steps.t, steps.marks, steps.disturbed, steps.loaded = (array.ctypes.data for array in arrays)
         log = structs.Log(**{name: recorder.address_ahead(name) for name in LOGS})
         try:
-            program.call("advance", steps, y, log, report)
+            program.call("advance", steps, recorder.state, log, report)
         finally:  # an interrupt that came meanwhile is raised before the call has returned
             recorder.advance(times[:-1][marks & Mark.LOGGED > 0][: report.rows])
             worst = program.work.step_error
-            self._step_error.note(worst.largest, worst.speed, worst.at, worst.time)
+            self._run.step_error.note(worst.largest, worst.speed, worst.at, worst.time)
         if report.status:
             check = checks(limits_of(program.loop.cell.task))[report.status - 1]
             found = Finding(check, report.robot, report.value)
-            raise stopped(program.loop, float(times[report.step]), y, recorder.last("v"), found)
+            t, v = float(times[report.step]), recorder.last("v")
+            raise stopped(program.loop, t, recorder.state, v, found)
 
 
 def _marks(checked: np.ndarray, logged: np.ndarray, sampled: np.ndarray, joined: np.ndarray) -> np.ndarray:

@@ -12,11 +12,10 @@ from ..control.controller import Controller
 from ..robots.friction_parameters import FrictionParameters
 from ..robots.mechanism import Mechanism, mechanism
 from ..tasks.algebra import Algebra
+from ..tasks.measurement import Kinematics
 from ..tasks.redundancy import Posture
 from ..tasks.spaces import BoundJointSpace, BoundTipSpace, JointSpace, TipSpace
-from ..tasks.tips import Kinematics
-from .lawful import TracedLaw, trace_law
-from .learning import Learning, trace_learning
+from .plugged import Learning, trace_law, trace_learning
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,21 +33,21 @@ class Kind:
         rotors: whether rotors are adapted too.
         made_of: names of the types that the user has plugged in.
         learning: how it learns, or None for (14).
-        law: what it does, or None for `SunMills`.
+        law: CasADi function of what it does, see `trace_law`, or None for `SunMills`.
     """
 
     fixed: Mechanism
     space: TipSpace | JointSpace
     matrix: np.ndarray | None
     base_rotation: np.ndarray | None
-    gravity: tuple[float, float, float]
+    gravity: tuple[float, ...]
     reference_acceleration: str
     k_r_space: str
     smoothing: float | None = None
     rotors: bool = False
     made_of: tuple[str, ...] = ()
     learning: Learning | None = None
-    law: TracedLaw | None = None
+    law: Any = None
 
     @property
     def nv(self) -> int:
@@ -66,20 +65,9 @@ class Kind:
         return isinstance(self.space, TipSpace)
 
     @property
-    def parameters(self) -> int:
-        """Number of adapted parameters."""
-        rub = 0 if self.smoothing is None else (2 + self.rotors) * self.nv
-        return self.rigid_parameters + rub
-
-    @property
     def rigid_parameters(self) -> int:
         """Number of adapted parameters of the rigid bodies; they come first."""
         return 10 * self.nv if self.matrix is None else self.matrix.shape[1]
-
-    @property
-    def learned(self) -> int:
-        """Number of entries of the adaptation's state."""
-        return self.parameters if self.learning is None else self.learning.size
 
     @property
     def damped(self) -> bool:
@@ -111,11 +99,13 @@ class Kind:
     @property
     def sizes(self) -> dict[str, int]:
         """What the lengths of its rows are made of, see `SIZES`."""
+        rub = 0 if self.smoothing is None else (2 + self.rotors) * self.nv
+        P = self.rigid_parameters + rub
         return {
             "m": self.m,
             "nv": self.nv,
-            "P": self.parameters,
-            "Z": self.learned,
+            "P": P,
+            "Z": P if self.learning is None else self.learning.estimate.numel_in(),
             "K": self.nv if self.k_r_space == "joint" else self.m,
             "bodies": 10 * self.nv,
             "tip": int(self.tip),
@@ -130,7 +120,7 @@ class Kind:
         matrix = None if self.matrix is None else self.matrix.tolist()
         options: list[Any] = [self.reference_acceleration, self.k_r_space, list(self.gravity)]
         options += [self.smoothing, self.rotors, list(self.made_of)]
-        options += [None if part is None else part.key() for part in (self.learning, self.law)]
+        options += [None if part is None else part.serialize() for part in (*(self.learning or ()), self.law)]
         damping = asdict(self.space.damping) if self.damped else None  # type: ignore[union-attr, arg-type]
         space = [list(getattr(self.space, "rows", ())), damping, list(self.watches)]
         return [self.fixed.key(), space, matrix, shared, options]
@@ -162,10 +152,10 @@ def classify(controller: Controller) -> Classified:
     for name, (_, base) in zip(names, found, strict=True):
         rotations.setdefault(name, set()).add((base.rotation + 0.0).tobytes())  # -0 counts as 0
     kinds: dict[str, Kind] = {}
-    index, learning, laws = [], trace_learning(controller), trace_law(controller)
+    index, plugged = [], [*zip(trace_learning(controller), trace_law(controller), strict=True)]
     for i, (name, (fixed, base)) in enumerate(zip(names, found, strict=True)):
         same = len(rotations[name]) == 1
-        kind = _kind(controller, i, fixed, base.rotation if same else None, learning[i], laws[i])
+        kind = _kind(controller, i, fixed, base.rotation if same else None, *plugged[i])
         key = repr(kind.key())
         kinds.setdefault(key, kind)
         index.append(list(kinds).index(key))
@@ -173,27 +163,20 @@ def classify(controller: Controller) -> Classified:
 
 
 def _kind(
-    controller: Controller,
-    i: int,
-    fixed: Mechanism,
-    rotation: np.ndarray | None,
-    learning: Learning | None,
-    law: TracedLaw | None,
+    controller: Controller, i: int, fixed: Mechanism, rotation: np.ndarray | None, *plugged: Any
 ) -> Kind:
     cell, parameters = controller.cell, controller.cell.parameters[i]
     rigid: Any = parameters.base if isinstance(parameters, FrictionParameters) else parameters
-    gravity = cell.robots[i].gravity_vector
     return Kind(
         fixed,
         cell.space,  # type: ignore[arg-type]
         getattr(rigid, "matrix", None),
         rotation,
-        (float(gravity[0]), float(gravity[1]), float(gravity[2])),
+        tuple(map(float, cell.robots[i].gravity_vector)),
         controller.reference_acceleration,
         controller.k_r_space,
         getattr(parameters, "smoothing", None),
         getattr(parameters, "armature", False),
         tuple(type(part).__qualname__ for part in (cell.space, parameters, rigid)),
-        learning,
-        law,
+        *plugged,
     )

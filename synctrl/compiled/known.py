@@ -4,7 +4,7 @@ The compiled engine does not call Python objects, it runs equations that were tr
 for objects of exactly the package's own types, with exactly their methods: what else a user has plugged in is
 refused by name, even a subclass that changes nothing of importance, for else it would silently run as its
 base. Laws and adaptations of a user's own are not refused here: their equations are traced when they are met,
-see `lawful.py` and `learning.py`. Desired motions, weights and disturbances may be anything: they are called,
+see `plugged.py`. Desired motions, weights and disturbances may be anything: they are called,
 and tabulated.
 """
 
@@ -32,20 +32,19 @@ from ..robots.friction_parameters import FrictionParameters
 from ..robots.parameters import FullParameters, LinearParameters
 from ..robots.robot import Robot
 from ..simulation.closed_loop import ClosedLoop
-from ..simulation.payloads import PayloadSchedule
 from ..simulation.plant import Plant
+from ..simulation.schedules import PayloadSchedule
 from ..tasks import algebra, rotations
+from ..tasks.measurement import Tips
 from ..tasks.pose import BoundPoseSpace, PoseSpace
 from ..tasks.redundancy import DampedInverse, Inverse, Pseudoinverse, Redundancy
 from ..tasks.spaces import BoundCartesianSpace, BoundJointSpace, CartesianSpace, JointSpace
-from ..tasks.tips import Tips
-
-WAY_OUT = "use engine='pinocchio'"
 
 SPACES = (JointSpace, CartesianSpace, PoseSpace)
 BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace)
 RIGID = (FullParameters, LinearParameters, BaseParameters)
 INVERSES = (Inverse, Pseudoinverse, DampedInverse)
+COMPILED_BEFORE = "its equations were compiled before"
 #: modules whose functions the parts of a closed loop call, beside those of their own
 LINES = (law, algebra, rotations)
 
@@ -154,18 +153,15 @@ def _is_ours(module: str) -> bool:
 def _check_type(part: Part) -> None:
     if type(part.value) not in part.known:
         names = ", ".join(known.__name__ for known in part.known)
-        raise InputError(
-            f"engine='compiled' does not have the {part.role} {_name(type(part.value))}, only {names} and no "
-            f"subclass: its equations were compiled before; {WAY_OUT}"
-        )
+        name = _name(type(part.value))
+        raise _refusal(part.role, name, f"{name}, only {names} and no subclass: {COMPILED_BEFORE}")
 
 
 def _check_own_methods(part: Part) -> None:
     """Refuse an object that has a method of its own in place of its class's."""
     kind: Any = type(part.value)
-    own, methods = vars(part.value), _methods(kind)
-    if not methods.isdisjoint(own):
-        name = next(name for name in own if name in methods)
+    own = vars(part.value)
+    for name in sorted(_methods(kind).intersection(own)):
         raise _replaced(f"{part.role}, {kind.__name__}.{name}", own[name])
 
 
@@ -187,16 +183,10 @@ def _check_controller(controller: Controller) -> None:
     """Refuse a controller whose parts no longer say what it does: it made some of them into others."""
     own = [part for part in (controller, controller.law) if isinstance(part, (Controller, BoundSunMills))]
     for name in ("Lambda", "beta", "K_eps"):
-        then = getattr(controller.gains, name)
-        if any(_changed(getattr(part, name), then, controller.cell.m) for part in own):
-            raise InputError(
-                f"engine='compiled' does not have a controller whose {name} was changed after its law was "
-                f"made of it; make another one of changed gains, or {WAY_OUT}"
-            )
-
-
-def _changed(now: Any, then: np.ndarray, m: int) -> bool:
-    return np.shape(now) != (m,) or not bool((now == then).all())
+        then = np.broadcast_to(getattr(controller.gains, name), (controller.cell.m,))
+        if not all(np.array_equal(getattr(part, name), then) for part in own):
+            what = f"a controller whose {name} was changed after its law was made of it"
+            raise _refusal(f"controller, {name}", None, f"{what} (make another one of changed gains)")
 
 
 def _check_plant(loop: ClosedLoop) -> None:
@@ -208,14 +198,17 @@ def _check_plant(loop: ClosedLoop) -> None:
         != list(map(id, robots)),
     }
     for name in (name for name, found in special.items() if found):
-        raise InputError(f"engine='compiled' does not have {name}; {WAY_OUT}")
+        raise _refusal("plant", name, name)
 
 
 def _replaced(role: str, function: Any) -> InputError:
-    return InputError(
-        f"engine='compiled' does not have the {role} that was replaced by {_name(function)}: its equations "
-        f"were compiled before; {WAY_OUT}"
-    )
+    name = _name(function)
+    return _refusal(role, name, f"{name} in its place: {COMPILED_BEFORE}")
+
+
+def _refusal(role: str, found: str | None, what: str) -> InputError:
+    message = f"engine='compiled' does not have {what}; use engine='pinocchio'"
+    return InputError(message, subject=role, found=found)
 
 
 def _name(thing: Any) -> str:

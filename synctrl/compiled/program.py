@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from ..control.adaptation.gradient import BoundGradient
-from ..control.controller import Controller
 from ..coupling.cell import Reference
 from ..errors import CompilationError
 from ..robots.mechanism import mechanism
@@ -22,11 +21,11 @@ from ..simulation.guard import limits_of
 from ..simulation.plant import Plant
 from . import structs
 from .build import cached_library, content_key, require_casadi
-from .header import header, largest
 from .kind import Classified, Kind, classify
 from .known import check_known, check_untouched
 from .quantities import DESIRED, checked, owned_by, shape
 from .specimen import Specimen
+from .structs import header, largest
 from .trace import Trace
 
 #: relative difference between generated code and the reference engine above which the code is refused
@@ -79,7 +78,9 @@ class CompiledLoop:
         arrays = {name: np.zeros(shape(name, self.sizes)) for name in owned_by("work")}
         for name, array in {**arrays, **_constants(loop, classified.bases)}.items():
             setattr(self.quantities, name, self.address(checked(name, array, self.sizes)))
-        self.scratch = _work_sizes(library)
+        sizes = (ctypes.c_longlong * 4)()
+        library.work_sizes(sizes)
+        self.scratch = tuple(sizes)
         self.work = self._work()
         self.carried = _carried(loop.plant, self.sizes["bodies"])
 
@@ -106,7 +107,7 @@ class CompiledLoop:
         for name, array in arrays.items():
             kept = checked(name, array, self.sizes)
             size = prod(shape(name, self.sizes))
-            setattr(steps, name, structs.Table(kept.ctypes.data, size if kept.size > size else 0))
+            setattr(steps, name, structs.Arrays(kept.ctypes.data, size if kept.size > size else 0))
             steps.kept[name] = kept
 
     def call(self, function: str, steps: structs.Steps, y: np.ndarray, *others: Any) -> None:
@@ -196,7 +197,7 @@ def _compare(library: ctypes.CDLL, loop: ClosedLoop, classified: Classified) -> 
         CompilationError: they differ.
     """
     if not (hasattr(library, "work_sizes") and hasattr(library, "state_dot")):
-        raise CompilationError("the library was made from other code")
+        raise CompilationError("the library was made from other code", subject="generated code")
     specimen = Specimen(loop, classified)
     small = specimen.loop
     bases = [mechanism(robot)[1] for robot in small.cell.robots]
@@ -211,17 +212,11 @@ def _agree(expected: list[np.ndarray], found: list[np.ndarray]) -> None:
         difference = np.abs(b - a).max(initial=0.0) / (1 + np.abs(a).max(initial=0.0))
         if not difference < AGREEMENT:
             raise CompilationError(
-                f"generated code differs from Pinocchio by {difference:.2g} relative in {name} at a random "
-                "state; use engine='pinocchio', and please report the cell"
+                f"it differs from Pinocchio by {difference:.2g} relative in {name} at a random state; use "
+                "engine='pinocchio', and please report the cell",
+                subject="generated code",
+                found=float(difference),
             )
-
-
-def gamma_of(controller: Controller) -> np.ndarray:
-    """Gamma of (14), (n, P); zeros, which nothing reads, for another adaptation."""
-    adaptation = controller.adaptation
-    if isinstance(adaptation, BoundGradient):
-        return adaptation.Gamma
-    return np.zeros(controller.cell.theta.shape)
 
 
 def one_after_another(weights: Sequence[np.ndarray]) -> np.ndarray:
@@ -231,22 +226,22 @@ def one_after_another(weights: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _constants(loop: ClosedLoop, bases: list[Any]) -> dict[str, np.ndarray]:
-    """Arrays of the quantities that do not change in a run, by name."""
-    controller, plant = loop.controller, loop.plant
+    """Arrays of the quantities that do not change in a run, by name; zeros for those that nothing reads."""
+    controller, plant, cell = loop.controller, loop.plant, loop.cell
     found = {name: np.atleast_2d(getattr(controller, name)) for name in ("Lambda", "beta", "K_eps", "K_r")}
-    W_inv, posture, gain = _posture(controller)
+    found |= {name: getattr(plant, name) for name in ("viscous", "coulomb", "smoothing")}
+    learns, zeros = controller.adaptation, np.zeros_like(cell.theta)
+    redundancy = getattr(cell.space, "redundancy", None)
+    W_inv, posture, gain = redundancy.spread(cell.robots) if redundancy else np.zeros((3, cell.n, cell.nv))
     return {
         **found,
-        "Gamma": gamma_of(controller),
+        "Gamma": learns.Gamma if isinstance(learns, BoundGradient) else zeros,
         "base": np.array([np.append(base.rotation.ravel(), base.translation) for base in bases]),
         "W_inv": W_inv,
         "posture": posture,
         "gain": gain,
-        "viscous": plant.viscous,
-        "coulomb": plant.coulomb,
-        "smoothing": plant.smoothing,
         "limits": plant.torque_limits,
-        "bounds": np.array([[*limits_of(loop.cell.task).values()]]),
+        "bounds": np.array([[*limits_of(cell.task).values()]]),
     }
 
 
@@ -258,19 +253,3 @@ def _carried(plant: Plant, bodies: int) -> np.ndarray:
         for row, robot in zip(rows, robots, strict=True):
             row[: 10 * robot.body_count] = robot.inertial_parameters
     return pi
-
-
-def _posture(controller: Controller) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    cell = controller.cell
-    redundancy = getattr(cell.space, "redundancy", None)
-    if redundancy is not None:
-        return redundancy.spread(cell.robots)
-    zero = np.zeros((cell.n, cell.nv))
-    return zero, zero, zero
-
-
-def _work_sizes(library: ctypes.CDLL) -> tuple[int, int, int, int]:
-    """Sizes of the scratch arrays, as the generated code asks for them."""
-    sizes = (ctypes.c_longlong * 4)()
-    library.work_sizes(sizes)
-    return tuple(sizes)

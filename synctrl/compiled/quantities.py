@@ -1,7 +1,7 @@
 """What generated functions read and write, by name: the one table that everything about them follows from.
 
-The symbols of `trace.py`, the text that stands before `driver.c` (see `header.py`), the structures of
-`structs.py` and the arrays of `program.py` and `engine.py` are all made from the tables below. Every quantity
+The symbols of `trace.py`, the structures of `structs.py` with the text that stands before `driver.c`, and the
+arrays of `program.py` and `engine.py` are all made from the tables below. Every quantity
 is one array with a row per robot or pair; rows are as long as the largest robot needs.
 """
 
@@ -203,7 +203,9 @@ def checked(name: str, array: np.ndarray, sizes: Mapping[str, int]) -> np.ndarra
     expected = shape(name, sizes)
     if np.shape(array)[-2:] != expected:
         raise CompilationError(
-            f"compiled engine, {name} ({QUANTITIES[name].meaning}): expected rows and columns {expected}, "
-            f"found an array of shape {np.shape(array)}"
+            f"compiled engine, {QUANTITIES[name].meaning}: expected rows and columns {expected}, found an "
+            f"array of shape {np.shape(array)}",
+            subject=name,
+            found=np.shape(array),
         )
     return np.ascontiguousarray(array, dtype=float)

@@ -9,7 +9,7 @@ kinds, not of robots.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -31,9 +31,8 @@ from ..tasks.pose import PoseSpace
 from ..tasks.redundancy import Redundancy
 from ..tasks.spaces import CartesianSpace, JointSpace, Space
 from ..tasks.trajectories import Hold
-from .chosen import Chosen
 from .kind import Classified
-from .lawful import ChosenLaw
+from .plugged import ChosenAdaptation, ChosenLaw
 
 #: robots at least: with three in a ring, each is in two pairs, and each pair leaves one out
 ROBOTS = 3
@@ -45,14 +44,6 @@ DISTANCES = (0.1, 0.8, 1.6)
 TRIES = 20
 #: condition number above which all of them are
 SINGULAR = 1e6
-
-
-class Case(NamedTuple):
-    """Something at which two ways to compute y' can be compared."""
-
-    reference: Reference
-    y: np.ndarray
-    disturbance: np.ndarray
 
 
 class Specimen:
@@ -75,8 +66,8 @@ class Specimen:
         members = [_member(loop.controller.cell, chosen[k]) for k in self.index]
         self.loop = self._loop(loop.controller, members, [chosen[k] for k in self.index])
 
-    def cases(self) -> Iterator[Case]:
-        """What to compare at; nothing if a robot is singular everywhere, and cannot run."""
+    def cases(self) -> Iterator[tuple[Reference, np.ndarray, np.ndarray]]:
+        """References, states and disturbances to compare y' at; none if a robot is singular everywhere."""
         cell = self.loop.cell
         for distance in DISTANCES:
             q = np.zeros((cell.n, cell.nv))
@@ -86,7 +77,7 @@ class Specimen:
                     return
             y = self._state(q)
             reference = Reference(self._desired(q, distance), self._weights())
-            yield Case(reference, y, self._random(cell.n, cell.nv) * self._joints())
+            yield reference, y, self._random(cell.n, cell.nv) * self._joints()
 
     # -- the loop -----------------------------------------------------------------------------------------
 
@@ -98,15 +89,9 @@ class Specimen:
         gains = self._gains(cell, original.k_r_space)
         adaptation: Any = None
         if not isinstance(original.adaptation, BoundGradient):
-            theta = original.cell.theta
-            adaptation = Chosen(original.adaptation, robots, original.cell.nv, theta.shape[1])
+            adaptation = ChosenAdaptation(original, robots)
             gains = gains.replace(Gamma=None)
-        controller = Controller(
-            cell,
-            gains,
-            adaptation=adaptation,
-            law=_law(original, robots),
-        )
+        controller = Controller(cell, gains, adaptation=adaptation, law=_law(original, robots))
         return ClosedLoop(controller, Plant(cell))
 
     def _space(self, space: Space, robots: Sequence[Robot]) -> Space:

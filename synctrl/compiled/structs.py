@@ -1,14 +1,22 @@
-"""The structures that Python and `driver.c` share; the text of those in C is made from these."""
+"""The structures that Python and `driver.c` share, and the text in C that stands before `driver.c`.
+
+It has sizes, lists of quantities, the structures, and a table of generated functions. A list is a macro that
+is applied to every quantity in it, with its name, its rows and its columns, so that the driver says once what
+is done with each.
+"""
 
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Iterable, Mapping
 from enum import IntFlag
 from typing import Any
 
 import numpy as np
 
-from .quantities import LOGS, QUANTITIES, owned_by
+from ..simulation.guard import checks
+from .kind import Kind
+from .quantities import FUNCTIONS, LOGS, QUANTITIES, owned_by
 
 
 class Mark(IntFlag):
@@ -27,40 +35,19 @@ class Mark(IntFlag):
     JOINED = 8
 
 
-class Doubles(ctypes.c_void_p):
-    """Address of numbers."""
+class Address(ctypes.c_void_p):
+    """An address, and how C declares what has it."""
 
-    written = "double *"
-
-
-class Ints(ctypes.c_void_p):
-    """Address of whole numbers."""
-
-    written = "int *"
+    written: str
 
 
-class Chars(ctypes.c_void_p):
-    """Address of bytes."""
-
-    written = "char *"
+def _address(written: str) -> type[Address]:
+    return type("Address", (Address,), {"written": written})
 
 
-class Longs(ctypes.c_void_p):
-    """Address of scratch of generated functions."""
-
-    written = "long long *"
-
-
-class Arguments(ctypes.c_void_p):
-    """Address of addresses of numbers that are read."""
-
-    written = "const double **"
-
-
-class Results(ctypes.c_void_p):
-    """Address of addresses of numbers that are written."""
-
-    written = "double **"
+Doubles, Ints, Chars, Longs = map(_address, ("double *", "int *", "char *", "long long *"))
+#: what generated functions read, and what they write
+Arguments, Results = map(_address, ("const double **", "double **"))
 
 
 class Cell(ctypes.Structure):
@@ -88,7 +75,7 @@ class Quantities(ctypes.Structure):
     _fields_ = [(name, Doubles) for name in QUANTITIES]
 
 
-class Table(ctypes.Structure):
+class Arrays(ctypes.Structure):
     """Arrays of a quantity one after another, `stride` numbers apart; 0 if there is but one."""
 
     _fields_ = [("values", Doubles), ("stride", ctypes.c_long)]
@@ -104,7 +91,7 @@ class Steps(ctypes.Structure):
         t: instants of those to be made, (count + 1), s.
         marks: what happens at the start of each, see `Mark`.
         disturbed, loaded: which disturbance and which load acts in each.
-        kept: the arrays that the tables point to.
+        kept: what has these addresses.
     """
 
     def __init__(self, **fields: Any):
@@ -117,7 +104,7 @@ class Steps(ctypes.Structure):
         ("marks", Chars),
         ("disturbed", Ints),
         ("loaded", Ints),
-        *((name, Table) for name in owned_by("instant", "disturbance", "load")),
+        *((name, Arrays) for name in owned_by("instant", "disturbance", "load")),
     ]
 
 
@@ -176,9 +163,28 @@ class Report(ctypes.Structure):
 
 
 #: in an order in which each knows those that it has inside
-STRUCTURES = (Cell, Quantities, Table, Steps, Log, StepError, Work, Report)
+STRUCTURES = (Cell, Quantities, Arrays, Steps, Log, StepError, Work, Report)
 
 _WRITTEN: dict[Any, str] = {ctypes.c_int: "int ", ctypes.c_long: "long ", ctypes.c_double: "double "}
+
+
+def header(kinds: list[Kind]) -> str:
+    """The C text for a cell of robots of these kinds."""
+    return "".join([*_constants(kinds), *_lists(), *map(declared, STRUCTURES), *_table(kinds)])
+
+
+def largest(kinds: list[Kind]) -> dict[str, int]:
+    """Sizes of rows that are long enough for all kinds."""
+    return {name: max(kind.sizes[name] for kind in kinds) for name in kinds[0].sizes}
+
+
+def functions_of(kind: Kind) -> list[str]:
+    """Names of the functions that a kind has.
+
+    A space that watches nothing has no `guard`, an adaptation whose state is theta_hat no `estimate`.
+    """
+    lacks = {"guard": not kind.watches, "estimate": kind.learning is None}
+    return [name for name in FUNCTIONS if not lacks.get(name, False)]
 
 
 def declared(structure: type[ctypes.Structure]) -> str:
@@ -187,9 +193,58 @@ def declared(structure: type[ctypes.Structure]) -> str:
     return f"typedef struct {{\n{fields}}} {structure.__name__};\n"
 
 
+# -- internals --------------------------------------------------------------------------------------------
+
+
 def _member(name: str, kind: Any) -> str:
     if issubclass(kind, ctypes.Array):
         return f"{_member(name, kind._type_)}[{kind._length_}]"
     if issubclass(kind, ctypes.Structure):
         return f"{kind.__name__} {name}"
     return (_WRITTEN.get(kind) or kind.written) + name
+
+
+def _constants(kinds: list[Kind]) -> Iterable[str]:
+    """Sizes, how many kinds there are, marks, and what the guard may find."""
+    yield _enumeration({**largest(kinds), "KINDS": len(kinds)})
+    yield _enumeration({name: mark.value for name, mark in Mark.__members__.items()})
+    found = enumerate(checks(kinds[0].watches), start=1)
+    yield _enumeration({f"FOUND_{check.upper()}": k for k, check in found})
+
+
+def _enumeration(constants: Mapping[str, int]) -> str:
+    return f"enum {{ {', '.join(f'{name} = {value}' for name, value in constants.items())} }};\n"
+
+
+def _lists() -> Iterable[str]:
+    owners = dict.fromkeys(quantity.owner for quantity in QUANTITIES.values())
+    yield from (_list(owner.upper(), owned_by(owner)) for owner in owners)
+    for name, signature in FUNCTIONS.items():
+        yield _list(f"{name}_INPUTS", signature.inputs)
+        yield _list(f"{name}_OUTPUTS", signature.outputs)
+    logs = (f"X({log}, {_entry(name)})" for log, name in LOGS.items())
+    yield f"#define LOGS(X) {' '.join(logs)}\n"
+    yield f"#define FUNCTIONS(X) {' '.join(f'X({name})' for name in FUNCTIONS)}\n"
+
+
+def _list(title: str, names: Iterable[str]) -> str:
+    return f"#define {title}(X) {' '.join(f'X({_entry(name)})' for name in names)}\n"
+
+
+def _entry(name: str) -> str:
+    return f"{name}, {QUANTITIES[name].rows}, {QUANTITIES[name].columns}"
+
+
+def _table(kinds: list[Kind]) -> Iterable[str]:
+    """Declarations of the generated functions, and the array `kinds`; 0 for a function that a kind lacks."""
+    yield "typedef int Function(const double **, double **, long long *, double *, int);\n"
+    yield "typedef int Sizes(long long *, long long *, long long *, long long *);\n"
+    members = "".join(f"Function *{name}; Sizes *{name}_work; " for name in FUNCTIONS)
+    yield f"typedef struct {{ {members}int nv; }} Kind;\n"
+    rows = []
+    for k, kind in enumerate(kinds):
+        names = {name: f"kind{k}_{name}" for name in functions_of(kind)}
+        yield from (f"Function {name}; Sizes {name}_work;\n" for name in names.values())
+        members = "".join(f".{name} = {full}, .{name}_work = {full}_work, " for name, full in names.items())
+        rows.append(f"    {{ {members}.nv = {kind.nv} }},\n")
+    yield from ("static const Kind kinds[] = {\n", *rows, "};\n")

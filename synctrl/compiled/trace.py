@@ -20,12 +20,12 @@ from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.weights import Weights
 from ..robots.friction_parameters import friction_diagonals
 from ..robots.symbolic import Symbols
+from ..tasks.measurement import Poses, Positions
 from ..tasks.redundancy import Inversion, velocity_lost
 from ..tasks.spaces import Measurement
-from ..tasks.tips import Poses, Positions
 from .algebra import SYMBOLS, array_of, column_of
 from .kind import Kind
-from .learning import Learning
+from .plugged import Learning
 from .quantities import DESIRED, FUNCTIONS, HEARD, QUANTITIES, columns
 
 
@@ -83,8 +83,7 @@ class Trace:
         """Where the robot is, and how it errs."""
         motion, desired = (np.stack([*map(self._row, names)]) for names in (("q", "v"), DESIRED))
         task = self.space.measure(motion, desired)
-        c, c_dot = self._weights()[:2]
-        w, w_dot = law.compute_weighted_errors(c, c_dot, task.error)
+        w, w_dot = law.compute_weighted_errors(Weights(*self._weights()), task.error)
         way = {} if task.inversion is None else task.inversion._asdict()
         return self._function(
             "measure",
@@ -144,7 +143,7 @@ class Trace:
             Lambda, beta, K_eps = map(self._row, ("Lambda", "beta", "K_eps"))
             return BoundSunMills(Lambda, beta, K_eps, kind.reference_acceleration).command(errors)
         rows = (column_of(getattr(errors, name)) for name in ROWS)
-        parts = kind.law.command(*rows, self.given["weights"])
+        parts = kind.law(*rows, self.given["weights"])
         return Asked(*(array_of(part, -1) for part in parts))
 
     def estimate(self, learning: Learning) -> Any:

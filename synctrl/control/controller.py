@@ -6,7 +6,8 @@ to read the package: every line of it is one part that can be exchanged, asked a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,17 +15,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, instance
+from ..checks import finite_array, instance, offers, shaped
 from ..coupling.cell import Cell, Reference
+from ..errors import InputError, SynctrlError
 from ..renamed import argument, names_elsewhere, tell
 from ..robots.regressors import Regressors, make_regressors
 from ..tasks.spaces import Measurement
 from . import law, laws
 from .adaptation import Adaptation, Seen, chosen
 from .gains import Gains, spread, spread_rows
-from .laws import Asked, Errors, Law, completed
-from .network import Network, Received, connected
-from .part_checks import check_parts
+from .laws import Asked, BoundLaw, Errors, Law, completed, no_errors
+from .network import BoundNetwork, Ideal, Network, Received
 
 
 @dataclass(slots=True)
@@ -134,7 +135,8 @@ class Controller:
         learning = chosen(gains.Gamma, adaptation)
         self.adaptation, self.adaptation_settings = learning.bind(cell), settings_of(learning)
         self.law, self.law_settings = options.law.bind(cell, gains), settings_of(options.law)
-        connection = connected(network)
+        connection = Ideal() if network is None else network
+        offers("network", connection, ("bind",), "a network, for example Ideal()")
         self.network, self.network_settings = connection.bind(cell), settings_of(connection)
         check_parts(self.law, self.network, cell.n, cell.coupling.pairs, m)
 
@@ -201,7 +203,7 @@ class Controller:
         q, v = motion
         space, weights = self.cell.task, reference.weights
         task = space.measure(motion, reference.desired)
-        w = law.compute_weighted_errors(weights.c, weights.c_dot, task.error)
+        w = law.compute_weighted_errors(weights, task.error)
         received = self.network.exchange(reference.t, w, integral)
         errors = Errors(reference.t, task.error, task.motion[1], task.rates, w, received.shares, weights)
         asked = self.law.command(errors)
@@ -224,13 +226,8 @@ def settings_of(part: Adaptation | Law | Network) -> dict[str, Any]:
     Raises:
         InputError: its `as_dict` gives no mapping.
     """
-    settings = part.as_dict()
-    instance(
-        f"{type(part).__qualname__}, as_dict",
-        settings,
-        Mapping,
-        "names and settings, for example {'gain': 1.0}",
-    )
+    settings, where = part.as_dict(), f"{type(part).__qualname__}, as_dict"
+    instance(where, settings, Mapping, "names and settings, for example {'gain': 1.0}")
     return {"name": type(part).__name__, **settings}
 
 
@@ -244,6 +241,55 @@ def check_reference(reference: Reference, n: int, m: int) -> None:
     finite_array("reference: xd, xd' and xd''", reference.desired, (3, n, m))
     for name, weight in zip(("c", "c'", "c''", "c^-1"), reference.weights, strict=True):
         finite_array(f"reference: {name}", weight, (n, m, m))
+
+
+def check_parts(law: BoundLaw, network: BoundNetwork, n: int, p: int, m: int) -> None:
+    """Look at what law and network give where there are no errors.
+
+    Args:
+        law, network: for the robots of one cell.
+        n, p, m: numbers of robots, of synchronization errors and of task coordinates.
+
+    Raises:
+        InputError: something of another shape than it should have, or one that fails where there are no
+            errors.
+    """
+    with _named("network", network):
+        memory = network.start()
+        integral = network.integral(memory)
+        received = network.exchange(0.0, np.zeros((2, n, m)), memory)
+    with _named("law", law):
+        asked = law.command(no_errors(n, m))
+    instance(f"network {type(network).__qualname__}, exchange", received, Received, "a Received")
+    instance(f"law {type(law).__qualname__}, command", asked, Asked, "an Asked")
+    _check_shapes("network", network, {
+        "epsilon": (received.epsilon, (p, m)), "epsilon_dot": (received.epsilon_dot, (p, m)),
+        "shares": (received.shares, (3, n, m)), "memory_dot": (received.memory_dot, np.shape(memory)),
+        "integral": (integral, (p, m)),
+    })  # fmt: skip
+    _check_shapes("law", law, {
+        "xref_dot": (asked.xref_dot, (n, m)), "xref_ddot": (asked.xref_ddot, (n, m)),
+        "force": (asked.force, (n, m)),
+    })  # fmt: skip
+
+
+@contextmanager
+def _named(role: str, part: Any) -> Iterator[None]:
+    """Name the part that fails in between."""
+    try:
+        yield
+    except SynctrlError:
+        raise
+    except Exception as error:  # whatever a user's code raises
+        raise InputError(
+            f"expected one that works where there are no errors, found {type(error).__name__}: {error}",
+            subject=f"{role} {type(part).__qualname__}",
+        ) from error
+
+
+def _check_shapes(role: str, part: Any, parts: Mapping[str, tuple[Any, tuple[int, ...]]]) -> None:
+    for name, (value, shape) in parts.items():
+        shaped(f"{role} {type(part).__qualname__}, {name}", value, shape)
 
 
 __getattr__ = names_elsewhere(__name__, ".laws.sun_mills", "REFERENCE_ACCELERATIONS")

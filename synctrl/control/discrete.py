@@ -16,11 +16,9 @@ from numpy.typing import ArrayLike
 from ..checks import boolean, choice, finite_array, finite_number, instance, positive_number
 from ..coupling.cell import Reference
 from ..errors import InputError, ResultError
-from .adaptation_check import check_adaptation
+from . import measured
 from .controller import Controller, Signals
-from .measured import check_limits, check_signals, gravity_torque, measurement, not_finite
-from .messages import Messages
-from .state_file import read_state, write_state
+from .network import Messages
 
 #: how far from its place on the grid of samples a call may come, as a share of the period
 LATE = 0.1
@@ -74,14 +72,14 @@ class DiscreteController:
         faults: str = "error",
     ):
         instance("controller", controller, Controller, "a Controller")
-        check_adaptation(controller)
+        measured.check_adaptation(controller)
         self.controller, self.cell = controller, controller.cell
         self.period = positive_number("period", period)
         self.include_gravity = boolean("include_gravity", include_gravity)
         self.faults = choice("faults", faults, FAULTS)
         self._shape = self.cell.n, self.cell.nv
         self._messages = Messages(self.cell, controller.network)
-        self._limits = check_limits(torque_limits, self._shape)
+        self._limits = measured.check_limits(torque_limits, self._shape)
         self.held: int
         self.signals: Signals | None
         self._samples: int
@@ -118,17 +116,17 @@ class DiscreteController:
             NonFiniteError: the law has no finite torque here.
             SimulationError: a space of the user's ends the run, or a motion or weight of theirs fails.
         """
-        time, motion = self._time(t), measurement(q, v, self._shape)
+        time, motion = self._time(t), measured.measurement(q, v, self._shape)
         wanted = None if desired is None else finite_array("desired", desired, (3, self.cell.n, self.cell.m))
         missed = self._missed(time)
-        fault = self._off_the_grid(time, missed) or not_finite(self.cell, time, motion)
+        fault = self._off_the_grid(time, missed) or measured.not_finite(self.cell, time, motion)
         if fault is not None:
             return self._hold(time, missed, fault)
         with np.errstate(all="ignore"):  # what is not finite is named
             reference = self._reference(time, wanted)
             memory = self._heard(reference, motion, self._samples + missed)
             signals = self.controller.unchecked(reference, motion, self.z, memory)
-        check_signals(self.cell, time, signals)
+        measured.check_signals(self.cell, time, signals)
         self._advance(motion[0], memory, signals, missed)
         return self._tau.copy()
 
@@ -196,7 +194,7 @@ class DiscreteController:
             InputError: something else than a path.
             ResultError: the file cannot be written.
         """
-        return write_state(path, self.state)
+        return measured.write_state(path, self.state)
 
     def load(self, path: str | Path) -> None:
         """Read what `save` wrote, of a controller for the same cell and period.
@@ -205,7 +203,7 @@ class DiscreteController:
             InputError: something else than a path.
             ResultError: the file is missing, damaged, of another controller, or anything else.
         """
-        found = read_state(path, self.state)
+        found = measured.read_state(path, self.state)
         try:
             self.state = found
         except InputError as error:
@@ -246,19 +244,20 @@ class DiscreteController:
     def _may_hold(self) -> bool:
         return self.faults == "hold" and self._samples > 0
 
-    def _off_the_grid(self, t: float, missed: int) -> str | None:
+    def _off_the_grid(self, t: float, missed: int) -> InputError | None:
         """What is wrong with the time of a call, if anything is."""
         due = self._t0 + (self._samples + missed) * self.period
         late = (t - due) / self.period
         if abs(late) <= LATE:
             return None
         how = f"{late:.3g} periods late" if late > 0 else "time runs backwards, or the call is early"
-        return f"t: expected the sample at {due:g} s of a period of {self.period:g} s, found {t:g} s: {how}"
+        sample = f"expected the sample at {due:g} s of a period of {self.period:g} s"
+        return InputError(f"{sample}, found {t:g} s: {how}", subject="t", found=t)
 
-    def _hold(self, t: float, missed: int, fault: str) -> np.ndarray:
+    def _hold(self, t: float, missed: int, fault: InputError) -> np.ndarray:
         """The torque that is held; a sample that is due now, or overdue, is missed as well."""
         if not self._may_hold:
-            raise InputError(fault)
+            raise fault
         sample = self._samples + missed
         due = t >= self._t0 + (sample - LATE) * self.period
         self._samples, self.held = sample + int(due), self.held + missed + 1
@@ -283,7 +282,7 @@ class DiscreteController:
     def _advance(self, q: np.ndarray, memory: np.ndarray, signals: Signals, missed: int = 0) -> None:
         """Keep what is commanded, and what will be known at the next sample; or nothing, if a part fails."""
         tau = np.clip(signals.tau, -self._limits, self._limits)
-        tau = tau if self.include_gravity else tau - gravity_torque(self.cell, q)
+        tau = tau if self.include_gravity else tau - measured.gravity_torque(self.cell, q)
         z = self.controller.adaptation.settle(self.z + self.period * signals.z_dot)
         self._tau, self.z, self.signals = tau, z, signals
         self.memory = memory + self.period * signals.memory_dot

@@ -1,4 +1,4 @@
-"""Gains of the controller, with the paper's symbols."""
+"""Gains of the controller, with the paper's symbols; some have a row per robot, of different lengths."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array
+from ..checks import finite_array, finite_number
 from ..coupling.cell import Cell
 from ..errors import InputError
-from .ragged_gain import RaggedGain, are_ragged
+from ..tasks.algebra import padded
 from .suggest import suggested
 
 
@@ -50,7 +50,7 @@ class Gains:
             low = gain.min() if gain.size else 0.0
             if low < 0 or (positive and low == 0):
                 bound = "above 0" if positive else "of at least 0"
-                raise InputError(f"expected entries {bound}, found {low:g}", subject=name)
+                raise InputError(f"expected entries {bound}, found {low:g}", subject=name, found=float(low))
             object.__setattr__(self, name, gain)
 
     @classmethod
@@ -137,14 +137,17 @@ def read_gain(name: str, gain: Any) -> np.ndarray | RaggedGain:
     return finite_array(name, gain)
 
 
-def spread(name: str, gain: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+def spread(name: str, gain: np.ndarray, shape: tuple[int, ...], otherwise: str = "") -> np.ndarray:
     """A gain as an array of the given shape.
 
     Raises:
-        InputError: the gain has other dimensions.
+        InputError: the gain has other dimensions; `otherwise` says what else it could have been.
     """
-    if not _fits(gain, shape):
-        raise InputError(f"expected a shape of {_shapes(shape)}, found {gain.shape}", subject=name)
+    fits = zip(gain.shape[::-1], shape[::-1], strict=False)
+    if gain.ndim > len(shape) or any(found != expected for found, expected in fits):
+        shapes = " or ".join(str(shape[k:]) for k in range(len(shape), -1, -1))
+        expected = f"expected a shape of {shapes}{otherwise}"
+        raise InputError(f"{expected}, found {gain.shape}", subject=name, found=gain.shape)
     return np.broadcast_to(gain, shape).copy()
 
 
@@ -162,28 +165,80 @@ def spread_rows(name: str, gain: np.ndarray | RaggedGain, lengths: Sequence[int]
     shape, own = (len(lengths), max(lengths)), tuple(lengths)
     if isinstance(gain, RaggedGain):
         if gain.lengths != own:
-            raise InputError(
-                f"expected a row for each robot, of {_listed(own)} entries, "
-                f"found rows of {_listed(gain.lengths)}",
-                subject=name,
-            )
-        return gain.padded()
-    if not _fits(gain, shape):
-        rows = "" if len(set(own)) == 1 else f", or a row for each robot, of {_listed(own)} entries"
-        raise InputError(f"expected a shape of {_shapes(shape)}{rows}, found {gain.shape}", subject=name)
-    return np.broadcast_to(gain, shape).copy()
-
-
-def _fits(gain: np.ndarray, shape: tuple[int, ...]) -> bool:
-    return gain.ndim <= len(shape) and all(
-        g == s for g, s in zip(gain.shape[::-1], shape[::-1], strict=False)
-    )
-
-
-def _shapes(shape: tuple[int, ...]) -> str:
-    return " or ".join(str(tuple(shape[k:])) for k in range(len(shape), -1, -1))
+            expected, found = f"expected a row for each robot, of {_listed(own)} entries", gain.lengths
+            raise InputError(f"{expected}, found rows of {_listed(found)}", subject=name, found=found)
+        return padded(gain.rows)
+    rows = "" if len(set(own)) == 1 else f", or a row for each robot, of {_listed(own)} entries"
+    return spread(name, gain, shape, rows)
 
 
 def _listed(lengths: Sequence[int]) -> str:
     shown = [str(length) for length in lengths[:12]]
     return ", ".join(shown) + (", ..." if len(lengths) > 12 else "")
+
+
+class RaggedGain:
+    """Vectors of different lengths that can be scaled like one array.
+
+    Args:
+        name: for messages.
+        rows: one vector per robot.
+
+    Raises:
+        InputError: a row that is no vector of finite numbers.
+    """
+
+    #: a number of numpy's leaves a product with rows to the rows
+    __array_ufunc__ = None
+
+    def __init__(self, name: str, rows: Sequence[ArrayLike]):
+        self.name = name
+        self.rows = tuple(finite_array(f"{name}: row {i}", row, (None,)) for i, row in enumerate(rows, 1))
+
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """Number of entries of each row."""
+        return tuple(row.size for row in self.rows)
+
+    @property
+    def size(self) -> int:
+        """Number of all entries."""
+        return sum(self.lengths)
+
+    def min(self) -> float:
+        """The smallest entry."""
+        return min(float(row.min()) for row in self.rows if row.size)
+
+    def any(self) -> bool:
+        """Whether an entry is not zero."""
+        return any(bool(row.any()) for row in self.rows)
+
+    def tolist(self) -> list[list[float]]:
+        """Plain lists, a list per row."""
+        return [row.tolist() for row in self.rows]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, i: int) -> np.ndarray:
+        return self.rows[i]
+
+    def __mul__(self, factor: Any) -> RaggedGain:
+        factor = finite_number("factor", factor)
+        return RaggedGain(self.name, [factor * row for row in self.rows])
+
+    __rmul__ = __mul__
+
+    def __repr__(self) -> str:
+        return repr(self.tolist())
+
+
+def are_ragged(value: Any) -> bool:
+    """Whether a value consists of vectors of different lengths."""
+    if isinstance(value, RaggedGain):
+        return True
+    if not isinstance(value, (list, tuple)):
+        return False
+    if not all(isinstance(row, (list, tuple, np.ndarray)) and np.ndim(row[:1]) == 1 for row in value):
+        return False
+    return len({len(row) for row in value}) > 1

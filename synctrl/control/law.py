@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..coupling.weights import Weights
 from ..tasks.spaces import BoundSpace
 from .laws import Asked
 
@@ -44,10 +45,11 @@ class JointCommand(NamedTuple):
     feedback: Array
 
 
-def compute_weighted_errors(c: Array, c_dot: Array, error: Array) -> Array:
+def compute_weighted_errors(weights: Weights, error: Array) -> Array:
     """w_i = c_i e_i, the error in the unit of the synchronization function, and w_i', (2, n, m)."""
-    w = np.matvec(c, error)
-    w[1] += np.matvec(c_dot, error[0])
+    w = np.matvec(weights.c, error)
+    if weights.move:
+        w[1] += np.matvec(weights.c_dot, error[0])
     return w
 
 

@@ -1,18 +1,25 @@
-"""Network: what the robots of a cell know of each other's errors.
+"""Network: what the robots of a cell know of each other's errors, and the messages that bring it.
 
 A network of one's own is a class with a `bind` that returns an object with the methods of `BoundNetwork`. It
-may have memory, which becomes a part of the state of the loop: it is integrated, logged and replayed.
+may have memory, which becomes a part of the state of the loop: it is integrated, logged and replayed. It may
+have messages: what it hears at instants of its own, between which it knows nothing new.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..coupling.cell import Cell
+from ..checks import finite_array, shaped
+from ..coupling.cell import Cell, Reference
 from ..coupling.coupling import Coupling
-from ..errors import InputError
+from ..errors import InputError, NonFiniteError
+from .law import compute_weighted_errors
+
+#: how far beyond an interval a message may be that counts as in it, as a share of its ends
+ROUNDING = 1e-12
 
 
 class Received(NamedTuple):
@@ -107,14 +114,74 @@ class BoundIdeal:
         return None
 
 
-def connected(network: Network | None) -> Network:
-    """The network of a controller: the one given, or `Ideal`.
+class Messages:
+    """The messages of a network; none of one that does not say when they come.
 
-    Raises:
-        InputError: something that is no network.
+    Args:
+        cell: the cell.
+        network: its network.
     """
-    if network is None:
-        return Ideal()
-    if not hasattr(network, "bind") or isinstance(network, type):
-        raise InputError(f"expected, for example, Ideal(), found {network!r}", subject="network")
-    return network
+
+    def __init__(self, cell: Cell, network: BoundNetwork):
+        self._measure, self._network = cell.task.measure, network
+        self._times: Any = getattr(network, "messages", None)
+
+    @property
+    def sent(self) -> bool:
+        """Whether the network has messages at all."""
+        return self._times is not None
+
+    def between(self, start: float, end: float) -> list[float]:
+        """Instants of the messages with start <= t < end, in order, s.
+
+        Raises:
+            InputError: the network gives something else.
+        """
+        if not self.sent:
+            return []
+        where = f"network {type(self._network).__qualname__}, messages"
+        times = finite_array(where, self._times(start, end), (None,))
+        slack = ROUNDING * max(abs(start), abs(end))
+        inside = bool(((times >= start - slack) & (times <= end + slack)).all())
+        if not inside or (np.diff(times) < 0).any():
+            raise InputError(
+                f"expected instants in order with {start:g} <= t < {end:g} s, found {times!s:.80}",
+                subject=where,
+            )
+        return times.tolist()
+
+    def received(
+        self, times: Sequence[float], reference: Reference, motion: np.ndarray, memory: np.ndarray
+    ) -> np.ndarray:
+        """Memory of the network after messages, which all robots send as they are now.
+
+        Args:
+            times: when the messages were due, s.
+            reference: what is desired now.
+            motion: joint positions and velocities, (2, n, nv).
+            memory: of the network, before.
+
+        Raises:
+            InputError: the network makes memory of another shape.
+            NonFiniteError: it makes finite memory infinite.
+        """
+        if not times:
+            return memory
+        w = compute_weighted_errors(reference.weights, self._measure(motion, reference.desired).error)
+        for t in times:
+            memory = self._after(t, w, memory)
+        return memory
+
+    def _after(self, t: float, w: np.ndarray, memory: np.ndarray) -> np.ndarray:
+        """Memory after one message, looked at."""
+        network: Any = self._network
+        found = np.asarray(network.meet(t, w, memory), dtype=float)
+        where = f"network {type(network).__qualname__}, meet"
+        shaped(where, found, memory.shape)
+        sound = np.isfinite(memory).all() and np.isfinite(w).all()
+        if sound and not np.isfinite(found).all():
+            raise NonFiniteError(
+                f"{where}: expected finite memory after the message of {t:g} s, found {found.tolist()}",
+                cause="part",
+            )
+        return found

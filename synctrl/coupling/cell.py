@@ -10,21 +10,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, instance
+from ..checks import finite_array, instance, offers
 from ..errors import InputError, UnreachableError
 from ..robots.friction import Friction
 from ..robots.parameters import Parameters
 from ..robots.robot import Robot
 from ..robots.units import joined
+from ..tasks.algebra import padded
 from ..tasks.inverse_kinematics import start_in
-from ..tasks.padding import padded
 from ..tasks.spaces import JointSpace, Space, units_of
 from ..tasks.trajectories import Motion, Trajectory
 from .coupling import Coupling
 from .desired import desired_motion, desired_weights
-from .member_checks import check_friction, check_labels, check_names, check_space, check_trajectory
-from .member_parameters import member_parameters, with_urdf_friction
-from .weights import Weights
+from .member_checks import (
+    check_friction,
+    check_labels,
+    check_names,
+    check_trajectory,
+    member_parameters,
+    with_urdf_friction,
+)
+from .weights import StillWeights, Weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,13 +163,11 @@ class Cell:
         self.robots = tuple(member.robot for member in self.members)
         self.names = tuple(m.name or f"robot {i}" for i, m in enumerate(self.members, start=1))
         check_names(name, self.names)
-        check_space(self.space)
+        offers("space", self.space, ("labels", "unit", "bind"), "a space, for example CartesianSpace('xy')")
         self.labels = self.space.labels(self.robots)
         self.units = units_of(self.space, self.robots)
         self.task = self.space.bind(self.robots)
-        self._check_members()
-        self._set_parameters()
-        self._set_initial_state()
+        self._read_members()
         check_labels(self)
 
     # -- sizes --------------------------------------------------------------------------------------------
@@ -220,7 +224,7 @@ class Cell:
         """Weights of the coupling at the times, (T,); see `desired_weights`."""
         if self.coupling.is_constant:
             return self.coupling.weights(times, self.m)
-        return desired_weights(lambda at: self.coupling.weights(at, self.m), times)
+        return desired_weights(self.coupling.weights, times, self.m)
 
     def references(self, times: np.ndarray) -> list[Reference]:
         """What is desired at each of the times, (T,)."""
@@ -230,32 +234,29 @@ class Cell:
         """The instants in a part of a table, one after another."""
         desired, times = np.ascontiguousarray(table.desired[part]), table.t[part].tolist()
         if self.coupling.is_constant:
-            constant = Weights(*(weight[0] for weight in table.weights))
+            constant = StillWeights(*(weight[0] for weight in table.weights))
             return (Reference(row, constant, t) for row, t in zip(desired, times, strict=True))
         rows = zip(desired, times, *(weight[part] for weight in table.weights), strict=True)
         return (Reference(row, Weights(*weights), t) for row, t, *weights in rows)
 
     # -- internals ----------------------------------------------------------------------------------------
 
-    def _set_parameters(self) -> None:
-        self.parameters = tuple(
-            member_parameters(name, member.robot, member.friction, member.parameters)
-            for name, member in zip(self.names, self.members, strict=True)
-        )
-        self.theta = padded([p.theta for p in self.parameters])
-
-    def _set_initial_state(self) -> None:
-        q0, v0, theta_hat0 = [], [], []
-        starts = [self._start(i) for i in range(self.n)]
-        self.starts = tuple(word for word, _ in starts)
-        rows = zip(self.names, self.members, self.parameters, starts, strict=True)
-        for name, member, parameters, (_, start) in rows:
+    def _read_members(self) -> None:
+        starts, parameters, q0, v0, theta_hat0 = [], [], [], [], []
+        for i, (name, member) in enumerate(zip(self.names, self.members, strict=True)):
             nv = member.robot.nv
+            check_trajectory(name, member.trajectory, self.labels)
+            check_friction(name, member.friction, member.robot)
+            parameters.append(member_parameters(name, member.robot, member.friction, member.parameters))
+            source, start = self._start(i)
+            starts.append(source)
             q0.append(finite_array(f"{name}, q0", start, (nv,)))
             v0.append(finite_array(f"{name}, v0", np.zeros(nv) if member.v0 is None else member.v0, (nv,)))
-            size = len(parameters.theta)
+            size = len(parameters[-1].theta)
             guess = np.zeros(size) if member.theta_hat0 is None else member.theta_hat0
             theta_hat0.append(finite_array(f"{name}, theta_hat0", guess, (size,)))
+        self.starts = tuple(starts)
+        self.parameters, self.theta = tuple(parameters), padded([p.theta for p in parameters])
         self.q0, self.v0, self.theta_hat0 = padded(q0), padded(v0), padded(theta_hat0)
 
     def _start(self, i: int) -> tuple[str, ArrayLike]:
@@ -274,11 +275,6 @@ class Cell:
             except UnreachableError as error:
                 raise UnreachableError(f"{error}", subject=f"{self.names[i]}, trajectory") from None
         raise InputError("expected joint positions to start from, found none", subject=f"{self.names[i]}, q0")
-
-    def _check_members(self) -> None:
-        for name, member in zip(self.names, self.members, strict=True):
-            check_trajectory(name, member.trajectory, self.labels)
-            check_friction(name, member.friction, member.robot)
 
     def __reduce__(self) -> tuple:
         """Copies and other processes bind the space anew: arrays that share memory would come apart."""

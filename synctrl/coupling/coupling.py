@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from copy import copy
 from functools import partial
+from itertools import combinations
 from typing import Any, Self
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, finite_number, instance
 from ..errors import CouplingError, InputError
 from . import graphs
-from .weight_checks import check_weights
+from .desired import check_weights
 from .weights import ConstantWeights, WeightFunction, Weights, WeightSource, as_source
 
 #: entries of S up to which a product with S written out is the quickest way
@@ -104,7 +105,7 @@ class Coupling:
     @classmethod
     def chain(cls, n: int, c: WeightsLike | None = None, unit: str = "") -> Self:
         """Differences of neighbours, c_k e_k - c_{k+1} e_{k+1} for k = 1 to n - 1; by default c = 1."""
-        return cls._differences(n, graphs.path(_count(n)), c, "chain", unit)
+        return cls._differences(n, [(k, k + 1) for k in range(_count(n) - 1)], c, "chain", unit)
 
     @classmethod
     def star(cls, n: int, leader: int = 0, c: WeightsLike | None = None, unit: str = "") -> Self:
@@ -112,12 +113,12 @@ class Coupling:
         instance("leader", leader, (int, np.integer), "the number of a robot")
         if not 0 <= leader < _count(n):
             raise CouplingError(f"expected a robot from 0 to {n - 1}, found {leader}", subject="leader")
-        return cls._differences(n, graphs.star(n, leader), c, "star", unit)
+        return cls._differences(n, [(leader, k) for k in range(n) if k != leader], c, "star", unit)
 
     @classmethod
     def complete(cls, n: int, c: WeightsLike | None = None, unit: str = "") -> Self:
         """Differences of all robots, n (n - 1) / 2 of them; by default c = 1."""
-        return cls._differences(n, graphs.complete(_count(n)), c, "all to all", unit)
+        return cls._differences(n, [*combinations(range(_count(n)), 2)], c, "all to all", unit)
 
     @classmethod
     def from_graph(
@@ -178,7 +179,8 @@ class Coupling:
         """
         size = self._source.size(finite_number("t", t))
         if not 0 < size < np.inf:
-            raise CouplingError(f"a weight has no inverse at t = {t:g} s, so there is no scale to divide by")
+            singular = f"a weight has no inverse at t = {t:g} s, so there is no scale to divide by"
+            raise CouplingError(singular).about("c", time=t)
         return self._again(self.signs, self._source.scaled(1 / size), "")
 
     def _again(self, signs: np.ndarray, source: WeightSource, unit: str) -> Self:
@@ -221,7 +223,8 @@ class Coupling:
             CouplingError: the coupling is not made of pairs.
         """
         if not self._in_pairs:
-            raise CouplingError(f"{self!r} compares all robots at once and leaves more than one motion free")
+            many = "compares all robots at once and leaves more than one motion free"
+            raise CouplingError(f"{self!r} {many}").about("edges")
         w = graphs.carried_motion(self.robots, self.edges, self.signs)
         return w if graphs.fits_all(self.edges, self.signs, w) else None
 
@@ -239,7 +242,8 @@ class Coupling:
 
         Raises:
             CouplingError: a weight loses its inverse on the way, or c' or c'' is not the derivative it should
-                be; the message names the robot and the time.
+                be; with robot and time.
+            SimulationError: the weights fail; with the time.
         """
         check_weights(self._source, np.asarray(times, dtype=float), m)
 

@@ -1,4 +1,7 @@
-"""What is desired at some instants, asked of functions that users wrote: whatever fails in them is named."""
+"""What is desired at some instants, asked of functions that users wrote: whatever fails in them is named.
+
+Before a run, its weights are followed: do they keep their inverse, and do their derivatives belong to them?
+"""
 
 from __future__ import annotations
 
@@ -7,11 +10,14 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..errors import NonFiniteError, SynctrlError, failed
+from ..errors import CouplingError, NonFiniteError, SynctrlError, failed
+from ..tasks.derivatives import find_misfit_in_motion, spread_windows
 from ..tasks.trajectories import MOTION_PARTS, Motion, Trajectory
-from .weights import DERIVATIVES, Weights
+from .weights import DERIVATIVES, ConstantWeights, FunctionWeights, Weights, WeightSource
 
 Found = TypeVar("Found")
+#: times, (T,), and m -> weights
+WeightsAt = Callable[[np.ndarray, int], Weights]
 
 
 def desired_motion(name: str, robot: int, trajectory: Trajectory, times: np.ndarray) -> Motion:
@@ -40,19 +46,13 @@ def desired_motion(name: str, robot: int, trajectory: Trajectory, times: np.ndar
     return motion
 
 
-def desired_weights(weights: Callable[[np.ndarray], Weights], times: np.ndarray) -> Weights:
-    """Weights of a coupling at some times, (T,).
-
-    Args:
-        weights: times -> weights.
-        times: (T,), s.
+def desired_weights(weights: WeightsAt, times: np.ndarray, m: int) -> Weights:
+    """Weights of a coupling at some times, (T,), s, for a task of dimension m.
 
     Raises:
-        SynctrlError: what the weights raise of this kind.
-        SimulationError: they raise anything else; with the time.
-        NonFiniteError: they are infinite or not numbers; with robot and time.
+        SynctrlError, SimulationError, NonFiniteError: see `desired_motion`.
     """
-    found = _asked(weights, times, "the weights of the coupling", None)
+    found = _asked(lambda at: weights(at, m), times, "the weights of the coupling", None)
     for name, value in zip(DERIVATIVES, found, strict=False):
         wrong = ~np.isfinite(value).all(axis=(0, 2, 3))
         for i in np.flatnonzero(wrong)[:1].tolist():
@@ -92,3 +92,46 @@ def _check_finite(what: str, part: str, value: np.ndarray, times: np.ndarray, ro
             robot=robot,
             cause=cause,
         )
+
+
+def check_weights(source: WeightSource, times: np.ndarray, m: int) -> None:
+    """Follow the weights through a run before it starts, see `Coupling.check_weights`.
+
+    Between two neighbouring instants c changes by c c^-1 c' Delta t to first order: where an eigenvalue of
+    c^-1 c' Delta t reaches 1 in size, c has lost its inverse on the way, even if both instants have one. A
+    few hundred instants are looked at.
+    """
+    instants = int(np.clip(200_000 // source.robots, 200, 2000))  # fewer for many robots
+    times = np.unique(times[np.linspace(0, len(times) - 1, instants).astype(int)])
+    c, c_dot, _, c_inv = desired_weights(source.at, times, m)
+    if isinstance(source, ConstantWeights) or len(times) < 2:
+        return
+    if isinstance(source, FunctionWeights):
+        _check_derivatives(source, float(times[0]), float(times[-1]), m)
+    gaps = np.gradient(times)[:, None]
+    change = np.abs(np.linalg.eigvals(c_inv @ c_dot).real).max(axis=-1) * gaps
+    if change.max() >= 1:
+        k, i = np.unravel_index(np.argmax(change), change.shape)
+        raise CouplingError(
+            f"the weight c of the robot at index {i} loses its inverse near t = {times[k]:g} s, where it is "
+            f"{c[k, i].tolist()} and changes at {c_dot[k, i].tolist()} per second"
+        ).about("c", robot=int(i), time=float(times[k]))
+
+
+def _check_derivatives(source: WeightSource, start: float, stop: float, m: int) -> None:
+    """Compare c' and c'' with differences of c and c'."""
+    n, entries = source.robots, m * m
+    groups = [slice(i * entries, (i + 1) * entries) for i in range(n)]
+    windows = spread_windows(start, stop, (), int(np.clip(1000 // n, 4, 24)))
+    found = find_misfit_in_motion(
+        lambda t: [part.reshape(len(t), -1) for part in desired_weights(source.at, t, m)[:3]], windows, groups
+    )
+    if found is not None:
+        order, misfit = found
+        i, entry = divmod(misfit.coordinate, entries)
+        name, derivative = DERIVATIVES[order - 1 : order + 1]
+        raise CouplingError(
+            f"{derivative} of the robot at index {i} is not the derivative of {name}: near "
+            f"t = {misfit.time:.6g} s entry {divmod(entry, m)} of {name} changes by "
+            f"{misfit.expected:.6g} per second, but {derivative} says {misfit.found:.6g}"
+        ).about(derivative, robot=i, time=misfit.time)

@@ -91,7 +91,7 @@ def expand(f: Function, x: np.ndarray, t: float) -> Expansion:
         raise SynchronizationError(
             f"f has no second derivatives at t = {t:g} s, x = {x.tolist()}: with half the step of {h:g} they "
             f"change by {change:.3g}"
-        )
+        ).about("function", time=t)
     first = np.array([_first(f, x, h * axis) for axis in np.eye(n * m).reshape(-1, n, m)]) / h
     c = -first.T.reshape(-1, n, m).swapaxes(0, 1)
     return Expansion(t, value, c, second.reshape(-1, n, m, n, m).swapaxes(2, 3) / 2)

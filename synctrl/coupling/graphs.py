@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array
+from ..checks import finite_array, instance
 from ..errors import CouplingError, CouplingWarning, InputError, warn
 
 Edge = tuple[int, int]
@@ -18,21 +18,6 @@ LARGEST = 2**31
 def cycle(n: int) -> list[Edge]:
     """Every robot with the next one, and the last with the first."""
     return [(k, (k + 1) % n) for k in range(n)]
-
-
-def path(n: int) -> list[Edge]:
-    """Every robot but the last with the next one."""
-    return [(k, k + 1) for k in range(n - 1)]
-
-
-def star(n: int, leader: int = 0) -> list[Edge]:
-    """The leader with every other robot."""
-    return [(leader, k) for k in range(n) if k != leader]
-
-
-def complete(n: int) -> list[Edge]:
-    """Every robot with every other."""
-    return [(i, j) for i in range(n) for j in range(i + 1, n)]
 
 
 def read_graph(graph: Any) -> tuple[int, np.ndarray, np.ndarray]:
@@ -48,12 +33,9 @@ def read_graph(graph: Any) -> tuple[int, np.ndarray, np.ndarray]:
     """
     if hasattr(graph, "nodes") and hasattr(graph, "is_directed"):
         rows, n = _networkx_rows(graph)
-    elif isinstance(graph, Iterable):
-        rows, n = [_row(edge) for edge in graph], None
     else:
-        raise InputError(
-            f"expected pairs of robots or a networkx graph, found {type(graph).__name__}", subject="graph"
-        )
+        instance("graph", graph, Iterable, "pairs of robots or a networkx graph")
+        rows, n = [_row(edge) for edge in graph], None
     if not rows:
         raise CouplingError("expected at least one pair of robots, found none", subject="graph")
     table = finite_array("graph", rows, (len(rows), 3))
@@ -88,9 +70,8 @@ def check_rows(name: str, n: int, edges: np.ndarray, signs: np.ndarray) -> None:
     _find("signs other than 0, one for each robot", (signs == 0).any(axis=1), edges, n)
     if edges.shape[1] == 2:
         w = carried_motion(n, edges, signs)
-        _check_connected(w)
+        _check_motion(name, w, fits_all(edges, signs, w))
         _warn_of_repetition(name, n, ordered)
-        _warn_of_rest(name, fits_all(edges, signs, w))
 
 
 def _find(expected: str, wrong: np.ndarray, edges: np.ndarray, n: int) -> None:
@@ -101,11 +82,19 @@ def _find(expected: str, wrong: np.ndarray, edges: np.ndarray, n: int) -> None:
         raise CouplingError(f"expected {expected}", subject=f"edge {k}, of robots {edges[k].tolist()}")
 
 
-def _check_connected(w: np.ndarray) -> None:
+def _check_motion(name: str, w: np.ndarray, left_free: bool) -> None:
+    """Refuse a graph in several pieces, and warn of one that leaves no synchronized motion free."""
     if np.isnan(w).any():
         raise CouplingError(
             "the graph is not connected: no chain of edges leads from robot 0 to robot "
             f"{np.argmax(np.isnan(w))}; add an edge, or simulate the groups as separate cells"
+        ).about("edges", robot=int(np.argmax(np.isnan(w))))
+    if not left_free:
+        warn(
+            f"{name}: all synchronization errors vanish only where all tracking errors do, so there is no "
+            "synchronized motion and every robot is held in place, as on the paper's ring of an odd number "
+            "of robots; take differences instead, for example Coupling.signed_ring",
+            CouplingWarning,
         )
 
 
@@ -117,16 +106,6 @@ def _warn_of_repetition(name: str, n: int, ordered: np.ndarray) -> None:
         warn(
             f"{name}: robots {i} and {j} are compared {counts.max()} times, which multiplies the effect of "
             f"beta and K_eps on them by {counts.max()}; {way_out}, or use edge weights",
-            CouplingWarning,
-        )
-
-
-def _warn_of_rest(name: str, motion_left: bool) -> None:
-    if not motion_left:
-        warn(
-            f"{name}: all synchronization errors vanish only where all tracking errors do, so there is no "
-            "synchronized motion and every robot is held in place, as on the paper's ring of an odd number "
-            "of robots; take differences instead, for example Coupling.signed_ring",
             CouplingWarning,
         )
 
@@ -177,9 +156,7 @@ def _networkx_rows(graph: Any) -> tuple[list[tuple[Any, Any, Any]], int]:
 
 
 def _row(edge: Any) -> tuple[Any, Any, Any]:
-    if not isinstance(edge, Iterable) or isinstance(edge, str):
-        raise InputError(f"expected pairs (i, j) or triples (i, j, weight), found {edge!r}", subject="graph")
-    parts = tuple(edge)
+    parts = tuple(edge) if isinstance(edge, Iterable) and not isinstance(edge, str) else ()
     if len(parts) not in (2, 3):
         raise InputError(f"expected pairs (i, j) or triples (i, j, weight), found {edge!r}", subject="graph")
     return (*parts, 1.0)[:3]

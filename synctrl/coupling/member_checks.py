@@ -1,18 +1,31 @@
-"""Checks of what a member of a cell is made of, before anything relies on it."""
+"""What the members of a cell are made of, checked before anything relies on it.
+
+The true values of parameters say what the torque of a robot is. So they can only be those of this robot, as
+it is placed: with parameters of another one the controller would adapt towards a robot that is not there.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array, instance, label, per_joint
+from ..checks import finite_array, instance, label, offers, per_joint
 from ..errors import InputError, RobotWarning, warn
+from ..robots.base_parameters import KINDS, parameters_of
 from ..robots.friction import Friction
+from ..robots.friction_parameters import FrictionParameters
+from ..robots.parameters import FullParameters, LinearParameters, Parameters
 from ..robots.robot import Robot
 from ..tasks.trajectories import MOTION_PARTS
+
+#: random states at which torques are compared
+STATES = 5
+#: difference that is allowed, as a share of the largest torque of the joint, and of all joints
+OF_JOINT, OF_ROBOT = 1e-6, 1e-10
 
 
 def check_names(cell: str, names: Sequence[str]) -> None:
@@ -48,29 +61,12 @@ def check_labels(cell: Any) -> None:
     label("coupling: unit", cell.coupling.unit)
     for axis in cell.labels:
         label("space: name of a coordinate", axis)
-        if not axis.strip():
-            raise InputError(
-                f"expected a word as the name of every coordinate, found {axis!r}", subject="space"
-            )
-    if len({*cell.labels}) < len(cell.labels):
-        raise InputError(
-            f"expected coordinates of different names, found {', '.join(cell.labels)}", subject="space"
-        )
+    if not all(map(str.strip, cell.labels)) or len({*cell.labels}) < len(cell.labels):
+        expected = "expected a word of its own as the name of every coordinate"
+        raise InputError(f"{expected}, found {', '.join(map(repr, cell.labels))}", subject="space")
     for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True):
         for word in (robot.name, *robot.joint_names, *parameters.names):
             label(f"{name}: name of a joint or parameter", word)
-
-
-def check_space(space: Any) -> None:
-    """Refuse what is no space.
-
-    Raises:
-        InputError: no object with `labels`, `unit` and `bind`.
-    """
-    if isinstance(space, type) or not all(hasattr(space, part) for part in ("labels", "unit", "bind")):
-        raise InputError(
-            f"expected a space, for example CartesianSpace('xy'), found {space!r}", subject="space"
-        )
 
 
 def check_trajectory(name: str, trajectory: Any, labels: tuple[str, ...]) -> None:
@@ -84,23 +80,16 @@ def check_trajectory(name: str, trajectory: Any, labels: tuple[str, ...]) -> Non
     Raises:
         InputError: no trajectory, another dimension, or a motion at t = 0 that is not finite.
     """
-    if not callable(trajectory) or not hasattr(trajectory, "dimension") or not hasattr(trajectory, "breaks"):
-        raise InputError(
-            f"expected a trajectory such as Hold, found {trajectory!r}", subject=f"{name}, trajectory"
-        )
-    m = len(labels)
+    where, m = f"{name}, trajectory", len(labels)
+    offers(where, trajectory, ("__call__", "dimension", "breaks"), "a trajectory such as Hold")
     if trajectory.dimension != m:
-        raise InputError(
-            f"expected {m} coordinates ({', '.join(labels)}), found {trajectory.dimension}",
-            subject=f"{name}, trajectory",
-        )
+        coordinates = f"expected {m} coordinates ({', '.join(labels)})"
+        raise InputError(f"{coordinates}, found {trajectory.dimension}", subject=where)
     motion = trajectory(np.zeros(1))
     if not isinstance(motion, tuple) or len(motion) != 3:
-        raise InputError(
-            f"expected position, velocity and acceleration, found {motion!r}", subject=f"{name}, trajectory"
-        )
+        raise InputError(f"expected position, velocity and acceleration, found {motion!r}", subject=where)
     for part, value in zip(MOTION_PARTS, motion, strict=True):
-        finite_array(f"{name}, trajectory, {part} at t = 0 s", value, (1, m))
+        finite_array(f"{where}, {part} at t = 0 s", value, (1, m))
 
 
 def check_friction(name: str, friction: Any, robot: Robot) -> None:
@@ -112,6 +101,131 @@ def check_friction(name: str, friction: Any, robot: Robot) -> None:
     instance(f"{name}, friction", friction, Friction, "a Friction, or 'urdf'")
     for part in ("viscous", "coulomb"):
         per_joint(f"{name}, friction, {part}", getattr(friction, part), robot.nv)
+
+
+def member_parameters(name: str, robot: Robot, friction: Friction, given: Any) -> Parameters:
+    """The parameters of one member of a cell.
+
+    Args:
+        name: whose they are.
+        robot: its robot, as it is placed.
+        friction: true friction of its joints.
+        given: parameters, or their name, or None for all inertial ones.
+
+    Raises:
+        InputError: an unknown name, no parameters, or parameters whose true values do not give the torque of
+            this robot with, or without, its friction and rotors.
+    """
+    if given is None or isinstance(given, str):
+        try:
+            return parameters_of("full" if given is None else given, robot)
+        except InputError as error:
+            raise InputError(f"{name}, {error}").about(f"{name}, {error.subject}") from None
+    parameters = _with_friction(name, friction, given)
+    where = f"{name}, parameters"
+    offers(where, parameters, ("names", "theta", "regressor"), "parameters, for example FullParameters")
+    _check_sizes(where, parameters, robot)
+    _check_truth(where, parameters, robot, friction)
+    _check_map(where, parameters, robot)
+    return parameters
+
+
+def with_urdf_friction(robot: Robot, given: Any) -> Any:
+    """Parameters with friction, and rotors if there are any, in the place of none or of a known name."""
+    if not (given is None or (isinstance(given, str) and given in KINDS)):
+        return given
+    base = parameters_of("full" if given is None else given, robot)
+    return FrictionParameters(robot, base=base, armature=bool(robot.armature.any()))
+
+
+def _with_friction(name: str, friction: Friction, given: Any) -> Any:
+    """Friction among the parameters is that of the member: the truth is stated once."""
+    if not isinstance(given, FrictionParameters):
+        return given
+    if given.friction is None:
+        try:
+            return given.with_friction(friction)
+        except InputError as error:
+            raise InputError(f"{error}", subject=f"{name}, parameters") from None
+    if not friction.equals(given.friction):
+        raise InputError(
+            f"FrictionParameters say {given.friction}, but the member's friction is {friction}; "
+            "expected the true friction stated once, as Member(friction=...)",
+            subject=f"{name}, parameters",
+        )
+    if given.friction is not friction:
+        once = "give it to the member alone, FrictionParameters(robot) takes it from there"
+        warn(f"{name}: its friction is stated twice; {once}", DeprecationWarning)
+    return given
+
+
+def _check_sizes(where: str, parameters: Any, robot: Robot) -> None:
+    theta = finite_array(f"{where}, theta", parameters.theta, (None,))
+    expected, still = (robot.nv, len(theta)), np.zeros(robot.nv)
+    if len(parameters.names) != len(theta):
+        names = f"expected a name for each of {len(theta)} values"
+        raise InputError(f"{names}, found {len(parameters.names)}", subject=where)
+    try:
+        found = np.shape(parameters.regressor(still, still, still, still))
+    except ValueError as error:
+        raise InputError(f"they belong to another robot: {error}", subject=where) from error
+    if found != expected:
+        regressor = f"expected a regressor of shape {expected} for '{robot.name}'"
+        raise InputError(f"{regressor}, found {found}", subject=where)
+
+
+def _check_truth(where: str, parameters: Any, robot: Robot, friction: Friction) -> None:
+    """Y theta is the torque of this robot; a kind of its own may leave friction and rotors out."""
+    states = _states(robot)
+    found = np.array([parameters.regressor(q, v, v, a) @ parameters.theta for q, v, a in states])
+    if not np.isfinite(found).all():
+        raise InputError("expected a finite regressor, found one that is not", subject=where)
+    off = min((_difference(found, torque) for torque in _torques(robot, friction, states)), key=max)
+    if off[0] > 1:
+        raise InputError(
+            f"Y theta differs from the torque of robot '{robot.name}', as it is placed, "
+            f"by {off[1]:.3g} N·m; expected parameters made for this robot, with its true values",
+            subject=where,
+        )
+
+
+def _check_map(where: str, parameters: Any, robot: Robot) -> None:
+    """Ready maps have to be made for this robot also where another one has the same torque."""
+    rigid = parameters.base if isinstance(parameters, FrictionParameters) else parameters
+    if not isinstance(rigid, (FullParameters, LinearParameters)) or rigid.robot is robot:
+        return
+    for q, v, a in _states(robot):
+        here, there = (made.regressor(q, v, 0.5 * v, a) for made in (robot, rigid.robot))
+        if here.shape != there.shape or np.abs(here - there).max() > 1e-9 * np.abs(here).max():
+            raise InputError(
+                f"made for robot '{rigid.robot.name}', whose regressor is another one; "
+                f"expected parameters made for robot '{robot.name}', as it is placed",
+                subject=where,
+            )
+
+
+def _states(robot: Robot) -> np.ndarray:
+    """q, v and a, (STATES, 3, nv): the same ones every time."""
+    return np.random.default_rng(0).uniform(-2, 2, (STATES, 3, robot.nv))
+
+
+def _torques(robot: Robot, friction: Friction, states: np.ndarray) -> Iterator[np.ndarray]:
+    """Torques, (STATES, nv), of the rigid bodies, with and without each kind of friction and rotors."""
+    _, v, a = states.swapaxes(0, 1)
+    rotors = robot.armature * a
+    rigid = np.array([robot.inverse_dynamics(*state) for state in states]) - rotors
+    coulomb = friction.coulomb * np.tanh(v / friction.smoothing)
+    parts = friction.viscous * v, coulomb, rotors
+    for shares in product((0, 1), repeat=3):
+        yield rigid + sum(s * part for s, part in zip(shares, parts, strict=True))
+
+
+def _difference(found: np.ndarray, expected: np.ndarray) -> tuple[float, float]:
+    """The largest difference, in multiples of what is allowed, and in N·m."""
+    sizes = np.abs(expected).max(axis=0)
+    off = np.abs(found - expected).max(axis=0)
+    allowed = np.maximum(OF_JOINT * sizes, OF_ROBOT * sizes.max())
+    return float((off / np.maximum(allowed, np.finfo(float).tiny)).max()), float(off.max())
 
 
 def warn_of_unasked_friction(cell: Any) -> None:

@@ -1,19 +1,22 @@
-"""Can the robots reach what is asked of them? Checked before anything runs."""
+"""Do desired motions fit their derivatives, and can the robots reach them? Checked before anything runs."""
 
 from __future__ import annotations
 
 from contextlib import suppress
+from itertools import pairwise
 
 import numpy as np
 
-from ..errors import SimulationError, UnreachableError
+from ..checks import finite_array
+from ..errors import InputError, SimulationError, TrajectoryError, UnreachableError
 from ..robots.robot import Robot
+from ..tasks.derivatives import Misfit, difference, find_misfit_in_motion, spread_windows
 from ..tasks.inverse_kinematics import RESTARTS as RESTARTS
 from ..tasks.inverse_kinematics import TOLERANCE as TOLERANCE
-from ..tasks.inverse_kinematics import Missing as Missing
 from ..tasks.inverse_kinematics import find_anywhere
 from ..tasks.inverse_kinematics import inverse_kinematics as inverse_kinematics
 from ..tasks.inverse_kinematics import reach as reach
+from ..tasks.trajectories import MOTION_PARTS, Motion
 from .cell import Cell
 
 SAMPLES = 60
@@ -56,4 +59,68 @@ def _unreachable(name: str, robot: Robot, t: float, target: np.ndarray, cell: Ce
     return UnreachableError(
         f"{name} ('{robot.name}') cannot reach its desired position at t = {t:g} s: {wanted}; "
         "expected a path inside the workspace of its tip"
+    ).about(f"{name}, trajectory", found=target.tolist(), time=float(t))
+
+
+def check_motions(cell: Cell, times: np.ndarray) -> None:
+    """Compare the derivatives of all desired motions with differences, between their breaks.
+
+    In `PoseSpace` the velocity is the angular velocity w of R' = [w] R: a space says by its `displacement`
+    which way leads from one position to another, if its velocities are no derivatives of its coordinates.
+    Coordinates of one unit side by side are taken together.
+
+    Args:
+        cell: the robots and what is desired of them.
+        times: instants of the run, (T,), s.
+
+    Raises:
+        TrajectoryError: a derivative that is off by more than 2 % of its largest value. The message names the
+            robot, the derivative, the time and both values.
+    """
+    start, stop = float(times[0]), float(times[-1])
+    count = int(np.clip(1000 // cell.n, 4, 24))
+    for robot in range(cell.n):
+        with suppress(SimulationError):  # a motion that fails ends the run, which hands over what it has
+            _check_motion(cell, robot, start, stop, count)
+
+
+def _check_motion(cell: Cell, robot: int, start: float, stop: float, count: int) -> None:
+    windows = spread_windows(start, stop, cell.members[robot].trajectory.breaks, count)
+    groups = _groups(cell.units)
+    way = getattr(cell.space, "displacement", difference)
+    found = find_misfit_in_motion(lambda t: _motion(cell, robot, t), windows, groups, way)
+    if found is not None:
+        raise _error(cell, cell.names[robot], *found)
+
+
+def _groups(units: tuple[str, ...]) -> list[slice]:
+    """Coordinates of one unit that stand side by side."""
+    borders = [0, *(k for k in range(1, len(units)) if units[k] != units[k - 1]), len(units)]
+    return [slice(a, b) for a, b in pairwise(borders)]
+
+
+def _motion(cell: Cell, robot: int, times: np.ndarray) -> Motion:
+    """The motion at some times, known to be numbers."""
+    try:
+        parts = zip(MOTION_PARTS, cell.motion(robot, times), strict=True)
+        return Motion(*(finite_array(part, value, (len(times), cell.m)) for part, value in parts))
+    except InputError as error:
+        where, end = f"{cell.names[robot]}, trajectory", times.max()
+        failure = TrajectoryError(f"{where}, {error}, between t = 0 s and {end:g} s")
+        raise failure.about(where, found=error.found) from None
+
+
+def _error(cell: Cell, name: str, order: int, misfit: Misfit) -> TrajectoryError:
+    label = cell.labels[misfit.coordinate]
+    unit = cell.units[misfit.coordinate]
+    per = ("/s", "/s^2")[order - 1]
+    function, derivative = MOTION_PARTS[order - 1 : order + 1]
+    failure = TrajectoryError(
+        f"its {derivative} along {label} does not fit its {function}: near "
+        f"t = {misfit.time:.6g} s found {misfit.found:.6g} {unit}{per}, but the {function} changes by "
+        f"{misfit.expected:.6g} {unit}{per}; expected its derivative, which SmoothTrajectory finds by "
+        "itself, or `breaks` where it jumps",
+        subject=f"{name}, trajectory",
+        found=misfit.found,
     )
+    return failure.about(failure.subject, time=misfit.time, derivative=derivative, coordinate=label)

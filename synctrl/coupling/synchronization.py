@@ -8,9 +8,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, finite_number, instance, positive_number
+from ..checks import count, finite_array, finite_number, instance, positive_number
 from ..errors import CouplingError, InputError, SynchronizationError
-from ..tasks.chebyshev import NotSmoothError, certify
+from ..tasks.chebyshev import NotSmoothError, fit_smooth
 from ..tasks.trajectories import Trajectory
 from .coupling import Coupling
 from .expansion import Expansion, expand, least_linear
@@ -44,16 +44,9 @@ class SynchronizationFunction:
     """
 
     def __init__(self, function: Callable[..., ArrayLike], robots: int, dimension: int, unit: str = ""):
-        if not callable(function):
-            raise InputError(
-                f"expected f(x_1, ..., x_n, t), found {type(function).__name__}", subject="function"
-            )
-        for name, value, lowest in (("robots", robots, 2), ("dimension", dimension, 1)):
-            instance(name, value, (int, np.integer), "a whole number")
-            if value < lowest:
-                raise InputError(f"expected at least {lowest}, found {value}", subject=name, found=value)
+        instance("function", function, Callable, "f(x_1, ..., x_n, t)")  # type: ignore[arg-type]
         self.function, self.unit = function, unit
-        self.robots, self.dimension = int(robots), int(dimension)
+        self.robots, self.dimension = count("robots", robots, 2), count("dimension", dimension)
         self._matrices: MatrixFunction | None = None
         self._given: WeightSource | None = None
 
@@ -112,7 +105,7 @@ class SynchronizationFunction:
         except Exception as error:
             raise SynchronizationError(
                 f"f(x_1, ..., x_{self.robots}, t) cannot be evaluated at t = {t:g} s: {error}"
-            ) from error
+            ).about("function", time=float(t)) from error
         return np.atleast_1d(value).ravel()
 
     def c(self, t: float) -> np.ndarray:
@@ -144,12 +137,12 @@ class SynchronizationFunction:
         if self._given is not None:
             return self._given
         try:
-            smooth = certify(self.c, positive_number("duration", duration))
+            smooth = fit_smooth(self.c, positive_number("duration", duration))
         except NotSmoothError as error:
             raise SynchronizationError(
                 f"the weights cannot be differentiated: {DERIVATIVES[error.order]} of robot {error.row + 1}: "
                 f"{error}, or its derivatives, see SynchronizationFunction.from_matrices"
-            ) from None
+            ).about(DERIVATIVES[error.order], robot=error.row, time=error.time) from None
         constant = smooth.constant()
         return SmoothWeights(smooth) if constant is None else ConstantWeights(constant)
 
@@ -185,14 +178,13 @@ class SynchronizationFunction:
         except SynchronizationError:
             raise
         except CouplingError as error:
-            raise SynchronizationError(str(error)) from error
+            raise SynchronizationError(str(error)).about(**vars(error)) from error
         self._check_satisfied(xd, times, source)
         return coupling
 
     def _couple(self, source: WeightSource, graph: GraphLike | None) -> Coupling:
         if graph is not None:
-            if not callable(graph):
-                raise InputError(f"expected, for example, Coupling.ring, found {graph!r}", subject="graph")
+            instance("graph", graph, Callable, "a function such as Coupling.ring")  # type: ignore[arg-type]
             coupling = graph(self.robots, c=source, unit=self.unit)
         elif self.robots == 2:
             coupling = Coupling.pair(source, self.unit)
@@ -223,13 +215,13 @@ class SynchronizationFunction:
                 f"it returns {k} number{'s' * (k != 1)} for coordinates of dimension {m}, so that every c_i "
                 f"is {k} by {m} and has no inverse (expected {m} numbers)"
             )
-        bend = self._bend(xd, times)
-        if bend is not None:
-            defects.append(bend)
+        bend, robots = self._bend(xd, times)
+        defects += [bend] if bend else []
         if defects:
-            raise SynchronizationError(f"f cannot be controlled: {'; and '.join(defects)}")
+            failure = SynchronizationError(f"f cannot be controlled: {'; and '.join(defects)}")
+            raise failure.about("function", found=k, robots=robots)
 
-    def _bend(self, xd: np.ndarray, times: np.ndarray) -> str | None:
+    def _bend(self, xd: np.ndarray, times: np.ndarray) -> tuple[str, tuple[int, ...]]:
         """What is not linear in f, if anything is, at random positions about the desired ones."""
         rng = np.random.default_rng(0)
         for k in np.linspace(0, len(times) - 1, 12).astype(int):
@@ -238,25 +230,24 @@ class SynchronizationFunction:
             base, c, value = self(0 * x, t), self.c(t), self(x, t)
             size = np.abs(base) + np.abs(value) + np.matvec(np.abs(c), np.abs(x)).sum(axis=0)
             if (np.abs(value - base + np.matvec(c, x).sum(axis=0)) > LINEAR * size).any():
-                return self._describe_bend(c, x, xd[k], t)
-        return None
+                return self._explain(c, x, xd[k], t)
+        return "", ()
 
-    def _describe_bend(self, c: np.ndarray, x: np.ndarray, xd: np.ndarray, t: float) -> str:
-        """Which robots' coordinates enter f other than linearly, and how."""
+    def _explain(self, c: np.ndarray, x: np.ndarray, xd: np.ndarray, t: float) -> tuple[str, tuple[int, ...]]:
+        """How f is not linear, and in which robots' coordinates."""
         i, j, bend = least_linear(lambda positions: self(positions, t), c, x)
         robots = f"robot {i + 1}" if i == j else f"robots {j + 1} and {i + 1} together"
         text = (
             f"it is not linear (assumption 1) in the coordinates of {robots}: at t = {t:g} s f is off by "
             f"{bend:.3g} where x_{i + 1} = {x[i].tolist()}"
         )
-        return text if x.size > 12 else f"{text}; {self._second_order(xd, t)}"
-
-    def _second_order(self, xd: np.ndarray, t: float) -> str:
-        try:
-            terms = self.expand(xd, t).second_order_terms()
-        except SynchronizationError as error:
-            return str(error)
-        return f"the second-order terms of (5) are there {', '.join(terms) if terms else 'zero'}"
+        if x.size <= 12:
+            try:
+                terms = self.expand(xd, t).second_order_terms()
+                text += f"; the second-order terms of (5) are there {', '.join(terms) or 'zero'}"
+            except SynchronizationError as error:
+                text += f"; {error}"
+        return text, tuple(sorted({i, j}))
 
     def _check_satisfied(self, xd: np.ndarray, times: np.ndarray, source: WeightSource) -> None:
         """Equation (3): f = 0 on the desired motion."""
@@ -267,11 +258,13 @@ class SynchronizationFunction:
             k = int(np.argmax(np.abs(f).max(axis=1)))
             shifts = np.matvec(w.c_inv[k], f[k])
             i = int(np.argmin(np.linalg.norm(shifts, axis=1)))
-            raise SynchronizationError(
+            failure = SynchronizationError(
                 f"the desired motion does not satisfy f = 0, eq. (3): at t = {times[k]:g} s f is "
                 f"{f[k].tolist()}; for f = 0 robot {i + 1} alone would have to be moved by "
                 f"{shifts[i].tolist()} from {xd[k, i].tolist()}"
             )
+            data = {"time": float(times[k]), "found": f[k].tolist(), "shift": shifts[i].tolist()}
+            raise failure.about("trajectories", robot=i, **data)
 
 
 def _as_function(value: ArrayLike | MatrixFunction) -> MatrixFunction:
@@ -295,4 +288,4 @@ def _check_implied(coupling: Coupling) -> None:
         raise SynchronizationError(
             f"the graph '{coupling.name}' does not imply f = 0: its errors vanish with {motion}, whose sum "
             "is not 0 as (6) demands; use Coupling.sum, or Coupling.ring for an even number of robots"
-        )
+        ).about("graph", found=coupling.name)

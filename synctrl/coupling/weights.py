@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, positive_number
 from ..errors import CouplingError, InputError
 from ..renamed import names_elsewhere
-from ..tasks.chebyshev import NotSmoothError, SmoothFunction, certify
+from ..tasks.chebyshev import NotSmoothError, SmoothFunction, fit_smooth
 
 #: A condition number above this counts as "no inverse".
 SINGULAR = 1e12
@@ -29,6 +29,17 @@ class Weights(NamedTuple):
     c_dot: np.ndarray
     c_ddot: np.ndarray
     c_inv: np.ndarray
+
+    @property
+    def move(self) -> bool:
+        """Whether c' and c'' have to be asked for."""
+        return True
+
+
+class StillWeights(Weights):
+    """Weights of which c' and c'' are zero for good: nothing has to be multiplied by them."""
+
+    move = False
 
 
 class WeightSource(Protocol):
@@ -116,7 +127,7 @@ class FunctionWeights:
                     f"expected one weight for each of {self.robots} robots, found shapes {found}"
                 )
         except InputError as error:
-            raise CouplingError(f"{error}", subject=f"weights at t = {t:g} s") from error
+            raise CouplingError(f"weights at t = {t:g} s: {error}").about("c", time=float(t)) from error
         return parts
 
 
@@ -146,15 +157,14 @@ class SmoothWeights:
             CouplingError: it is not smooth enough for a relative error of 1e-8.
         """
         try:
-            smooth = certify(
+            smooth = fit_smooth(
                 lambda t: as_matrices(finite_array(f"c at t = {t:g} s", c(t)), m),
                 positive_number("duration", duration),
             )
         except NotSmoothError as error:
-            raise CouplingError(
-                f"the weight of the robot at index {error.row} cannot be differentiated {error.order} times: "
-                f"{error}"
-            ) from None
+            where = f"the weight of the robot at index {error.row}"
+            failure = CouplingError(f"{where} cannot be differentiated {error.order} times: {error}")
+            raise failure.about("c", robot=error.row, time=error.time) from None
         return cls(smooth)
 
     def at(self, times: np.ndarray, m: int) -> Weights:
@@ -168,7 +178,7 @@ class SmoothWeights:
             raise CouplingError(
                 f"the weights were prepared for times from 0 to {self._c.duration:g} s, asked for t = "
                 f"{outside:g} s; make the coupling for a longer duration"
-            )
+            ).about("c", time=outside)
         c, c_dot, c_ddot = self._factor * self._c.at(times)
         return Weights(c, c_dot, c_ddot, inverse(c, times))
 
@@ -185,13 +195,9 @@ def as_source(robots: int, c: ArrayLike | WeightFunction | WeightSource) -> Weig
     Raises:
         InputError: weights for another number of robots.
     """
-    source: WeightSource
-    if hasattr(c, "at") and hasattr(c, "scaled"):
-        source = c  # type: ignore[assignment]
-    elif callable(c):
-        source = FunctionWeights(robots, c)
-    else:
-        source = ConstantWeights(c)
+    source: Any = c
+    if not (hasattr(c, "at") and hasattr(c, "scaled")):
+        source = FunctionWeights(robots, c) if callable(c) else ConstantWeights(c)
     if source.robots != robots:
         raise InputError(
             f"expected one weight for each of {robots} robots, found {source.robots}", subject="c"
@@ -243,7 +249,7 @@ def _singular(c: np.ndarray, times: np.ndarray) -> CouplingError:
     return CouplingError(
         f"the weight c of the robot at index {i} has no inverse at t = {times[k]:g} s "
         f"(condition number {condition[k, i]:.2g}): {c[k, i].tolist()}"
-    )
+    ).about("c", robot=int(i), time=float(times[k]))
 
 
-__getattr__ = names_elsewhere(__name__, ".weight_checks", "check_weights")
+__getattr__ = names_elsewhere(__name__, ".desired", "check_weights")

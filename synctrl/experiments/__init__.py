@@ -1,7 +1,6 @@
 """Ready cells: the paper's two, and its examples 1 to 3."""
 
-from .a460_full import a460_full_pair
-from .a460_pair import a460_pair
+from .a460_pair import a460_full_pair, a460_pair
 from .mixed_four import mixed_four
 from .mobile_robot import mobile_robot
 from .panda_four import panda_four

@@ -3,13 +3,15 @@
 Joint angles and gains are the paper's. Masses, inertias and friction of the A460 were never published: the
 ones used here are synthetic. The time of the motion, the initial estimate and the place of the second base
 are our choices as well; with these the two wrists carry a level payload 0.5 m long across its direction of
-travel.
+travel. With all six joints, as in the paper's laboratory, PID controllers hold the last three, while the
+adaptive controller knows a lumped mass in place of the wrist.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Unpack
+from functools import partial
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -21,6 +23,7 @@ from ..robots.catalog import load_robot
 from ..robots.friction import Friction
 from ..robots.friction_parameters import FrictionParameters
 from ..robots.robot import Robot
+from ..simulation.held_joints import HeldJointsPlant, Pid
 from ..simulation.simulate import Experiment
 from ..tasks.spaces import JointSpace
 from ..tasks.trajectories import Cubic
@@ -37,6 +40,8 @@ KNOWN = 0.7
 GAMMA_FRICTION = 100.0
 #: synthetic; the controller does not know it
 FRICTION = Friction(viscous=(5.0, 6.0, 4.0), coulomb=(4.0, 6.0, 4.0), smoothing=0.01)
+#: what holds joints 4 to 6: ours, about 60 rad/s and well damped for each joint alone
+WRIST = Pid(P=(7.0, 20.0, 2.0), I=(70.0, 200.0, 20.0), D=(0.25, 0.6, 0.06))
 
 
 def a460_pair(
@@ -61,15 +66,28 @@ def a460_pair(
     boolean("friction", friction)
     boolean("adapt_friction", adapt_friction)
     robot = load_robot("a460")
-    members = [_member(robot, i, FRICTION if friction else Friction()) for i in range(2)]
+    members, ours = [_member(robot, i, FRICTION if friction else Friction()) for i in range(2)], GAINS
     if adapt_friction:
         members = [_knowing_friction(member) for member in members]
+        ours = replace(GAINS, Gamma=np.repeat([float(GAINS.Gamma), GAMMA_FRICTION], [30, 6]))
     cell = Cell(members, Coupling.pair(c=(1.0, -1.0)), JointSpace(), name="A460 pair")
     remarks = [*["without friction"] * (not friction), *["friction adapted"] * adapt_friction]
-    options: ControllerParts = {
-        **parts, "reference_acceleration": reference_acceleration, "k_r_space": k_r_space,
-    }  # fmt: skip
-    return ready_experiment(cell, DURATION, _gains(adapt_friction), gains, synchronized, options, *remarks)
+    options = ControllerParts(reference_acceleration=reference_acceleration, k_r_space=k_r_space, **parts)
+    return ready_experiment(cell, DURATION, ours, gains, synchronized, options, *remarks)
+
+
+def a460_full_pair(wrist: Pid = WRIST, **options: Any) -> Experiment:
+    """The cell of section V-A with six joints in the plant and three in the controller.
+
+    Args:
+        wrist: the controllers of joints 4 to 6.
+        options: of `a460_pair`, its `adaptation`, `law` and `network` too.
+    """
+    known = a460_pair(**options)
+    robot = load_robot("a460_full")
+    robots = [robot.placed(*base, name=f"A460 {i + 1}") for i, base in enumerate(BASES)]
+    plant = partial(HeldJointsPlant, robots=robots, pid=wrist)
+    return replace(known, plant_type=plant, title=f"{known.title}, six joints")
 
 
 def _member(robot: Robot, i: int, friction: Friction) -> Member:
@@ -86,9 +104,3 @@ def _knowing_friction(member: Member) -> Member:
     """The member with friction among what it adapts."""
     knowing = replace(member, parameters=FrictionParameters(member.robot))
     return replace(knowing, theta_hat0=KNOWN * knowing.theta)
-
-
-def _gains(adapt_friction: bool) -> Gains:
-    if not adapt_friction:
-        return GAINS
-    return replace(GAINS, Gamma=np.repeat([float(GAINS.Gamma), GAMMA_FRICTION], [30, 6]))

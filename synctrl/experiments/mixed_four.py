@@ -6,8 +6,7 @@ from typing import Unpack
 
 from ..control.gains import Gains
 from ..simulation.simulate import Experiment
-from .circles import Station, circle_cell
-from .panda_four import DISTANCE, K_R, POSTURE
+from .panda_four import DISTANCE, K_R, POSTURE, Station, circle_cell
 from .parts import ControllerParts
 
 UR_POSTURE = (0.0, -1.3, 1.9, -2.17, -1.57, 0.0)
@@ -29,8 +28,6 @@ def mixed_four(
     Without friction, and with 0.7 of the true inertial parameters as the first estimate.
 
     Args:
-        synchronized: False sets beta = K_eps = 0, independent adaptive control.
-        gains: by default ones that converge within the run.
-        parts: parts and options of the controller, see `ControllerParts`.
+        synchronized, gains, parts: see `ready_experiment`; the gains of the cell converge within the run.
     """
     return circle_cell(STATIONS, "mixed cell", gains, synchronized, parts)

@@ -28,7 +28,7 @@ from ..coupling.synchronization import SynchronizationFunction
 from ..robots.catalog import load_robot
 from ..robots.parameters import LinearParameters
 from ..robots.robot import Robot
-from ..simulation.disturbances import Disturbance
+from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
 from ..tasks.spaces import JointSpace
 from ..tasks.trajectories import Motion
@@ -102,19 +102,15 @@ def mobile_robot(
     """Two wheels, each a robot with one joint, on a path whose radii change with time.
 
     Args:
-        synchronized: False sets beta = K_eps = 0.
         disturbed: whether the left wheel meets an obstacle, -1.5 N·m for 3 <= t < 3.5 s.
-        gains: by default ours.
-        parts: parts and options of the controller, see `ControllerParts`.
+        synchronized, gains, parts: see `ready_experiment`.
     """
     wheel = load_robot("wheel")
     members = [_member(wheel, i) for i in range(2)]
     coupling = wheel_synchronization().coupling([member.trajectory for member in members], DURATION)
     cell = Cell(members, coupling, JointSpace(), name="wheels of a mobile robot")
-    remarks, disturbances = (("disturbed",), (OBSTACLE,)) if disturbed else ((), ())
-    return ready_experiment(
-        cell, DURATION, GAINS, gains, synchronized, parts, *remarks, disturbances=disturbances
-    )
+    met = (OBSTACLE,) if disturbed else ()
+    return ready_experiment(cell, DURATION, GAINS, gains, synchronized, parts, disturbances=met)
 
 
 def _member(wheel: Robot, i: int) -> Member:

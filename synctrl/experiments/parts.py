@@ -11,7 +11,7 @@ from ..control.gains import Gains
 from ..control.laws import Law
 from ..control.network import Network
 from ..coupling.cell import Cell
-from ..simulation.disturbances import Disturbance
+from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
 
 
@@ -47,8 +47,8 @@ def ready_experiment(
         duration: of the experiment, s.
         default: gains of the cell; without Gamma where another adaptation takes its place.
         gains: what is used instead of them, or None.
-        synchronized: False sets beta = K_eps = 0.
-        parts: parts and options of the controller.
+        synchronized: False sets beta = K_eps = 0, independent adaptive control.
+        parts: parts and options of the controller, see `ControllerParts`.
         remarks: what else is special about the experiment, for its title.
         disturbances: torques from outside.
 
@@ -60,6 +60,6 @@ def ready_experiment(
         gains = default if parts.get("adaptation") is None else default.replace(Gamma=None)
     instance("gains", gains, Gains, "Gains")
     kind = "synchronized" if synchronized else "independent"
-    title = ", ".join([cell.name, kind, *remarks])
+    title = ", ".join([cell.name, kind, *remarks, *["disturbed"] * bool(disturbances)])
     gains = gains if synchronized else gains.independent()
     return Experiment(cell, gains, duration, disturbances, title=title, **parts)

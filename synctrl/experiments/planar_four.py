@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..robots.catalog import load_robot
 from ..robots.parameters import planar_two_link_parameters, theta_50
 from ..robots.robot import Robot
-from ..simulation.disturbances import Disturbance
+from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
 from ..tasks.spaces import CartesianSpace
 from ..tasks.trajectories import ExponentialApproach
@@ -72,14 +72,9 @@ def planar_four(
     members = [_member(arm, i, phi, RADII[radii][i]) for i in range(4)]
     coupling = Coupling.ring(4, c=(R + D, -R, R, -(R + D)), unit="m")
     cell = Cell(members, coupling, CartesianSpace("xy"), name="four planar arms")
-    remarks = () if disturbance is None else ("disturbed",)
-    disturbances = _disturbances(disturbance)
-    options: ControllerParts = {
-        **parts, "reference_acceleration": reference_acceleration, "k_r_space": k_r_space,
-    }  # fmt: skip
-    return ready_experiment(
-        cell, DURATION, GAINS, gains, synchronized, options, *remarks, disturbances=disturbances
-    )
+    options = ControllerParts(reference_acceleration=reference_acceleration, k_r_space=k_r_space, **parts)
+    pushes = _disturbances(disturbance)
+    return ready_experiment(cell, DURATION, GAINS, gains, synchronized, options, disturbances=pushes)
 
 
 def circle_point(radius: float, angle: float) -> np.ndarray:
@@ -110,6 +105,5 @@ def _disturbances(disturbance: str | Disturbance | Sequence[Disturbance] | None)
         return (disturbance,)
     if isinstance(disturbance, Sequence) and not isinstance(disturbance, str):
         return tuple(disturbance)
-    raise InputError(
-        f"expected None, 'torque' or Disturbance objects, found {disturbance!r}", subject="disturbance"
-    )
+    expected = "expected None, 'torque' or Disturbance objects"
+    raise InputError(f"{expected}, found {disturbance!r}", subject="disturbance")

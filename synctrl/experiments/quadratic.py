@@ -39,14 +39,6 @@ class Analysis:
         return f"{self.expansion}\nrefused: {self.refusal}"
 
 
-def quadratic_synchronization() -> SynchronizationFunction:
-    """f = x_1^T x_1 + x_2^T x_2 - A, with the A of `desired_motion`, m^2."""
-    A = sum(radius**2 for radius in RADII)
-    return SynchronizationFunction(
-        lambda x_1, x_2, t: x_1 @ x_1 + x_2 @ x_2 - A, robots=2, dimension=2, unit="m"
-    )
-
-
 def desired_motion() -> tuple[Circle, Circle]:
     """Two circles about the origin, on which f = 0."""
     first, second = (Circle((0.0, 0.0), radius, SPEED) for radius in RADII)
@@ -59,7 +51,8 @@ def quadratic_analysis(t: float = 0.0) -> Analysis:
     Args:
         t: where on the motion, s.
     """
-    function, paths = quadratic_synchronization(), desired_motion()
+    A, paths = sum(radius**2 for radius in RADII), desired_motion()
+    function = SynchronizationFunction(lambda x_1, x_2, t: x_1 @ x_1 + x_2 @ x_2 - A, 2, 2, unit="m")
     expansion = function.expand(np.array([path(t).x for path in paths]), t)
     try:
         function.coupling(paths, DURATION)

@@ -17,7 +17,7 @@ from ..coupling.cell import Cell, Member
 from ..coupling.synchronization import SynchronizationFunction
 from ..robots.catalog import load_robot
 from ..robots.parameters import planar_two_link_parameters, theta_50
-from ..simulation.disturbances import Disturbance
+from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
 from ..tasks.inverse_kinematics import inverse_kinematics
 from ..tasks.spaces import CartesianSpace
@@ -37,11 +37,6 @@ MASS_HAT, LENGTH_HAT = 0.8, 0.2  # kg, m: the initial guess of every link
 PUSH = Disturbance(robot=0, torque=(1.0, 1.0), start=2.0, stop=2.2)
 
 
-def object_synchronization() -> SynchronizationFunction:
-    """f = x_1 - x_2 - A, in m."""
-    return SynchronizationFunction(lambda x_1, x_2, t: x_1 - x_2 - A, robots=2, dimension=2)
-
-
 def rigid_object(
     synchronized: bool = True,
     disturbed: bool = True,
@@ -51,18 +46,15 @@ def rigid_object(
     """Two arms and the object between them, in Cartesian space.
 
     Args:
-        synchronized: False sets beta = K_eps = 0.
         disturbed: whether the first arm is pushed, 1 N·m on both joints for 2 <= t < 2.2 s.
-        gains: by default ours.
-        parts: parts and options of the controller, see `ControllerParts`.
+        synchronized, gains, parts: see `ready_experiment`.
     """
     members = [_member(i) for i in range(2)]
-    coupling = object_synchronization().coupling([member.trajectory for member in members], DURATION)
+    function = SynchronizationFunction(lambda x_1, x_2, t: x_1 - x_2 - A, robots=2, dimension=2)
+    coupling = function.coupling([member.trajectory for member in members], DURATION)
     cell = Cell(members, coupling, SPACE, name="rigid object")
-    remarks, disturbances = (("disturbed",), (PUSH,)) if disturbed else ((), ())
-    return ready_experiment(
-        cell, DURATION, GAINS, gains, synchronized, parts, *remarks, disturbances=disturbances
-    )
+    pushes = (PUSH,) if disturbed else ()
+    return ready_experiment(cell, DURATION, GAINS, gains, synchronized, parts, disturbances=pushes)
 
 
 def _member(i: int) -> Member:

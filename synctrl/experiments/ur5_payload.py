@@ -54,9 +54,7 @@ def ur5_payload(
     rest, a few centimetres and degrees off their paths.
 
     Args:
-        synchronized: False sets beta = K_eps = 0, independent adaptive control.
-        gains: by default ones that converge within the run.
-        parts: parts and options of the controller, see `ControllerParts`.
+        synchronized, gains, parts: see `ready_experiment`; the gains of the cell converge within the run.
     """
     members = [_member(i) for i in range(2)]
     cell = Cell(members, Coupling.pair(), PoseSpace(), name="UR5 pair with payload")

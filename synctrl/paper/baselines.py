@@ -15,10 +15,10 @@ import numpy as np
 
 from ..errors import InputError
 from ..simulation.simulate import Experiment
-from .matching import Match, match_peak_torque
-from .trials import Bench, Trial
+from .trials import Bench, Match, Trial, match_peak_torque
 
 PARTS = ("beta", "K_eps", "Gamma")
+_SYMBOLS = {"beta": "β", "K_eps": "K_ε", "Gamma": "adaptation", "Lambda": "Λ", "K_r": "K_r"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,16 +47,13 @@ class Comparison:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
+        match = self.match
         return {
             "title": self.title,
             "duration": self.duration,
             "trials": [asdict(trial) for trial in self.trials],
             "ablation": [asdict(trial) for trial in self.ablation],
-            "matched": {
-                "factor": self.match.factor,
-                "scaled": list(self.match.scaled),
-                "runs": self.match.runs,
-            },
+            "matched": {"factor": match.factor, "scaled": list(match.scaled), "runs": match.runs},
             "units": list(self.units),
             "findings": self.findings(),
         }
@@ -68,7 +65,7 @@ def ablation(bench: Bench) -> tuple[Trial, ...]:
     gains = bench.experiment.gains
     return tuple(
         bench.trial(
-            " + ".join(map(_symbol, names)) or "none of them",
+            " + ".join(_SYMBOLS[name] for name in names) or "none of them",
             gains.replace(**{name: 0 * getattr(gains, name) for name in PARTS if name not in names}),
         )
         for names in kept
@@ -92,7 +89,7 @@ def compare(experiment: Experiment, scaled: Sequence[str] = ("Lambda",), **optio
         raise InputError("expected a synchronized controller, found beta = K_eps = 0", subject="experiment")
     ours = bench.trial("synchronized", gains)
     match = match_peak_torque(bench, ours.peak_torque, scaled)
-    matched = f"independent, {' and '.join(map(_symbol, scaled))} times {match.factor:.3g}"
+    matched = f"independent, {' and '.join(_SYMBOLS[name] for name in scaled)} times {match.factor:.3g}"
     trials = (
         ours,
         bench.trial("independent", independent),
@@ -104,15 +101,6 @@ def compare(experiment: Experiment, scaled: Sequence[str] = ("Lambda",), **optio
     return Comparison(
         experiment.title or experiment.cell.name, duration, trials, ablation(bench), match, units
     )
-
-
-# -- parts ------------------------------------------------------------------------------------------------
-
-_SYMBOLS = {"beta": "β", "K_eps": "K_ε", "Gamma": "adaptation", "Lambda": "Λ", "K_r": "K_r"}
-
-
-def _symbol(name: str) -> str:
-    return _SYMBOLS.get(name, name)
 
 
 # -- in words ---------------------------------------------------------------------------------------------
@@ -131,7 +119,7 @@ def _against_independent(c: Comparison) -> list[str]:
 
 def _about_torque(c: Comparison) -> str:
     share = c.trials[0].gravity_torque / c.trials[0].peak_torque
-    factors = f"{' and '.join(map(_symbol, c.match.scaled))} by {c.match.factor:.3g}"
+    factors = f"{' and '.join(_SYMBOLS[name] for name in c.match.scaled)} by {c.match.factor:.3g}"
     if share > 0.5:
         return (
             f"Multiplying {factors} matches the peak torque, but here that means little: gravity alone takes "

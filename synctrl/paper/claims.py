@@ -8,8 +8,7 @@ paper's; `MUCH` and the other constants below say what we ask for.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -56,10 +55,6 @@ class Claim:
     holds: bool
     figures: tuple[Finding, ...]
     explanation: str
-
-    def as_data(self) -> dict[str, Any]:
-        """Plain data for a JSON file."""
-        return asdict(self)
 
 
 def sync_error_is_much_smaller(synchronized: Result, independent: Result, source: str) -> Claim:
@@ -157,11 +152,6 @@ def extremes(ratios: np.ndarray) -> list[tuple[tuple[int, int], float]]:
 def error_name(run: Result, pair: int, axis: int) -> str:
     """A synchronization error in words."""
     return f"ε_{row_names(run, 'sync_error')[pair].split(':')[0]}, {run.info['axes'][axis]}"
-
-
-def scalar(gain: Any) -> str:
-    """A gain as one number."""
-    return f"{np.mean(gain):g}"
 
 
 __getattr__ = names_elsewhere(__name__, ".claims", Quantity="Finding")

@@ -17,8 +17,7 @@ from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .claims import Claim
 from .claims import kind as kind_of
-from .claims_a460 import a460_claims
-from .claims_planar import own_findings, planar_four_claims
+from .claims_of_cells import a460_claims, own_findings, planar_four_claims
 from .report import (
     Block,
     Formulas,

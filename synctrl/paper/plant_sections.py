@@ -1,4 +1,4 @@
-"""Sections of the page on plants that differ from the controller's model, and on what it learns of them."""
+"""Sections of the page: plants unlike the controller's model, what it learns of them, what the step costs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..analysis.identification import LEARNED, Identification
+from ..analysis.convergence import LEARNED, Identification
+from ..checks import instance
 from ..show.plots import common_limits, joint_trajectories, sync_errors, tracking_errors
 from ..show.style import display
 from ..simulation.result import Result
@@ -80,21 +81,19 @@ def friction_section(runs: Mapping[str, Result], folder: Path) -> Section:
 
 def identification_section(found: Mapping[str, Sequence[Identification]]) -> Section:
     """What runs could learn of their robots' parameters, and what they did learn, by title of the run."""
-    rows = []
-    for title, robots in found.items():
-        for robot in robots:
-            data = robot.as_dict()
-            sizes = (data["adapted"], data["identifiable"], data["learned"])
-            rows.append(
-                (
-                    f"{title}: {robot.robot}",
-                    *map(str, sizes),
-                    number(data["condition"]),
-                    f"{data['excitation']:.1e}",
-                    *(number(data[f"torque_error_{when}"]) for when in ("peak", "end")),
-                    *(number(data[f"base_error_{when}"]) for when in ("start", "end")),
-                )
-            )
+    sizes = ("adapted", "identifiable", "learned")
+    errors = ("torque_error_peak", "torque_error_end", "base_error_start", "base_error_end")
+    data = [(f"{title}: {each.robot}", each.as_dict()) for title, robots in found.items() for each in robots]
+    rows = [
+        (
+            name,
+            *(str(row[size]) for size in sizes),
+            number(row["condition"]),
+            f"{row['excitation']:.1e}",
+            *(number(row[error]) for error in errors),
+        )
+        for name, row in data
+    ]
     head = (
         "run and robot", "adapted", "identifiable", "learned", "condition", "excitation",
         "torque error, N·m, peak", "at the end", "base parameter error, start", "at the end",
@@ -120,11 +119,11 @@ def _caption(k: int, kind: str, joints: str) -> str:
 
 
 def _wrist_table(runs: Mapping[str, Result]) -> Table:
-    rows = []
-    for kind, full in FULL.items():
-        run = runs[full]
-        for name, held in zip(run.names, run.info["held_joints"], strict=True):
-            rows.append((f"{kind}, {name}", *(number(np.rad2deg(angle)) for angle in held["largest"])))
+    rows = [
+        (f"{kind}, {name}", *map(number, np.rad2deg(held["largest"])))
+        for kind, full in FULL.items()
+        for name, held in zip(runs[full].names, runs[full].info["held_joints"], strict=True)
+    ]
     joints = runs["full"].info["held_joints"][0]["joints"]
     return Table(("largest deflection, deg", *joints), tuple(rows))
 
@@ -141,4 +140,41 @@ def _error_table(runs: Mapping[str, Result]) -> Table:
             rows.append((f"peak {symbol}, {kind}, {unit}", *cells))
     axes = runs["synchronized"].info["axes"]
     head = ("", *(f"{axis}, {joints}" for axis in axes for joints in ("three joints", "six joints")))
+    return Table(head, tuple(rows))
+
+
+def step_section(runs: Mapping[str, Result]) -> Section:
+    """The estimated error of the worst step of every run, with those above the limit in a table.
+
+    Args:
+        runs: by name; those of methods that choose their steps, or from before estimates, are left out.
+
+    Raises:
+        InputError: something that is no result.
+    """
+    for name, run in runs.items():
+        instance(f"runs, {name}", run, Result, "a Result")
+    known = {name: run for name, run in runs.items() if (run.info.get("step_error") or {}).get("estimate")}
+    over = {n: run for n, run in known.items() if run.info["step_error"]["advised_step"] is not None}
+    estimated = Text(
+        "Every run estimates what its worst step errs in velocity, as a share of the largest velocity of the "
+        "run, from derivatives that it computes anyway. The error itself is about a third of that."
+    )
+    advice = ", and would do with the step in the last column." if over else "."
+    verdict = Text(f"{len(over)} of {len(known)} runs are above the limit{advice}")
+    return Section("What the step costs", (estimated, verdict, *([_step_table(over)] if over else [])))
+
+
+def _step_table(runs: Mapping[str, Result]) -> Table:
+    titles = [str(run.info["title"]) for run in runs.values()]
+    names = [
+        name.replace("_", " ") if titles.count(t) > 1 else t for name, t in zip(runs, titles, strict=True)
+    ]
+    head = ("run", "step, ms", "estimate, %", "limit, %", "at", "t, s", "advised step, ms")
+    rows = []
+    for name, run in zip(names, runs.values(), strict=True):
+        found, step = run.info["step_error"], f"{1e3 * run.info['dt']:g}" if "dt" in run.info else ""
+        shares = [f"{100 * found[share]:.2g}" for share in ("estimate", "limit")]
+        where = f"{run.names[found['robot']]}, joint {found['joint'] + 1}"
+        rows.append((name, step, *shares, where, f"{found['time']:g}", f"{1e3 * found['advised_step']:.2g}"))
     return Table(head, tuple(rows))

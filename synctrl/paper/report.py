@@ -1,7 +1,8 @@
 """A page: sections of text, formulas, figures, tables and verdicts in one HTML file that opens offline.
 
 Everything that comes from data is escaped; the only markup is written here. In text, a letter with an
-underscore, as in `e_1`, is shown with its index below the line.
+underscore, as in `e_1`, is shown with its index below the line. Formulas become pictures by matplotlib's own
+reader of TeX: without LaTeX, the same in every browser.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -18,10 +20,9 @@ from ..errors import InputError
 from ..files import reported, write_whole
 from ..renamed import names_elsewhere
 from ..show.panels import ten_to
-from ..show.plots import save
+from ..show.plots import save, style
 from ..show.style import display
 from .claims import Claim, Finding
-from .formulas import formula_svg
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -242,6 +243,39 @@ def _shown(quantity: Finding) -> str:
     """A figure in the unit that people read."""
     unit, factor = display(quantity.unit)
     return f"{number(factor * quantity.value)} {unit}".strip()
+
+
+SIZE = 14.0  # points
+
+
+def formula_svg(tex: str) -> bytes:
+    """A formula as an SVG picture; the same formula gives the same bytes.
+
+    Args:
+        tex: without dollar signs, in the part of TeX that matplotlib knows.
+
+    Raises:
+        InputError: matplotlib cannot read it.
+    """
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.mathtext import MathTextParser
+
+    font = FontProperties(size=SIZE, math_fontfamily="stix")
+    with style():
+        try:
+            width, height, depth, _, _ = MathTextParser("path").parse(f"${tex}$", dpi=72, prop=font)
+        except ValueError as error:
+            raise InputError(
+                f"expected TeX that matplotlib can read; {error}", subject=f"formula '{tex}'"
+            ) from error
+        figure = Figure(figsize=(width / 72, height / 72), facecolor="none")
+        FigureCanvasSVG(figure)
+        figure.text(0, depth / height, f"${tex}$", fontproperties=font)
+        file = BytesIO()
+        figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
+    return file.getvalue()
 
 
 __getattr__ = names_elsewhere(__name__, ".report", Row="SideBySide")

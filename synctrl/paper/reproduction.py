@@ -1,20 +1,156 @@
-"""All runs of the paper's section V, and those that its claims are checked against."""
+"""All runs of the paper's section V, and those that its claims are checked against: which, and how made."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import signal
+import time
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
+from multiprocessing import get_context
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import Any, Self
 
-from ..experiments.a460_full import a460_full_pair
-from ..experiments.a460_pair import a460_pair
+from ..errors import SimulationError, StepWarning
+from ..experiments.a460_pair import a460_full_pair, a460_pair
 from ..experiments.planar_four import GAINS, planar_four
+from ..files import reported
 from ..renamed import names_elsewhere
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .batch import PlannedRun
 from .judge import DURATION as JUDGED_DURATION
 from .judge import Agreement, compare_runs, joint_pair
+
+LAYOUT = "{desc:36} {percentage:3.0f}% |{bar}| {n:.1f}/{total:g} s  [{elapsed}]"
+INTERVAL = 0.1  # s between two reports of a run
+#: tells the parent how far a run is; set when a process starts, for it cannot be handed over with a run
+_report: Any = None
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """A run to be made: how its experiment is built, how long it takes, and what computes the plant."""
+
+    make: Callable[[], Experiment]
+    duration: float | None = None
+    plant: str = "pinocchio"
+
+    def shortened(self, duration: float) -> Self:
+        """This run, cut off where it would take longer than `duration`, s."""
+        return replace(self, duration=min(duration, self.duration or self.make().duration))
+
+
+def run_all(folder: Path, workers: int, planned: Mapping[str, PlannedRun]) -> dict[str, Result]:
+    """Make runs, with a progress bar each in simulated seconds, and save each as soon as it is complete.
+
+    Args:
+        folder: where the `.npz` files go.
+        workers: number of processes.
+        planned: the runs by name, which is also that of the file.
+
+    Raises:
+        SimulationError: a run had to stop, or its process was killed; the others are saved, and of a run that
+            stopped what was computed.
+        ResultError: a file cannot be written.
+    """
+    with reported("write into the folder", folder):  # before anything runs
+        folder.mkdir(parents=True, exist_ok=True)
+        TemporaryFile(dir=folder).close()
+    context = get_context("spawn")
+    events = context.SimpleQueue()
+    with ProcessPoolExecutor(workers, context, initializer=_start, initargs=(events.put,)) as pool:
+        futures = {name: pool.submit(_work, name, run, folder) for name, run in planned.items()}
+        try:
+            _watch(futures, events)
+        except KeyboardInterrupt:
+            pool.shutdown(cancel_futures=True)
+            raise
+    for name, future in futures.items():
+        error = future.exception()
+        if isinstance(error, BrokenExecutor):
+            ended = SimulationError(f"the process of run '{name}' ended without a result: was it killed?")
+            raise ended.about(name)
+        if error is not None:
+            raise error
+    return {name: Result.load(future.result()) for name, future in futures.items()}
+
+
+def _watch(futures: Mapping[str, Future[Path]], events: Any) -> None:
+    """Draw a bar for every run until all are done."""
+    with _bars() as draw:
+        done = False
+        while not done:
+            done = all(future.done() for future in futures.values())
+            while not events.empty():
+                draw(*events.get())
+            time.sleep(0 if done else INTERVAL)
+
+
+@contextmanager
+def _bars() -> Iterator[Callable[[str, float, float], None]]:
+    """A function that draws how far a run is, given its name and two times; only ends without a terminal."""
+    import sys
+
+    from tqdm import tqdm
+
+    bars: dict[str, tqdm] = {}
+    pause = INTERVAL if sys.stderr.isatty() else float("inf")
+
+    def draw(name: str, t: float, duration: float) -> None:
+        if name not in bars:
+            bars[name] = tqdm(total=duration, desc=name, bar_format=LAYOUT, mininterval=pause, leave=True)
+        bars[name].update(t - bars[name].n)
+        if t >= duration:
+            bars[name].close()
+
+    try:
+        yield draw
+    finally:
+        for bar in bars.values():
+            bar.close()
+
+
+def _start(report: Callable) -> None:
+    """Prepare a process: it reports to its parent, which alone answers to an interrupt."""
+    global _report
+    _report = report
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _work(name: str, run: PlannedRun, folder: Path) -> Path:
+    """Make one run, in one of the processes."""
+    experiment, path = run.make(), folder / f"{name}.npz"
+    duration = run.duration or experiment.duration
+    try:
+        progress = _reporter(name, duration)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", StepWarning)  # the page has a section on steps
+            return experiment.simulate(duration, plant=run.plant, progress=progress).save(path)
+    except SimulationError as error:
+        if error.result is not None:
+            error.result.save(path)
+            error.result = None  # too large to travel between processes, and safe on disk
+        raise
+
+
+def _reporter(name: str, duration: float) -> Callable[[float], None]:
+    """A function that reports how far a run is, now and then, and its end."""
+    last = -INTERVAL
+
+    def progress(t: float) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last >= INTERVAL or t >= duration:
+            last = now
+            _report((name, t, duration))
+
+    return progress
+
 
 #: Lambda + beta of the paper's four arms: what an independent controller could be given instead, 1/s
 STIFF = GAINS.replace(Lambda=110.0)
@@ -66,4 +202,6 @@ def judged(runs: Mapping[str, Result]) -> list[Agreement]:
     return [compare_runs(ours, theirs) for ours, theirs in pairs if theirs is not None]
 
 
-__getattr__ = names_elsewhere(__name__, ".reproduction", JOBS="PLANNED", judge_jobs="judge_runs")
+__getattr__ = names_elsewhere(
+    __name__, ".reproduction", Job="PlannedRun", JOBS="PLANNED", judge_jobs="judge_runs"
+)

@@ -16,24 +16,64 @@ there; only a sample that is due is still taken, and its torque is in the last r
 Of these only events of the plant (`step.loop.meet`) and what the controller does (`control.begin`) are calls
 that the loop below makes. The rest is in the step itself, because it does not move the state but changes what
 the state will do: `step.loop` has the plant with the loads of this step, `step.stages` the desired motion
-and `step.push` the torque from outside. `steps.py` looks loop and push up in the middle of the step, which is
+and `step.push` the torque from outside. `steps` looks loop and push up in the middle of the step, which is
 on the right side of every jump; what is desired at its end is taken from just before it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple, Protocol
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
 from ..control.controller import Signals
 from ..coupling.cell import Reference
-from .clock import Clock
-from .closed_loop import ClosedLoop
-from .disturbances import DisturbanceSchedule
-from .state import State
-from .steps import Step, steps
+from .clock import Clock, Stretch
+from .closed_loop import ClosedLoop, State
+from .schedules import DisturbanceSchedule
+
+Made = TypeVar("Made")
+#: steps whose references are evaluated together
+BLOCK = 256
+
+
+class Step(NamedTuple):
+    """One step of a run, within which everything is smooth.
+
+    Attributes:
+        t, t_next: its start and end, s.
+        stages: what is desired at its start, in its middle, and just before its end, which are the three
+            instants at which the Runge-Kutta method evaluates rates.
+        loop: the closed loop with the plant as it is in between, with the loads that it carries then.
+        push: torque from outside in between, (n, nv), N·m.
+        number: which multiple of dt it begins at or after.
+        checked: whether it begins at that multiple: there the run is watched, and samples fall.
+        logged: whether it begins at an instant that is logged.
+        joined: whether all goes on smoothly from the step before, so that its error can be estimated across
+            the instant between them.
+    """
+
+    t: float
+    t_next: float
+    stages: tuple[Reference, Reference, Reference]
+    loop: ClosedLoop
+    push: np.ndarray
+    number: int
+    checked: bool
+    logged: bool
+    joined: bool
+
+    @property
+    def h(self) -> float:
+        """Its length, s."""
+        return self.t_next - self.t
+
+    @property
+    def middle(self) -> float:
+        """Halfway through it, s."""
+        return 0.5 * (self.t + self.t_next)
 
 
 class Sample(NamedTuple):
@@ -91,22 +131,12 @@ class Solver(Protocol):
         """
 
 
-class Agenda:
-    """Instants, each of which comes up once.
-
-    Args:
-        instants: in any order, s; those before the run are left out.
-    """
-
-    def __init__(self, instants: Iterable[float]):
-        self._left = sorted((t for t in instants if t >= 0), reverse=True)
-
-    def until(self, t: float) -> list[float]:
-        """What comes up until time t, in order."""
-        due = []
-        while self._left and self._left[-1] <= t:
-            due.append(self._left.pop())
-        return due
+def due(agenda: deque[float], t: float) -> list[float]:
+    """Take from instants in order those that come up until time t, s."""
+    found = []
+    while agenda and agenda[0] <= t:
+        found.append(agenda.popleft())
+    return found
 
 
 def advance(
@@ -127,12 +157,82 @@ def advance(
     Raises:
         SynctrlError: the run cannot go on.
     """
-    y, rate, events = loop.state(loop.initial_state()), loop.state(np.zeros(loop.size)), Agenda(loop.events)
+    y, rate = loop.state(loop.initial_state()), loop.state(np.zeros(loop.size))
+    events = deque(sorted(t for t in loop.events.tolist() if t >= 0))
     for step in steps(loop, clock, schedule):
-        for event in events.until(step.middle):
+        for event in due(events, step.middle):
             step.loop.meet(event, y)
         signals = control.begin(step, y, rate)
         if step.checked:
             yield Sample(step.t, y.flat, step.push, signals, step.logged)
         y = solver.carry(control, step, y, rate)
     yield Sample(clock.end, y.flat, step.push, control.finish(clock.end, y))
+
+
+def steps(loop: ClosedLoop, clock: Clock, schedule: DisturbanceSchedule) -> Iterator[Step]:
+    """Every step of the clock; all that come before an instant whose references cannot be had, and its error.
+
+    Raises:
+        SynctrlError: a desired motion or weight fails.
+    """
+
+    def make(first: int, last: int) -> list[Step]:
+        return list(_tabulated(loop, clock, clock.stretch(first, last), schedule))
+
+    for first, last in clock.stretches(BLOCK):
+        for made in up_to_a_failure(make, first, last):
+            yield from made
+
+
+def _tabulated(
+    loop: ClosedLoop, clock: Clock, stretch: Stretch, schedule: DisturbanceSchedule
+) -> Iterator[Step]:
+    """The steps of a stretch, their references evaluated together."""
+    table, n = loop.cell.reference_table(stretch.stages.ravel()), len(stretch.starts)
+    stages = (loop.cell.instants(table, slice(i * n, (i + 1) * n)) for i in range(3))
+    middles = stretch.middles
+    columns = stretch.number, stretch.checked, stretch.logged, clock.joined(stretch.first, stretch.starts)
+    return map(
+        Step,
+        stretch.starts.tolist(),
+        stretch.times[1:].tolist(),
+        zip(*stages, strict=True),
+        map(loop.at, middles.tolist()),
+        map(schedule.torques.__getitem__, schedule.windows(middles).tolist()),
+        *(column.tolist() for column in columns),
+    )
+
+
+def up_to_a_failure(make: Callable[[int, int], Made], first: int, last: int) -> Iterator[Made]:
+    """What is made for the steps [first, last) in one go, or, if that fails, for those before the failure.
+
+    Args:
+        make: first, last -> what is made.
+        first, last: the steps.
+
+    Raises:
+        Exception, KeyboardInterrupt: what `make` raised for the first step for which it fails. An interrupt
+            that does not come again was not of its doing, and is raised at once.
+    """
+    made, failure = _attempt(make, first, last)
+    if failure is None:
+        yield made  # type: ignore[misc]
+        return
+    good, bad = first, last
+    while bad - good > 1:
+        middle = (good + bad) // 2
+        found = _attempt(make, good, middle)[1]
+        good, bad, failure = (middle, bad, failure) if found is None else (good, middle, found)
+    again = _attempt(make, good, bad)[1]
+    if again is not None and good > first:
+        yield make(first, good)
+    raise failure if again is None else again
+
+
+def _attempt(
+    make: Callable[[int, int], Made], first: int, last: int
+) -> tuple[Made | None, BaseException | None]:
+    try:
+        return make(first, last), None
+    except (Exception, KeyboardInterrupt) as error:
+        return None, error

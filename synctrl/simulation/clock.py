@@ -176,7 +176,7 @@ def make_clock(
     every = 1 if log_dt is None else multiple("log_dt", log_dt, dt)
     bare = Clock(dt, int(np.ceil(duration / dt - TIE)), duration, every=every)
     near = [(_nearest(bare, instant, least=1), float(instant)) for instant in breaks]
-    moved = {k: instant for k, instant in near if _close(bare.at(k), instant, dt)}
+    moved = {k: instant for k, instant in near if abs(bare.at(k) - instant) <= TIE * dt}
     end = moved.get(bare.count, duration)
     return _with_jumps(replace(bare, end=end, moved=tuple(sorted(moved.items()))), edges, breaks)
 
@@ -184,7 +184,7 @@ def make_clock(
 def _with_jumps(clock: Clock, edges: Sequence[float], breaks: Sequence[float]) -> Clock:
     """The clock with what jumps inside the run."""
     on_grid = [(edge, clock.at(_nearest(clock, edge))) for edge in edges]
-    snapped = [multiple if _close(multiple, edge, clock.dt) else edge for edge, multiple in on_grid]
+    snapped = [on if abs(on - edge) <= TIE * clock.dt else edge for edge, on in on_grid]
     jumps = np.unique([float(jump) for jump in (*breaks, *snapped) if 0 < jump < clock.end])
     off_grid = [jump for jump in jumps.tolist() if clock.at(_nearest(clock, jump)) != jump]
     between = tuple((_before(clock, jump) + 1 + k, jump) for k, jump in enumerate(off_grid))
@@ -214,10 +214,6 @@ def _before(clock: Clock, instant: float) -> int:
     """The last multiple of dt before an instant that is none."""
     near = _nearest(clock, instant)
     return near if clock.at(near) < instant else near - 1
-
-
-def _close(t: float, to: float, dt: float) -> bool:
-    return abs(t - to) <= TIE * dt
 
 
 def before(t: float) -> float:

@@ -1,4 +1,4 @@
-"""Controller and plant as one differential equation over one flat state vector."""
+"""Controller and plant as one differential equation, over one flat state vector with named parts."""
 
 from __future__ import annotations
 
@@ -8,15 +8,58 @@ from typing import Any
 import numpy as np
 
 from ..checks import finite_array, instance
-from ..control.adaptation_check import check_adaptation
 from ..control.controller import Controller, Signals
-from ..control.messages import Messages
-from ..control.network import BoundNetwork
-from ..coupling.cell import Reference
+from ..control.measured import check_adaptation
+from ..control.network import Messages
+from ..coupling.cell import Cell, Reference
 from ..errors import InputError, NonFiniteError
 from .clock import before
 from .plant import Plant
-from .state import Layout, State
+
+
+class State:
+    """Parts of a flat vector y as views of it.
+
+    Attributes:
+        flat: y.
+        motion: q and v together, (2, n, nv).
+        q, v: joint positions and velocities, (n, nv).
+        z: state of the adaptation, (n, Z).
+        memory: of the network; with `Ideal` the integrals of the synchronization errors, (p, m).
+        hidden: state of the plant's own.
+    """
+
+    __slots__ = ("flat", "hidden", "memory", "motion", "q", "v", "z")
+
+    def __init__(self, layout: Layout, flat: np.ndarray):
+        a, b, c = layout.ends
+        self.flat = flat
+        self.motion = flat[:a].reshape(layout.motion)
+        self.q, self.v = self.motion
+        self.z = flat[a:b].reshape(layout.z)
+        self.memory = flat[b:c].reshape(layout.memory)
+        self.hidden = flat[c:]
+
+    def ahead(self, y: State, h: float, rate: np.ndarray) -> State:
+        """This state, made to y + h rate."""
+        np.multiply(rate, h, self.flat)
+        np.add(self.flat, y.flat, self.flat)
+        return self
+
+
+class Layout:
+    """Where the parts are in y.
+
+    Args:
+        cell: the cell.
+        z, memory: shapes of the state of the adaptation and of the memory of the network.
+        hidden: size of the plant's own state.
+    """
+
+    def __init__(self, cell: Cell, z: tuple[int, ...], memory: tuple[int, ...], hidden: int):
+        self.motion, self.z, self.memory = (2, cell.n, cell.nv), z, memory
+        self.ends = tuple(np.cumsum([np.prod(s) for s in (self.motion, self.z, self.memory)]).tolist())
+        self.size = self.ends[-1] + hidden
 
 
 class ClosedLoop:
@@ -45,8 +88,11 @@ class ClosedLoop:
         self.cell, self._law = controller.cell, controller.unchecked
         if not _is_ours(type(controller.adaptation)):
             check_adaptation(controller)
-        self._z0, self._memory0 = controller.adaptation.start(), _memory_of(controller.network)
-        _check_own_state(plant)
+        self._z0, network = controller.adaptation.start(), controller.network
+        self._memory0 = finite_array(f"network {type(network).__qualname__}, start", network.start())
+        where = f"plant {type(plant).__qualname__}, hidden0"
+        instance(where, plant.hidden0, np.ndarray, "an array")
+        finite_array(where, plant.hidden0, (None,))
         self._layout = Layout(self.cell, self._z0.shape, self._memory0.shape, plant.hidden0.size)
         self.size = self._layout.size
         self.events = finite_array(f"events of the plant {type(plant).__qualname__}", plant.events, (None,))
@@ -58,8 +104,7 @@ class ClosedLoop:
 
     def initial_state(self) -> np.ndarray:
         """y at t = 0."""
-        cell = self.cell
-        parts = (cell.q0, cell.v0, self._z0, self._memory0, self.plant.hidden0)
+        parts = self.cell.q0, self.cell.v0, self._z0, self._memory0, self.plant.hidden0
         return np.concatenate([part.ravel() for part in parts])
 
     def check_plant(self) -> None:
@@ -77,15 +122,15 @@ class ClosedLoop:
 
     def _check_given(self, shapes: Mapping[str, tuple[int, ...]], found: Any, when: str = "") -> None:
         """Refuse what the plant gives unless it is a tuple of arrays of these shapes."""
-        where = f"plant, {type(self.plant).__qualname__}"
+        subject = f"plant {type(self.plant).__qualname__}"
         if not isinstance(found, (tuple, list)) or len(found) != len(shapes):
-            seen = f"{len(found)}" if isinstance(found, (tuple, list)) else type(found).__qualname__
-            raise InputError(f"{where}: expected {len(shapes)}, ({', '.join(shapes)}){when}, found {seen}")
-        for (what, expected), part in zip(shapes.items(), found, strict=True):
-            if np.shape(part) != expected:
-                raise InputError(
-                    f"{where}: expected {expected} numbers as its {what}{when}, found {np.shape(part)}"
-                )
+            seen = len(found) if isinstance(found, (tuple, list)) else type(found).__qualname__
+            expected = f"expected {len(shapes)}, ({', '.join(shapes)}){when}"
+            raise InputError(f"{expected}, found {seen}", subject=subject, found=seen)
+        for (what, shape), part in zip(shapes.items(), map(np.shape, found), strict=True):
+            if part != shape:
+                text = f"expected {shape} numbers as its {what}{when}, found {part}"
+                raise InputError(text, subject=subject, found=part)
 
     def state(self, y: np.ndarray | None = None) -> State:
         """The parts of y, or of a new y that holds nothing yet."""
@@ -104,10 +149,6 @@ class ClosedLoop:
         """Views of q, v, z and the memory of the network in y."""
         state = self.state(y)
         return [state.q, state.v, state.z, state.memory]
-
-    def hidden(self, y: np.ndarray) -> np.ndarray:
-        """View of the state of the plant's own in y."""
-        return self.state(y).hidden
 
     def evaluate(
         self, reference: Reference, y: np.ndarray, disturbance: np.ndarray
@@ -167,11 +208,6 @@ class ClosedLoop:
             state.z[...] = z
         return moved
 
-    def events_within(self, end: float) -> list[dict[str, Any]]:
-        """The plant's events of a run with 0 <= t < end, in order, as plain data: `t`, s, and `part`."""
-        part = type(self.plant).__qualname__
-        return [{"t": t, "part": part} for t in np.sort(self.events).tolist() if 0 <= t < end]
-
     def meet(self, t: float, state: State) -> None:
         """Make the state before the plant's event at time t the one after it.
 
@@ -195,8 +231,8 @@ class ClosedLoop:
         """Name parts that users wrote when a finite state becomes numbers that mean nothing.
 
         Raises:
-            NonFiniteError: a torque, a rate of an estimate or an acceleration that is not finite; without
-                the time, which is not known here.
+            NonFiniteError: a torque, a rate of estimates or of the network's memory, or an acceleration that
+                is not finite; without the time, which is not known here.
         """
         if not self._foreign or not np.isfinite(state.flat).all():
             return
@@ -208,23 +244,14 @@ class ClosedLoop:
         for what, rows in found.items():
             if not np.isfinite(rows).all():
                 i = int(np.argmin(np.isfinite(rows).all(axis=1)))
-                names = " or ".join(dict.fromkeys(kind.__qualname__ for kind in self._foreign))
-                raise NonFiniteError(
-                    f"{names} gives {self.cell.names[i]} {rows[i].tolist()} as its {what}, from a state that "
-                    "is finite; expected finite numbers",
-                    robot=i,
-                    cause="part",
-                )
+                raise self._lost(f"{self.cell.names[i]} {rows[i].tolist()} as its {what}", i)
+        if not np.isfinite(signals.memory_dot).all():
+            raise self._lost(f"{signals.memory_dot.tolist()!s:.200} as the rate of its memory", None)
 
-
-def _memory_of(network: BoundNetwork) -> np.ndarray:
-    return finite_array(f"network {type(network).__qualname__}, start", network.start())
-
-
-def _check_own_state(plant: Plant) -> None:
-    where = f"plant {type(plant).__qualname__}, hidden0"
-    instance(where, plant.hidden0, np.ndarray, "an array")
-    finite_array(where, plant.hidden0, (None,))
+    def _lost(self, what: str, robot: int | None) -> NonFiniteError:
+        names = " or ".join(dict.fromkeys(kind.__qualname__ for kind in self._foreign))
+        text = f"{names} gives {what}, from a state that is finite; expected finite numbers"
+        return NonFiniteError(text, robot=robot, cause="part")
 
 
 def _is_ours(kind: type) -> bool:

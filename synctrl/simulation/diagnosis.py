@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import NonFiniteError, OrientationError, SimulationError, SingularJacobianError
 from ..robots.units import joined, unit_for
 from .closed_loop import ClosedLoop
-from .disturbances import DisturbanceSchedule
+from .schedules import DisturbanceSchedule
 from .stop import Excess, Push, Stop
 
 #: an acceleration from outside that no step follows: 0.2 rad in a millisecond, rad/s^2
@@ -88,12 +88,11 @@ def diagnosed(
     if error.cause is not None and stop.calm:
         return error
     cause = find_cause(stop)
-    about: dict[str, Any] = {
-        "time": error.time, "robot": cause.robot, "joint": cause.joint, "cause": cause.word,
-    }  # fmt: skip
+    about: Any = {"time": error.time, "robot": cause.robot, "joint": cause.joint, "cause": cause.word}
     if not cause.ran_away:
         return type(error)(f"{error}; {cause.words}", **about)
-    place = stop.place(cause.robot, cause.joint)
+    name = "the cell" if cause.robot is None else loop.cell.names[cause.robot]
+    place = name if cause.joint is None else f"joint {cause.joint + 1} of {name}"
     return NonFiniteError(f"{place} ran away at t = {error.time:g} s: {cause.words}", **about)
 
 
@@ -126,9 +125,9 @@ def _pushed(stop: Stop, push: Push) -> Cause:
 
 def _fast_start(stop: Stop) -> Cause | None:
     v0 = np.abs(stop.loop.cell.v0)
-    robot, joint = (int(k) for k in np.unravel_index(v0.argmax(), v0.shape))
     if not v0.max() > FASTEST_START:
         return None
+    robot, joint = (int(k) for k in np.unravel_index(v0.argmax(), v0.shape))
     speed = f"{v0.max():.3g} {stop.unit('rad/s', robot, joint)}"
     return Cause("start", f"it starts with {speed}, which no step follows", robot, joint)
 
@@ -146,10 +145,9 @@ def _strong_start(stop: Stop) -> Cause | None:
 
 
 def _nearly_singular(stop: Stop) -> Cause:
-    conditions = stop.conditions
-    robot = int(conditions.argmax())
-    found = f"the Jacobian of {stop.place(robot, None)} was nearly singular before"
-    words = f"{found}, with condition number {conditions[robot]:.3g}; {AWAY}"
+    robot = int(stop.conditions.argmax())
+    found = f"the Jacobian of {stop.loop.cell.names[robot]} was nearly singular before"
+    words = f"{found}, with condition number {stop.conditions[robot]:.3g}; {AWAY}"
     return Cause("singular", words, robot, ran_away=False)
 
 
@@ -172,14 +170,14 @@ def _too_fast(stop: Stop, excesses: list[Excess]) -> Cause:
 
 
 def _unclear(stop: Stop) -> Cause:
+    if stop.h is not None and not stop.calm:
+        robot, joint = stop.quickest(range(stop.loop.cell.n))
+        words = "its closed loop is unstable; no gain, step or push stands out"
+        return Cause("unstable", words, robot, joint)
+    words = "nothing moved fast before: look at what is desired, and at its derivatives"
     if stop.h is None:
         words = "the closed loop is unstable, or too stiff for the tolerances of the method"
-        return Cause("unstable", words, stop.error.robot, ran_away=False)
-    if stop.calm:
-        words = "nothing moved fast before: look at what is desired, and at its derivatives"
-        return Cause("unstable", words, stop.error.robot, ran_away=False)
-    robot, joint = stop.quickest(range(stop.loop.cell.n))
-    return Cause("unstable", "its closed loop is unstable; no gain, step or push stands out", robot, joint)
+    return Cause("unstable", words, stop.error.robot, ran_away=False)
 
 
 def _gain(stop: Stop, gain: str, robot: int, joint: int) -> str:

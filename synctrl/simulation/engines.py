@@ -1,21 +1,184 @@
-"""Engines: what takes a planned run through time, by name in one table, or a user's own.
+"""A planned run, and the engines that take it through time; whatever ends it hands over what was computed.
 
-An engine of one's own is an object with `refuses` and `run`. If it makes steps of its own, a `Solver` is all
-that it needs: `run.samples(solver)` carries it through time and events, and `collect` of run.py watches and
-logs. Others find the closed loop in `run.loop`, instants in `run.clock` and pushes in `run.schedule`, and
-give `collect` samples of their own making.
+Engines have names in one table, or are a user's own: objects with `refuses` and `run`. If an engine makes
+steps of its own, a `Solver` is all that it needs: `run.samples(solver)` carries it through time and events,
+and `collect` watches and logs. Others find the closed loop in `run.loop`, instants in `run.clock` and pushes
+in `run.schedule`, and give `collect` samples of their own making.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from importlib import import_module
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
 
 from ..checks import choice
-from ..errors import InputError
-from .handover import Progress
+from ..coupling.reachability import SAMPLES, check_motions, check_reachable
+from ..errors import InputError, RunInterrupted, SimulationError, SynctrlError
+from .advance import Sample, Solver, advance
+from .clock import Clock
+from .closed_loop import ClosedLoop
+from .controls import Continuous, Sampled
+from .diagnosis import diagnosed
+from .guard import Guard, Progress, date, tell, user_failure
+from .integrators import RungeKutta, Scipy
+from .recorder import NOTHING, Recorder
 from .result import Result
-from .run import Run, run_reference
+from .schedules import DisturbanceSchedule
+from .step_error import StepError, step_report
+
+#: instants at which weights are looked at before a run, at most
+WEIGHT_SAMPLES = 2000
+
+
+class Run(NamedTuple):
+    """A run that is about to start.
+
+    `every` is how many steps of dt a sample of sampled control lasts, or None; `experiment` is what the
+    result will know as its own; `step_error` learns what the worst step was.
+    """
+
+    experiment: Any
+    loop: ClosedLoop
+    clock: Clock
+    schedule: DisturbanceSchedule
+    every: int | None
+    info: dict[str, Any]
+    step_error: StepError
+
+    def check(self) -> None:
+        """Look ahead, before anything runs.
+
+        Raises:
+            TrajectoryError: a desired velocity or acceleration that does not fit the motion.
+            UnreachableError: a robot cannot reach its desired positions.
+            CouplingError: a weight loses its inverse on the way, or its derivatives do not fit.
+            MissingDependencyError, InputError: a library cannot compute the plant, or refuses a robot.
+            RunInterrupted: by Ctrl-C.
+        """
+        cell = self.loop.cell
+        with before_the_start(self):
+            self.loop.plant.prepare()
+            self.loop.check_plant()
+            check_motions(cell, np.array([0.0, self.clock.end]))
+            check_reachable(cell, self.clock.spread(SAMPLES))
+            with suppress(SimulationError):  # weights that fail end the run, which hands over what it has
+                cell.coupling.check_weights(self.clock.spread(WEIGHT_SAMPLES), cell.m)
+
+    def samples(self, solver: Solver) -> Iterator[Sample]:
+        """What a solver makes of this run, see `advance`."""
+        loop, clock = self.loop, self.clock
+        if self.every is None:
+            return advance(loop, clock, self.schedule, Continuous(loop, clock, self.step_error), solver)
+        period = float(self.info["control_period"])
+        control = Sampled(loop, clock, self.every, period, self.step_error)
+        return advance(loop, clock, self.schedule, control, solver)
+
+
+def run_reference(run: Run, progress: Progress | None = None) -> Result:
+    """A planned run by the reference engine and the fixed-step integrator."""
+    return collect(run, run.samples(RungeKutta(run.loop)), progress)
+
+
+def run_adaptive(run: Run, method: str, rtol: float, atol: float, progress: Progress | None = None) -> Result:
+    """A planned run by one of SciPy's methods."""
+    run.info.update(integrator=method, rtol=rtol, atol=atol)
+    return collect(run, run.samples(Scipy(run.loop, run.clock, method, rtol, atol)), progress)
+
+
+def collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> Result:
+    """Watch samples one by one, and log those that belong into the log.
+
+    Args:
+        run: the run; its `info` may say more by then.
+        samples: what was computed, in order; whatever an engine raises ends the run.
+        progress: called with the time of what is logged, s.
+
+    Raises:
+        SimulationError: the run had to stop; it carries what was logged.
+    """
+    recorder, guard = Recorder(run.loop, run.clock), Guard(run.loop)
+
+    def log() -> None:
+        for sample in samples:
+            recorder.state = sample.y
+            guard.check(sample)
+            recorder.reached = sample.t
+            if sample.logged:
+                recorder.add(sample)
+                tell(progress, sample.t)
+
+    return finish(run, recorder, log)
+
+
+def finish(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:
+    """Let a run log itself; whatever ends it, while it is looked into too, takes along what was logged."""
+    with np.errstate(all="ignore"):  # overflow is found and named by the guard
+        try:
+            return _made(run, recorder, log)
+        except KeyboardInterrupt:
+            raise _interrupted(run, recorder) from None
+
+
+@contextmanager
+def before_the_start(run: Run) -> Iterator[None]:
+    """Hand over an empty result if Ctrl-C comes while a run is being prepared."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise _interrupted(run, Recorder(run.loop, run.clock)) from None
+
+
+def _made(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:
+    """The result of a run that nobody interrupts; its error has the result of one that had to stop."""
+    try:
+        log()
+        return _logged(run, recorder, "completed")
+    except SynctrlError as error:
+        date(error, recorder.reached)
+        told = _diagnosed(run, recorder, error)
+        told.result = _logged(run, recorder, f"stopped: {told}")
+        if told is error:
+            raise
+        raise told from None
+    except Exception as error:
+        failure = user_failure(error, recorder.reached)
+        failure.result = _logged(run, recorder, f"stopped: {failure}")
+        raise failure from error
+
+
+def _logged(run: Run, recorder: Recorder, status: str) -> Result:
+    """The result of a run; why it stopped is worth more than why the plant says nothing of it."""
+    try:
+        account = recorder.account(run.info)
+    except Exception:
+        if status == "completed":
+            raise
+        account = NOTHING
+    run.info["step_error"] = step_report(run.step_error, run.loop, recorder.logged(), run.info)
+    return recorder.result(status, run.info, run.experiment, account)
+
+
+def _diagnosed(run: Run, recorder: Recorder, error: SynctrlError) -> SynctrlError:
+    """An error of the guard's with its cause; others as they are, and those whose cause cannot be found."""
+    if not isinstance(error, SimulationError):
+        return error
+    try:
+        return diagnosed(error, run.loop, run.schedule, recorder.logged(), recorder.state, run.info)
+    except Exception:  # numbers near the end, or a plant of a user's, that cannot be calculated with
+        return error
+
+
+def _interrupted(run: Run, recorder: Recorder) -> RunInterrupted:
+    message = f"interrupted at t = {recorder.reached:g} s"
+    result = _logged(run, recorder, f"stopped: {message}")
+    return RunInterrupted(message, time=recorder.reached, result=result)
+
+
+# -- engines -----------------------------------------------------------------------------------------------
 
 
 class Engine(Protocol):
@@ -49,7 +212,7 @@ class Reference:
 #: the engines that have a name: their module and class, which is imported when it is asked for
 ENGINES = {
     "pinocchio": ("synctrl.simulation.engines", "Reference"),
-    "compiled": ("synctrl.compiled.run", "Compiled"),
+    "compiled": ("synctrl.compiled.engine", "Compiled"),
 }
 
 

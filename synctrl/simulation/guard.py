@@ -1,15 +1,23 @@
-"""Watches a run and stops it when its numbers no longer mean anything."""
+"""Watches a run, stops it when its numbers no longer mean anything, and says what else has ended it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from math import isfinite
+from traceback import walk_tb
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from ..coupling.cell import Cell
-from ..errors import NonFiniteError, OrientationError, SimulationError, SingularJacobianError
+from ..errors import (
+    NonFiniteError,
+    OrientationError,
+    SimulationError,
+    SingularJacobianError,
+    SynctrlError,
+    failed,
+)
 from ..tasks.measurement import first_beyond
 from ..tasks.measurement import limits_of as limits_of
 from ..tasks.pose import MAX_ANGLE
@@ -17,6 +25,10 @@ from ..tasks.spaces import Measurement
 from .advance import Sample
 from .closed_loop import ClosedLoop
 
+Progress = Callable[[float], Any]
+
+#: packages in which no function of the user's stands
+LIBRARIES = frozenset({"synctrl", "numpy", "scipy", "pinocchio", "mujoco", "casadi"})
 #: parts of the state, in order
 PARTS = ("position", "velocity", "parameter estimate", "integral of the synchronization error")
 
@@ -71,16 +83,13 @@ class Guard:
         if not isfinite(np.add.reduce(sample.y)) and not np.isfinite(sample.y).all():
             return Finding("state")
         task, tau = sample.signals.task, sample.signals.tau
-        if (found := self._beyond(task) or self._crossed(task)) is not None:
+        if (beyond := first_beyond(self._space, task)) is not None:
+            return Finding(beyond.name, beyond.robot, beyond.value)
+        if (found := self._crossed(task)) is not None:
             return found
         if not isfinite(np.add.reduce(tau, axis=None)) and (rows := _non_finite_rows(tau)).size:
             return Finding("torque", int(rows[0]))
         return None
-
-    def _beyond(self, task: Measurement) -> Finding | None:
-        """The first number that has reached its limit, or is none."""
-        found = first_beyond(self._space, task)
-        return None if found is None else Finding(found.name, found.robot, found.value)
 
     def _crossed(self, task: Measurement) -> Finding | None:
         """The first robot on the other side of a singular configuration than at the instant before."""
@@ -101,53 +110,43 @@ def stopped(loop: ClosedLoop, t: float, y: np.ndarray, v: np.ndarray, found: Fin
         v: joint velocities at the instant before, (n, nv), rad/s.
         found: what stopped it.
     """
-    i, value = found.robot, found.value
-    if found.check == "state":
+    check, robot, value = found
+    name = loop.cell.names[robot]
+    about: dict[str, Any] = {"time": t, "robot": robot}
+    if check == "state":
         return _run_away(loop, t, y, v)
-    if found.check == "torque":
-        return _not_finite(loop.cell, t, i, "torque")
-    if found.check not in ("orientation", "condition", "side"):
-        return _invalid(loop.cell, t, found)
-    if found.check == "orientation":
+    if check == "torque":
+        return _not_finite(loop.cell, t, robot, check)
+    if check == "orientation":
         return OrientationError(
-            f"the orientation error of {loop.cell.names[i]} is {value:.3g} rad at t = {t:g} s; expected at "
-            f"most {MAX_ANGLE:g} rad, because at pi its direction is not defined",
-            time=t,
-            robot=i,
+            f"the orientation error of {name} is {value:.3g} rad at t = {t:g} s; expected at most "
+            f"{MAX_ANGLE:g} rad, because at pi its direction is not defined",
+            **about,
         )
-    seen = "its determinant changed sign since the instant before"
-    return SingularJacobianError(
-        f"the Jacobian of {loop.cell.names[i]} is singular at t = {t:g} s: "
-        + (seen if found.check == "side" else f"its condition number is {_large(value)}"),
-        time=t,
-        robot=i,
-    )
-
-
-def _invalid(cell: Cell, t: float, found: Finding) -> SimulationError:
-    """The error of task coordinates that a space of another kind calls invalid."""
+    if check in ("condition", "side"):
+        large = f"{value:.3g}" if value < 1e12 else "infinite"  # above it is made of rounding errors
+        side = "its determinant changed sign since the instant before"
+        seen = side if check == "side" else f"its condition number is {large}"
+        return SingularJacobianError(f"the Jacobian of {name} is singular at t = {t:g} s: {seen}", **about)
     return SimulationError(
-        f"the {found.check} of {cell.names[found.robot]} is {found.value:.3g} at t = {t:g} s; "
-        f"{cell.space!r} says that its coordinates mean nothing there",
-        time=t,
-        robot=found.robot,
+        f"the {check} of {name} is {value:.3g} at t = {t:g} s; {loop.cell.space!r} says that its coordinates "
+        "mean nothing there",
+        **about,
     )
 
 
 def _run_away(loop: ClosedLoop, t: float, y: np.ndarray, v: np.ndarray) -> NonFiniteError:
     """The error of a state with infinite or undefined numbers."""
-    parts = zip(PARTS, loop.split(y), strict=True)
-    broken = [(name, bad) for name, part in parts if (bad := _non_finite_rows(part)).size]
-    if not broken:
-        return NonFiniteError(f"the plant's own state is no longer finite at t = {t:g} s", time=t)
-    name, rows = broken[0]
+    state = loop.state(y)
+    parts = state.q, state.v, state.z, loop.controller.network.integral(state.memory)
+    named = zip(PARTS, map(_non_finite_rows, parts), strict=True)
+    name, rows = next(((name, rows) for name, rows in named if rows.size), (None, np.zeros(0)))
+    if name is None:
+        what = "network's memory" if not np.isfinite(state.memory).all() else "plant's own state"
+        return NonFiniteError(f"the {what} is no longer finite at t = {t:g} s", time=t)
     robots = rows if name != PARTS[3] else np.unique(loop.cell.coupling.edges[rows])
-    return _not_finite(loop.cell, t, _fastest(robots, v), name)
-
-
-def _fastest(robots: np.ndarray, v: np.ndarray) -> int:
-    """Of robots that broke down in one step, as coupled ones do, the one that moved fastest before."""
-    return int(robots[np.abs(v[robots]).max(axis=1).argmax()])
+    fastest = np.abs(v[robots]).max(axis=1).argmax()  # of robots that broke down together, as coupled ones do
+    return _not_finite(loop.cell, t, int(robots[fastest]), name)
 
 
 def _not_finite(cell: Cell, t: float, robot: int, what: str) -> NonFiniteError:
@@ -157,10 +156,47 @@ def _not_finite(cell: Cell, t: float, robot: int, what: str) -> NonFiniteError:
     )
 
 
-def _large(condition: float) -> str:
-    """A condition number in words; above 1e12 it is made of rounding errors."""
-    return f"{condition:.3g}" if condition < 1e12 else "infinite"
-
-
 def _non_finite_rows(part: np.ndarray) -> np.ndarray:
     return np.flatnonzero(~np.isfinite(part).all(axis=1))
+
+
+def user_failure(error: Exception, t: float) -> SimulationError:
+    """The error of a run that an exception ended which nobody foresaw, with the function that it came from.
+
+    Args:
+        error: the exception, with its traceback.
+        t: simulated time of the last instant reached, s.
+    """
+    frames = [*walk_tb(error.__traceback__)]
+    names = [str(frame.f_globals.get("__name__", "")) for frame, _ in frames]
+    own = [f for f, name in zip(frames, names, strict=True) if name.partition(".")[0] not in LIBRARIES]
+    frame, line = (own or frames)[-1]
+    code = frame.f_code
+    return failed(f"'{code.co_qualname}' ({code.co_filename}, line {line})", t, error)
+
+
+def date(error: SynctrlError, t: float) -> None:
+    """Say when a failure happened that was raised where the time was not known.
+
+    Args:
+        error: the failure.
+        t: simulated time of the last instant reached, s.
+    """
+    if isinstance(error, SimulationError) and error.time is None:
+        error.time, error.args = t, (f"{error}, in the step from t = {t:g} s",)
+
+
+def tell(progress: Progress | None, t: float) -> None:
+    """Report the time reached to whoever wants to know.
+
+    Raises:
+        SimulationError: the function of the user's failed.
+    """
+    if progress is None:
+        return
+    try:
+        progress(t)
+    except SynctrlError:
+        raise
+    except Exception as error:
+        raise failed("the function given as progress", t, error) from error

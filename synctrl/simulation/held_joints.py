@@ -117,10 +117,11 @@ class HeldJointsPlant(Plant):
         """Positions, velocities and torques of the held joints, each (T, n, held joints)."""
         rows = hidden.reshape(len(hidden), -1, 3, self._count)
         held = [robot.joint_units[k] for robot, at in zip(self.robots, self._held, strict=True) for k in at]
-        parts = {"rad": rows[:, :, 0], "rad/s": rows[:, :, 1], "N·m": self._torque(rows)}
+        parts = ("rad", rows[:, :, 0]), ("rad/s", rows[:, :, 1]), ("N·m", self._torque(rows))
+        axes = "time", "robot", "held joint"
         return {
-            name: (part.copy(), joined(unit_for(unit, joint) for joint in held), HELD_AXES)
-            for name, (unit, part) in zip(HELD, parts.items(), strict=True)
+            name: (part.copy(), joined(unit_for(unit, joint) for joint in held), axes)
+            for name, (unit, part) in zip(HELD, parts, strict=True)
         }
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:

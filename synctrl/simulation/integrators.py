@@ -14,12 +14,10 @@ import numpy as np
 
 from ..errors import InputError, NonFiniteError, SynctrlError
 from ..robots.units import unit_for
-from .advance import Control
+from .advance import Control, Step
 from .clock import Clock, before
-from .closed_loop import ClosedLoop
-from .handover import user_failure
-from .state import State
-from .steps import Step
+from .closed_loop import ClosedLoop, State
+from .guard import user_failure
 
 ADAPTIVE = ("RK45", "RK23", "DOP853", "Radau", "BDF", "LSODA")
 #: weights of the four stages, times 6

@@ -1,19 +1,40 @@
-"""Which limits of the robots' descriptions a run left, when, and by how much."""
+"""What a run left and met: limits of the robots' descriptions, torque that was cut off, and damping.
+
+Of each of these a result has a list in plain data: which robot, which joint, when, and by how much.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..control.controller import Signals
 from ..coupling.cell import Cell
+from ..errors import SaturationWarning, warn
+from ..renamed import names_elsewhere
 from ..robots.limits import joint_limits
 from ..robots.units import unit_for
-from .damping import spans
+from ..tasks.redundancy import velocity_lost
+from .plant import Output, Plant
 
 if TYPE_CHECKING:
     from .result import Result
+
+#: the output that has what was left of the torque
+APPLIED = "applied_torque"
+#: growth of the estimates that is worth a word, as a share of what they were
+GROWN = 0.01
+
+
+def spans(active: np.ndarray) -> list[tuple[int, int]]:
+    """First and last index of every run of True in a row, (T,)."""
+    edges = np.flatnonzero(np.diff(active, prepend=False, append=False))
+    return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
+
+
+# -- limits of the descriptions ---------------------------------------------------------------------------
 
 
 def limit_report(
@@ -60,12 +81,42 @@ def _outside(t: np.ndarray, values: np.ndarray, lower: float, upper: float) -> I
             }
 
 
-def torque_limits(cell: Cell) -> np.ndarray:
-    """Torque limits of all robots, (n, nv), N·m; infinite where there is none."""
-    limits = np.full((cell.n, cell.nv), np.inf)
-    for i, robot in enumerate(cell.robots):
-        limits[i, : robot.nv] = joint_limits(robot).torque
-    return limits
+# -- torque that was cut off ------------------------------------------------------------------------------
+
+
+def saturation_report(plant: Plant, arrays: Mapping[str, np.ndarray]) -> list[dict[str, Any]]:
+    """Joints whose torque was cut off, in order of robots and joints.
+
+    Args:
+        plant: the plant.
+        arrays: `tau`, (T, n, nv), N·m, and `theta_hat`, (T, n, P), at the logged instants.
+
+    Returns:
+        One entry per joint: `robot` and `joint`, counted from 0; `limit`, in `unit`; `share` of the logged
+        instants at which the controller asked for more; `largest`, the largest torque that it asked for; and
+        `theta_hat`, the largest magnitude of the robot's estimates at the start and over the run.
+    """
+    if not plant.saturate or not len(arrays["tau"]):
+        return []
+    size, estimates, limits = np.abs(arrays["tau"]), np.abs(arrays["theta_hat"]), plant.torque_limits
+    share = (size > limits).mean(axis=0)
+    return [
+        {
+            "robot": int(i),
+            "joint": int(joint),
+            "limit": float(limits[i, joint]),
+            "unit": unit_for("N·m", plant.cell.robots[i].joint_units[joint]),
+            "share": float(share[i, joint]),
+            "largest": float(size[:, i, joint].max()),
+            "theta_hat": [float(part.max()) for part in (estimates[0, i], estimates[:, i])],
+        }
+        for i, joint in np.argwhere(share > 0)
+    ]
+
+
+def applied_output(plant: Plant, tau: np.ndarray) -> dict[str, Output]:
+    """What reached the joints of torques tau, (T, n, nv), N·m, as an output."""
+    return {APPLIED: (plant.applied(tau), "N·m", ("time", "robot", "joint"))} if plant.saturate else {}
 
 
 def applied_torque(result: Result) -> np.ndarray:
@@ -74,11 +125,90 @@ def applied_torque(result: Result) -> np.ndarray:
     It is `result.tau`, what the controller commands; in a run with saturation cut off at the limits, which
     newer results have as the output "applied_torque".
     """
-    if "applied_torque" in result.outputs:
-        return result.outputs["applied_torque"].copy()
+    if APPLIED in result.outputs:
+        return result.outputs[APPLIED].copy()
     tau = result.tau.copy()
     for i, robot in enumerate(result.info["robots"]):
         for joint, limit in enumerate(robot.get("torque_limits", ()) if result.info.get("saturate") else ()):
             if limit is not None:
                 tau[:, i, joint] = np.clip(tau[:, i, joint], -limit, limit)
     return tau
+
+
+def warn_of_saturation(result: Result) -> None:
+    """Warn whoever called the package of torque that was cut off while the controller went on regardless."""
+    found = result.info["saturation"]
+    if not found:
+        return
+    worst = max(found, key=lambda entry: entry["largest"] - entry["limit"])
+    warn(
+        f"{result.info['title']}: torque was cut off at {len(found)} joints, for up to "
+        f"{max(entry['share'] for entry in found):.0%} of the time; {result.names[worst['robot']]}, joint "
+        f"{worst['joint'] + 1} asked for {worst['largest']:.3g} {worst['unit']} of its "
+        f"{worst['limit']:.3g}. Estimates and integrals of the synchronization errors went on meanwhile as "
+        f"if it had got it{_learned(found)}. See info['saturation'] and "
+        f"outputs['{APPLIED}']; lower the gains, or ask for a slower motion",
+        SaturationWarning,
+    )
+
+
+def _learned(found: list[dict[str, Any]]) -> str:
+    """How far the estimates grew, in words; empty if they hardly did."""
+    start, largest = max((entry["theta_hat"] for entry in found), key=lambda pair: pair[1])
+    if largest <= (1 + GROWN) * start:
+        return ""
+    times = f", {largest / start:.3g} times as much" if start > 0 else ""
+    return f": the largest entry of theta_hat went from {start:.3g} to {largest:.3g}{times}"
+
+
+# -- damping ----------------------------------------------------------------------------------------------
+
+
+class DampingLog:
+    """Damping of every robot at all logged instants, as a list of intervals.
+
+    Args:
+        instants: number of logged instants.
+        robots: number of robots.
+
+    Attributes:
+        arrays: lambda, and the part of xref' that J v_ref leaves out, (instants, robots) each.
+    """
+
+    def __init__(self, instants: int, robots: int):
+        self.arrays = {name: np.zeros((instants, robots)) for name in ("damping", "velocity_lost")}
+
+    def add(self, k: int, signals: Signals) -> None:
+        """Log one instant."""
+        task = signals.task
+        if task.J is None or task.inversion is None or task.inversion.damping is None:
+            return
+        lost = velocity_lost(task.J, signals.v_ref, signals.asked.xref_dot)
+        self.arrays["damping"][k], self.arrays["velocity_lost"][k] = task.inversion.damping[:, 0], lost[:, 0]
+
+    def report(self, t: np.ndarray) -> list[dict[str, Any]]:
+        """Intervals in which the damping of a robot was above zero, in order of their start.
+
+        Args:
+            t: instants logged so far, (T,), s.
+
+        Returns:
+            One entry per interval: `robot`, counted from 0; `start`, `stop`, s: first and last instant;
+            `largest_damping`: of lambda; `largest_velocity_lost`: of |xref' - J v_ref|, task unit per s.
+        """
+        logged = zip(*(array[: len(t)].T for array in self.arrays.values()), strict=True)
+        found = [
+            {
+                "robot": robot,
+                "start": float(t[first]),
+                "stop": float(t[last]),
+                "largest_damping": float(damping[first : last + 1].max()),
+                "largest_velocity_lost": float(lost[first : last + 1].max()),
+            }
+            for robot, (damping, lost) in enumerate(logged)
+            for first, last in spans(damping > 0)
+        ]
+        return sorted(found, key=lambda entry: (entry["start"], entry["robot"]))
+
+
+__getattr__ = names_elsewhere(__name__, ".plant", "torque_limits")

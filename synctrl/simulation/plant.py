@@ -12,9 +12,10 @@ import numpy as np
 from ..checks import choice, instance
 from ..coupling.cell import Cell
 from ..robots.forest import forests
+from ..robots.limits import joint_limits
 from ..robots.robot import Robot
-from .limits import torque_limits
-from .payloads import Payload, PayloadSchedule
+from ..tasks.algebra import padded
+from .schedules import Payload, PayloadSchedule
 
 Output = tuple[np.ndarray, str, tuple[str, ...]]
 """An array over time, its unit, and the names of its axes, the first of which is "time"."""
@@ -30,7 +31,7 @@ def pinocchio_dynamics(robots: Sequence[Robot]) -> Dynamics:
 
 def mujoco_dynamics(robots: Sequence[Robot]) -> Dynamics:
     """Forward dynamics by MuJoCo, from its own reading of the robots' URDF."""
-    from .mujoco_plant import MujocoArm
+    from .mujoco import MujocoArm
 
     return partial(_by_part, [(slice(i, i + 1), MujocoArm(robot)) for i, robot in enumerate(robots)])
 
@@ -49,6 +50,14 @@ PHYSICS: dict[str, Callable[[Sequence[Robot]], Dynamics]] = {
     "pinocchio": pinocchio_dynamics,
     "mujoco": mujoco_dynamics,
 }
+
+
+def torque_limits(cell: Cell) -> np.ndarray:
+    """Torque limits of all robots, (n, nv), N·m; infinite where there is none."""
+    limits = np.full((cell.n, cell.nv), np.inf)
+    for i, robot in enumerate(cell.robots):
+        limits[i, : robot.nv] = joint_limits(robot).torque
+    return limits
 
 
 class Plant:
@@ -180,14 +189,10 @@ class Plant:
     # -- internals ----------------------------------------------------------------------------------------
 
     def _set_friction(self) -> None:
-        cell = self.cell
-        self.viscous, self.coulomb = np.zeros((2, cell.n, cell.nv))
-        self.smoothing = np.ones((cell.n, cell.nv))
-        for i, member in enumerate(cell.members):
-            nv = member.robot.nv
-            self.viscous[i, :nv] = member.friction.viscous
-            self.coulomb[i, :nv] = member.friction.coulomb
-            self.smoothing[i] = member.friction.smoothing
+        members = [(member.robot.nv, member.friction) for member in self.cell.members]
+        self.viscous = padded([np.broadcast_to(friction.viscous, nv) for nv, friction in members])
+        self.coulomb = padded([np.broadcast_to(friction.coulomb, nv) for nv, friction in members])
+        self.smoothing = np.repeat([[friction.smoothing] for _, friction in members], self.cell.nv, axis=1)
         self.rubs = bool(self.viscous.any() or self.coulomb.any())
 
     @cached_property

@@ -71,10 +71,8 @@ def loop_rates(
         driven: whether the regressor is that of the reference motion with its feedback, rather than that of
             what is desired.
     """
-    reference = loop.cell.references(np.array([t]))[0]
-    task = loop.cell.task.measure(motion, reference.desired)
-    J, Y = _jacobians(loop, task), _regressors(loop, reference, task, motion, driven)
-    found = []
+    reference, task, J = _measured(loop, t, motion)
+    Y, found = _regressors(loop, reference, task, motion, driven), []
     for i, robot in enumerate(loop.cell.robots):
         nv, J_i = robot.nv, J[i, :, : robot.nv]
         M = robot.mass_matrix(motion[0, i, :nv])
@@ -85,20 +83,13 @@ def loop_rates(
     return found
 
 
-def rest_friction(loop: ClosedLoop) -> np.ndarray:
-    """Slope of the true friction at rest, (n, nv), N·m·s/rad."""
-    plant = loop.plant
-    return plant.viscous + plant.coulomb / plant.smoothing
-
-
 def damping_rate(loop: ClosedLoop, t: float, motion: np.ndarray, sampled: bool = False) -> float:
     """The largest sum of what damps a robot within a step, 1/s.
 
     It is the sum of Lambda, beta lambda_n and the largest eigenvalues of M^-1 D, of M^-1 F, and of what
     another law than the paper's damps with. Where torque is held, a step knows nothing but the friction.
     """
-    reference = loop.cell.references(np.array([t]))[0]
-    J = _jacobians(loop, loop.cell.task.measure(motion, reference.desired))
+    reference, _, J = _measured(loop, t, motion)
     sums = []
     for i, robot in enumerate(loop.cell.robots):
         M = robot.mass_matrix(motion[0, i, : robot.nv])
@@ -107,24 +98,17 @@ def damping_rate(loop: ClosedLoop, t: float, motion: np.ndarray, sampled: bool =
     return max(sums)
 
 
-def _task_rates(loop: ClosedLoop) -> list[tuple[str, float]]:
-    """Lambda, and beta times the largest eigenvalue of S^T S, 1/s."""
-    controller = loop.controller
-    return [
-        ("Lambda", min(float(controller.Lambda.max()), HUGE)),
-        ("beta", min(float(controller.beta.max()), HUGE) * _largest_share(loop)),
-    ]
-
-
 def _largest_share(loop: ClosedLoop) -> float:
     """The largest eigenvalue of S^T S."""
     return float(np.linalg.norm(loop.cell.coupling.matrix, 2) ** 2)
 
 
-def _jacobians(loop: ClosedLoop, task: Measurement) -> np.ndarray:
-    """Jacobians of all robots, (n, m, nv); in joint space identities."""
-    cell = loop.cell
-    return np.broadcast_to(np.eye(cell.m, cell.nv), (cell.n, cell.m, cell.nv)) if task.J is None else task.J
+def _measured(loop: ClosedLoop, t: float, motion: np.ndarray) -> tuple[Reference, Measurement, np.ndarray]:
+    """What is desired and measured, and the Jacobians, (n, m, nv); in joint space identities."""
+    cell, reference = loop.cell, loop.cell.references(np.array([t]))[0]
+    task = cell.task.measure(motion, reference.desired)
+    J = np.broadcast_to(np.eye(cell.m, cell.nv), (cell.n, cell.m, cell.nv)) if task.J is None else task.J
+    return reference, task, J
 
 
 def _regressors(
@@ -147,11 +131,12 @@ def _dampers(
     loop: ClosedLoop, reference: Reference, i: int, J: np.ndarray, M: np.ndarray
 ) -> tuple[np.ndarray, list[Rate]]:
     """What resists the velocities of a robot, (nv, nv), and the rates of all that damps it."""
-    controller, nv = loop.controller, J.shape[1]
+    controller, plant, nv = loop.controller, loop.plant, J.shape[1]
     K_r = np.minimum(controller.K_r[i], HUGE)
     damping = np.diag(K_r[:nv]) if controller.k_r_space == "joint" else J.T @ np.diag(K_r) @ J
-    friction = np.diag(rest_friction(loop)[i, :nv])
-    found = [Rate(name, i, None, rate) for name, rate in _task_rates(loop)]
+    friction = np.diag((plant.viscous + plant.coulomb / plant.smoothing)[i, :nv])  # slope at rest
+    beta = min(float(controller.beta.max()), HUGE) * _largest_share(loop)
+    found = [Rate("Lambda", i, None, min(float(controller.Lambda.max()), HUGE)), Rate("beta", i, None, beta)]
     found += [_rate("K_r", i, M, damping), _rate("friction", i, M, friction)]
     if type(controller.law) is not BoundSunMills:
         force = J.T @ _answers(loop, reference, i)[0] @ J
@@ -182,21 +167,14 @@ def _answers(loop: ClosedLoop, reference: Reference, i: int) -> tuple[np.ndarray
     still = replace(no_errors(n, m), t=reference.t, weights=weights)
     rest = loop.controller.law.command(still).force[i]
     found = np.zeros((2, m, m))
-    for k in range(m):
-        e, none = np.zeros((2, n, m))
-        e[i, k] = -1.0
-        w = np.matvec(weights.c, e)
-        heard = share * w
-        moving = replace(
-            still, error=np.array((none, e)), x_dot=-e, weighted=np.array((none, w)),
-            shares=np.array((none, none, heard)),
-        )  # fmt: skip
-        away = replace(
-            still, error=np.array((e, none)), weighted=np.array((w, none)),
-            shares=np.array((none, heard, none)),
-        )  # fmt: skip
-        for matrix, errors in zip(found, (moving, away), strict=True):
-            matrix[:, k] = rest - loop.controller.law.command(errors).force[i]
+    for matrix, order in zip(found, (1, 0), strict=True):  # of the velocity, of the position
+        for k in range(m):
+            error, shares = np.zeros((2, n, m)), np.zeros((3, n, m))
+            error[order, i, k] = -1.0
+            weighted = np.matvec(weights.c, error)
+            shares[order + 1] = share * weighted[order]
+            seen = replace(still, error=error, x_dot=-error[1], weighted=weighted, shares=shares)
+            matrix[:, k] = rest - loop.controller.law.command(seen).force[i]
     damping, spring = (np.clip(np.nan_to_num(A + A.T) / 2, -HUGE, HUGE) for A in found)
     return damping, spring
 

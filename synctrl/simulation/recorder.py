@@ -1,8 +1,13 @@
-"""Collects the instants of a run into the arrays of a Result."""
+"""Collects the instants of a run into the arrays of a Result, with what the plant says of its own state.
+
+A plant of a user's own may carry a state through a run that nobody else understands, see `Plant`. At the end
+of the run its methods `report` and `outputs` say what became of it. Both are code of the user's, so what they
+give is checked here before it gets into a `Result`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, NamedTuple
@@ -10,20 +15,29 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..checks import printable
-from ..control.controller import Signals
 from ..coupling.cell import Cell
+from ..errors import InputError
+from ..robots.limits import joint_limits
 from ..robots.written import write_robot
-from .account import NOTHING, Account, account_of
 from .advance import Sample
 from .clock import Clock
-from .closed_loop import ClosedLoop
-from .damping import DampingLog
-from .limits import limit_report, torque_limits
+from .closed_loop import ClosedLoop, State
+from .limits import APPLIED, DampingLog, applied_output, limit_report, saturation_report
 from .memory import check_fits
+from .plant import Output
 from .result import LAYOUT, Result
 from .result_units import array_unit
-from .saturation import APPLIED, applied_output, saturation_report
-from .state import State
+
+
+class Account(NamedTuple):
+    """What a plant adds to a result: entries of `info`, and outputs by name."""
+
+    report: Mapping[str, Any]
+    outputs: Mapping[str, Output]
+
+
+#: of a plant that has nothing to say
+NOTHING = Account({}, {})
 
 
 class Recorder:
@@ -56,9 +70,9 @@ class Recorder:
     def add(self, sample: Sample) -> None:
         """Log one instant."""
         state = self._loop.state(sample.y)
-        at = Instant(sample, sample.signals, state, self._loop.controller.network.integral(state.memory))
+        integral = self._loop.controller.network.integral(state.memory)
         for name, array in self._arrays.items():
-            array[self.count] = ROW[name](at)
+            array[self.count] = ROW[name](sample, state, integral)
         self._damping.add(self.count, sample.signals)
         self.count += 1
 
@@ -82,16 +96,22 @@ class Recorder:
         return {name: array[: self.count] for name, array in self._arrays.items()}
 
     def account(self, info: Mapping[str, Any]) -> Account:
-        """What the plant says of its own state until now, under names that `info` does not have.
+        """What the plant says of its own state until now, under names that neither `info` nor the run has.
 
         Raises:
-            InputError: nothing that a result can hold.
+            InputError: something else than entries by name, a name that is taken, or an output that is no
+                array with a unit and one axis per dimension, time first.
             Exception: what the plant raises.
         """
         loop, nothing = self._loop, np.zeros((self.count, 0))
-        taken = {*info, *describe(loop), *LAYOUT, *_STATE_AXES, *OF_EVERY_RUN}
         hidden, lengths = self.logged().get(PLANT_STATE, nothing), {"time": self.count, **sizes(loop)}
-        return account_of(loop.plant, hidden, taken, lengths)
+        taken = {*info, *describe(loop), *LAYOUT, *_STATE_AXES, *OF_EVERY_RUN}
+        found = Account(loop.plant.report(hidden), loop.plant.outputs(hidden))
+        for what, entries in found._asdict().items():
+            _check_names(f"plant {type(loop.plant).__qualname__}, {what}", entries, taken)
+        for name, output in found.outputs.items():
+            _check_output(f"plant {type(loop.plant).__qualname__}, outputs, {name}", output, lengths)
+        return found
 
     def result(
         self, status: str, info: Mapping[str, Any], experiment: Any, account: Account = NOTHING
@@ -113,37 +133,28 @@ class Recorder:
         return Result(**arrays, info=described, outputs=outputs, experiment=experiment)
 
 
-class Instant(NamedTuple):
-    """What a row of the log is read from: a sample, its signals, the parts of its state, and int epsilon."""
-
-    sample: Sample
-    signals: Signals
-    state: State
-    integral: np.ndarray
-
-
 #: outputs that have what an adaptation, a network and a plant have of their own in the state of the loop
 ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE = "adaptation_state", "network_state", "plant_state"
 #: further names of entries and outputs that a result gets from elsewhere
 OF_EVERY_RUN = "status", "outputs", "damping", "limits", "saturation", "step_error", "run", "format", APPLIED
-#: how every array is read from an instant
-ROW: dict[str, Callable[[Instant], Any]] = {
-    "t": lambda at: at.sample.t,
-    "x": lambda at: at.signals.task.motion[0],
-    "x_desired": lambda at: at.signals.reference.desired[0],
-    "tracking_error": lambda at: at.signals.e,
-    "sync_error": lambda at: at.signals.epsilon,
-    "sync_integral": lambda at: at.integral,
-    "coupled_error": lambda at: at.signals.e_star,
-    "q": lambda at: at.state.q,
-    "v": lambda at: at.state.v,
-    "v_error": lambda at: at.signals.s_q,
-    "tau": lambda at: at.signals.tau,
-    "disturbance": lambda at: at.sample.disturbance,
-    "theta_hat": lambda at: at.signals.theta_hat,
-    ADAPTATION_STATE: lambda at: at.state.z,
-    NETWORK_STATE: lambda at: at.state.memory.ravel(),
-    PLANT_STATE: lambda at: at.state.hidden,
+#: how every array is read from a sample and the parts of its state; the last one from int epsilon
+ROW: dict[str, Callable[[Sample, State, np.ndarray], Any]] = {
+    "t": lambda at, y, _: at.t,
+    "x": lambda at, y, _: at.signals.task.motion[0],
+    "x_desired": lambda at, y, _: at.signals.reference.desired[0],
+    "tracking_error": lambda at, y, _: at.signals.e,
+    "sync_error": lambda at, y, _: at.signals.epsilon,
+    "sync_integral": lambda at, y, integral: integral,
+    "coupled_error": lambda at, y, _: at.signals.e_star,
+    "q": lambda at, y, _: y.q,
+    "v": lambda at, y, _: y.v,
+    "v_error": lambda at, y, _: at.signals.s_q,
+    "tau": lambda at, y, _: at.signals.tau,
+    "disturbance": lambda at, y, _: at.disturbance,
+    "theta_hat": lambda at, y, _: at.signals.theta_hat,
+    ADAPTATION_STATE: lambda at, y, _: y.z,
+    NETWORK_STATE: lambda at, y, _: y.memory.ravel(),
+    PLANT_STATE: lambda at, y, _: y.hidden,
 }
 _STATE_AXES = {
     ADAPTATION_STATE: ("time", "robot", "state"),
@@ -217,12 +228,10 @@ def _describe_robots(cell: Cell) -> list[dict[str, Any]]:
             "joint_units": list(robot.joint_units),
             "parameters": list(parameters.names),
             "theta": [float(value) for value in parameters.theta],
-            "torque_limits": [float(x) if np.isfinite(x) else None for x in limits[: robot.nv]],
+            "torque_limits": [float(x) if np.isfinite(x) else None for x in joint_limits(robot).torque],
             **write_robot(robot),
         }
-        for name, robot, parameters, limits in zip(
-            cell.names, cell.robots, cell.parameters, torque_limits(cell), strict=True
-        )
+        for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True)
     ]
 
 
@@ -237,3 +246,28 @@ def _version(package: str) -> str:
         return version(package)
     except PackageNotFoundError:
         return "not installed as a package"
+
+
+def _check_names(where: str, entries: Any, taken: Collection[str]) -> None:
+    if not isinstance(entries, Mapping):
+        raise InputError(f"expected entries by name, found {entries!r:.80}", subject=where)
+    for name in entries:
+        if not isinstance(name, str) or not name.isidentifier() or name in taken:
+            text = f"expected names that are not taken, found {name!r:.80}"
+            raise InputError(text, subject=where, found=name)
+
+
+def _check_output(where: str, output: Any, lengths: Mapping[str, int]) -> None:
+    try:
+        array, unit, axes = output
+        named = isinstance(unit, str) and axes[0] == "time" and all(isinstance(axis, str) for axis in axes)
+        fits = all(lengths.get(axis, k) == k for axis, k in zip(axes, array.shape, strict=True))
+        sound = named and fits and array.dtype == np.float64
+    except (TypeError, ValueError, AttributeError, IndexError):
+        sound = False
+    if not sound:
+        raise InputError(
+            f"expected an array of floats over {lengths['time']} instants, its unit, and the names of its "
+            f"axes, of which the first is 'time', found {output!r:.80}",
+            subject=where,
+        )

@@ -6,22 +6,22 @@ import json
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field, fields
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 import numpy as np
 
-from ..checks import instance
+from ..checks import count, instance
 from ..errors import InputError, ResultError
-from .result_file import read_result, write_result
-from .result_schema import FORMAT, LAYOUT, check_shape, shapes, unit_of
+from .result_file import LAYOUT, check_shape, read_result, shapes, unit_of, write_result
 from .result_units import array_unit, array_units
+from .schema import FORMAT
 from .views import GALLERY, found
 
 __all__ = ["FORMAT", "LAYOUT", "Result", "unit_of"]
 
-R = TypeVar("R", bound="Result")
 #: what the names of outputs begin with in a file
 OUTPUTS = "outputs/"
 
@@ -90,15 +90,15 @@ class Result:
         return {**{name: getattr(self, name) for name in LAYOUT}, **outputs}
 
     def __reduce__(self) -> tuple:
-        return _remade, (type(self), {**self._contents(), "experiment": None})
+        return partial(type(self), **{**self._contents(), "experiment": None}), ()
 
     def __copy__(self) -> Self:
-        return _remade(type(self), self._contents())
+        return type(self)(**self._contents())
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         contents = self._contents()
         shared = {"experiment": contents.pop("experiment")}
-        return _remade(type(self), {**deepcopy(contents, memo), **shared})
+        return type(self)(**deepcopy(contents, memo), **shared)
 
     def _contents(self) -> dict[str, Any]:
         """All fields, mappings as plain dictionaries."""
@@ -149,14 +149,12 @@ class Result:
         Raises:
             InputError: no whole number above 0.
         """
-        instance("every", every, (int, np.integer), "a whole number")
-        if isinstance(every, bool) or every < 1:
-            raise InputError(f"expected a whole number above 0, found {every!r}", subject="every")
+        every = count("every", every)
         last = max(len(self.t) - 1, 0)
         kept = np.union1d(np.arange(0, last, every), [last] if len(self.t) else []).astype(int)
         arrays = {name: getattr(self, name)[kept] for name in LAYOUT}
         outputs = {name: array[kept] for name, array in self.outputs.items()}
-        info = {**self.info, "decimated": int(every)}
+        info = {**self.info, "decimated": every}
         return type(self)(**arrays, info=info, outputs=outputs, experiment=self.experiment)
 
     def save(self, path: str | Path) -> Path:
@@ -201,10 +199,6 @@ class Result:
     def __repr__(self) -> str:
         n, m = self.x.shape[1:]
         return f"Result({self.info['title']!r}, {n} robots, {m} axes, {len(self.t)} instants, {self.status})"
-
-
-def _remade(kind: type[R], contents: dict[str, Any]) -> R:
-    return kind(**contents)
 
 
 def _check_outputs(result: Result) -> None:

@@ -12,17 +12,20 @@ import os
 import re
 import struct
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from itertools import chain
+from math import prod
 from pathlib import Path
+from types import MappingProxyType
 from typing import IO, Any, NamedTuple
 
 import numpy as np
 
 from ..errors import ResultError
 from ..files import whole_file
-from .result_schema import check_array_names, check_arrays, check_info, check_shape, shapes
-from .schema import read_json
+from ..robots.units import TURNS, unit_for
+from .schema import check_info, read_json
 
 #: what reading a file that is no archive, or a damaged one, may raise
 _DAMAGE = (OSError, ValueError, LookupError, EOFError, RuntimeError, MemoryError, ArithmeticError)
@@ -34,6 +37,34 @@ _HEADER = re.compile(
     rb"\{'descr': '([<>])([fU])(\d{1,10})', 'fortran_order': (True|False), "
     rb"'shape': \(((?:\d{1,19}, )*(?:\d{1,19},?)?)\), \} *\n"
 )
+
+#: largest time in a log, s, about 30,000 years: times beyond it are damage
+LATEST = 1e12
+
+#: array -> (dimensions, unit); "task" stands for the unit of the task, "weighted" for that of c e; what has
+#: an axis "joint" has the unit that it has for a joint that turns
+LAYOUT: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
+    {
+        "t": (("time",), "s"),
+        "x": (("time", "robot", "axis"), "task"),
+        "x_desired": (("time", "robot", "axis"), "task"),
+        "tracking_error": (("time", "robot", "axis"), "task"),
+        "sync_error": (("time", "pair", "axis"), "weighted"),
+        "sync_integral": (("time", "pair", "axis"), "weighted·s"),
+        "coupled_error": (("time", "robot", "axis"), "weighted"),
+        "q": (("time", "robot", "joint"), "rad"),
+        "v": (("time", "robot", "joint"), "rad/s"),
+        "v_error": (("time", "robot", "joint"), "rad/s"),
+        "tau": (("time", "robot", "joint"), "N·m"),
+        "disturbance": (("time", "robot", "joint"), "N·m"),
+        "theta_hat": (("time", "robot", "parameter"), "SI"),
+    }
+)
+
+
+def unit_of(array: str, task: str, weighted: str, joint: str = TURNS) -> str:
+    """Unit of an array of `LAYOUT`, given those of the task and of c e, and of the position of the joint."""
+    return unit_for(LAYOUT[array][1].replace("task", task).replace("weighted", weighted), joint)
 
 
 def write_result(path: Path, info: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:
@@ -162,9 +193,7 @@ def _read_header(stream: IO[bytes], member: zipfile.ZipInfo) -> Header:
     shape = tuple(int(k) for k in lengths.replace(",", " ").split())
     if kind == "f" and width != "8":
         raise ResultError(f"expected float64, found float{8 * int(width)}", subject=f"{member.filename!a}")
-    size = int(width) * (4 if kind == "U" else 1)
-    for k in shape:
-        size *= k
+    size = int(width) * (4 if kind == "U" else 1) * prod(shape)
     if len(start) + length + size != member.file_size:
         raise ResultError(
             f"expected {size} bytes of an array of shape {shape}, found "
@@ -183,3 +212,76 @@ def _read_numbers(stream: IO[bytes], header: Header) -> np.ndarray:
             raise EOFError("an array ends too early")
         left = left[read:]
     return array
+
+
+# -- what arrays have to be ---------------------------------------------------------------------------------
+
+
+def shapes(info: Mapping[str, Any], instants: int) -> dict[str, tuple[int | None, ...]]:
+    """Shape of every array, and of every output after "outputs/"; None is a length that info does not say."""
+    lengths = {**info["sizes"], "time": instants}
+    dimensions = chain(
+        ((name, axes) for name, (axes, _) in LAYOUT.items()),
+        ((f"outputs/{name}", about["axes"]) for name, about in info.get("outputs", {}).items()),
+    )
+    return {name: tuple(lengths.get(axis) for axis in axes) for name, axes in dimensions}
+
+
+def check_arrays(info: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:
+    """Refuse arrays that are not those that info speaks of, or numbers that no run has.
+
+    Every number is finite, as a run stops before anything else is logged; outputs may say by NaN that there
+    is no value. Times grow.
+
+    Raises:
+        ResultError: the array, what is expected and what is found.
+    """
+    expected = shapes(info, arrays["t"].size)
+    check_array_names(arrays, expected)
+    for name, array in arrays.items():
+        check_shape(name, array.dtype, array.shape, expected[name])
+        if name in LAYOUT and not np.isfinite(array).all():
+            where = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
+            raise ResultError(
+                f"expected finite numbers, found {array[where]} at {where}", subject=f"array '{name}'"
+            )
+    _check_times(arrays["t"])
+
+
+def check_array_names(found: Iterable[str], expected: Iterable[str]) -> None:
+    """Refuse arrays that are too many or too few.
+
+    Raises:
+        ResultError: with the names that are not in both.
+    """
+    different = ", ".join(sorted({*found} ^ {*expected}))
+    if different:
+        raise ResultError(
+            f"expected those that info speaks of and no others, these differ: {different}",
+            subject="arrays",
+            found=different,
+        )
+
+
+def check_shape(name: str, dtype: np.dtype, found: tuple[int, ...], expected: tuple[int | None, ...]) -> None:
+    """Refuse an array of another kind or shape.
+
+    Raises:
+        ResultError: see above.
+    """
+    fits = len(found) == len(expected) and all(
+        e is None or e == f for e, f in zip(expected, found, strict=True)
+    )
+    if not fits or dtype != np.float64:
+        raise ResultError(
+            f"expected float64 of shape {expected}, found {dtype} of shape {found}", subject=f"array '{name}'"
+        )
+
+
+def _check_times(t: np.ndarray) -> None:
+    wrong = np.flatnonzero(~(np.abs(t) <= LATEST) | (np.diff(t, prepend=-np.inf) <= 0))
+    if wrong.size:
+        raise ResultError(
+            f"expected times that grow, at most {LATEST:g} s, found {t[wrong[0]]} at {wrong[0]}",
+            subject="array 't'",
+        )

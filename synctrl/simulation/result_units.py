@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..robots.units import TURNS, joined, unit_for
-from .result_schema import LAYOUT, unit_of
+from .result_file import LAYOUT, unit_of
 
 
 def array_units(info: Mapping[str, Any], array: str) -> tuple[tuple[str, ...], ...]:

@@ -1,7 +1,8 @@
-"""What plain data from outside must look like: rules that read like the data they describe.
+"""What plain data from outside must look like, and what the package reads of a result's info.
 
-A rule is called with the place, the value there and the lengths that names such as "robot" stand for; it
-raises a ResultError that says what is expected at that place and what is found.
+The rules read like the data they describe. A rule is called with the place, the value there and the lengths
+that names such as "robot" stand for; it raises a ResultError that says what is expected at that place and
+what is found.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections.abc import Callable, Mapping
 from math import isfinite
 from typing import Any, NoReturn, TypeAlias
 
-from ..checks import LONGEST_LABEL, unprintable
+from ..checks import LONGEST_LABEL, printable, unprintable
 from ..errors import ResultError
 
 Sizes: TypeAlias = Mapping[str, int]
@@ -51,36 +52,35 @@ def anything(where: str, value: Any, sizes: Sizes, depth: int = 0) -> None:
         _refuse(where, "numbers below 2^63", hex(value))
 
 
-def text(where: str, value: Any, sizes: Sizes) -> None:
-    """A text of one or more lines, for people."""
-    if not isinstance(value, str):
-        _refuse(where, "a text", value)
-    if len(value) > LONGEST_TEXT or unprintable(value.replace("\n", " ").replace("\t", " ")):
-        _refuse(where, f"up to {LONGEST_TEXT} characters that can be shown", value)
+def plain(expected: str, fits: Callable[[Any], bool]) -> Rule:
+    """A value of which a test is true."""
+
+    def rule(where: str, value: Any, sizes: Sizes) -> None:
+        if not fits(value):
+            _refuse(where, expected, value)
+
+    return rule
 
 
-def label(where: str, value: Any, sizes: Sizes) -> None:
-    """A name or a unit: a text of one line."""
-    if not isinstance(value, str) or len(value) > LONGEST_LABEL or unprintable(value):
-        _refuse(where, f"one line of up to {LONGEST_LABEL} characters", value)
+def _shown(value: Any, longest: int) -> bool:
+    return isinstance(value, str) and len(value) <= longest and printable(value) == value
 
 
-def boolean(where: str, value: Any, sizes: Sizes) -> None:
-    """True or false."""
-    if not isinstance(value, bool):
-        _refuse(where, "true or false", value)
+def _finite(value: Any) -> bool:
+    return type(value) in (int, float) and isfinite(value)
 
 
-def nothing(where: str, value: Any, sizes: Sizes) -> None:
-    """Null."""
-    if value is not None:
-        _refuse(where, "null", value)
-
-
-def number(where: str, value: Any, sizes: Sizes) -> None:
-    """A finite number."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
-        _refuse(where, "a finite number", value)
+#: a text of one or more lines, for people; and one of one line, a name or a unit
+text = plain(f"a text of up to {LONGEST_TEXT} characters", lambda value: _shown(value, LONGEST_TEXT))
+label = plain(
+    f"one line of up to {LONGEST_LABEL} characters",
+    lambda value: _shown(value, LONGEST_LABEL) and not unprintable(value),
+)
+boolean = plain("true or false", lambda value: isinstance(value, bool))
+nothing = plain("null", lambda value: value is None)
+number = plain("a finite number", _finite)
+positive = plain("a number above 0", lambda value: _finite(value) and value > 0)
+not_negative = plain("a number of at least 0", lambda value: _finite(value) and value >= 0)
 
 
 def numbers(where: str, value: Any, sizes: Sizes) -> None:
@@ -100,17 +100,6 @@ def whole(least: int = 0, below: str | None = None) -> Rule:
             _refuse(where, f"a whole number of at least {least}", value)
         if below is not None and value >= sizes[below]:
             _refuse(where, f"the number of a {below}, from 0 to {sizes[below] - 1}", value)
-
-    return rule
-
-
-def above(low: float, or_equal: bool = False) -> Rule:
-    """A finite number above `low`."""
-
-    def rule(where: str, value: Any, sizes: Sizes) -> None:
-        number(where, value, sizes)
-        if value < low or (value == low and not or_equal):
-            _refuse(where, f"a number {'of at least' if or_equal else 'above'} {low:g}", value)
 
     return rule
 
@@ -179,3 +168,124 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _refuse(where: str, expected: str, found: Any) -> NoReturn:
     raise ResultError(f"expected {expected}, found {found!a:.80}", subject=where)
+
+
+# -- info of a result --------------------------------------------------------------------------------------
+
+FORMAT = "synctrl result 2"
+#: what is read; files of format 1 have no outputs
+FORMATS = ("synctrl result 1", FORMAT)
+SIZES = entries({**dict.fromkeys(("robot", "pair", "axis", "joint"), whole(1)), "parameter": whole(0)})
+
+_ROBOT = entries(
+    {
+        "name": label,
+        "joints": rows(label, least=1, distinct=True),
+        "parameters": rows(label),
+        "theta": rows(number),
+    },
+    {
+        **dict.fromkeys(("model", "tip", "file"), label),
+        "urdf": text,
+        "joint_units": rows(label),
+        "torque_limits": rows(optional(not_negative)),
+    },
+)
+_JOINT = {"robot": whole(below="robot"), "joint": whole(below="joint")}
+_WINDOW = {"robot": whole(below="robot"), "start": number}
+_DISTURBANCE = entries({**_WINDOW, "torque": numbers, "stop": number})
+_PAYLOAD = entries({**_WINDOW, "stop": optional(number), "mass": number})
+_LEFT_LIMIT = entries({**_WINDOW, **_JOINT, "stop": number, "kind": label}, {"unit": label})
+_CUT_OFF = entries(
+    {
+        **_JOINT,
+        **dict.fromkeys(("limit", "share", "largest"), not_negative),
+        "theta_hat": rows(not_negative, least=2),
+    },
+    {"unit": label},
+)
+_STEP = {"estimate": not_negative, **_JOINT, "time": number, "advised_step": optional(positive)}
+#: a step that was looked at, and what is said where none was
+_WORST = entries({**_STEP, "limit": positive})
+_NO_STEP = entries({**dict.fromkeys(_STEP, nothing), "limit": positive})
+_PART = entries({"name": label})
+_HELD = entries({"joints": rows(label), "largest": rows(number), "final": rows(number)})
+
+
+def _step_error(where: str, value: Any, sizes: Mapping[str, int]) -> None:
+    """What `step_report` gives: all of the worst step, or nothing but the limit."""
+    unseen = isinstance(value, dict) and value.get("estimate", 0) is None
+    (_NO_STEP if unseen else _WORST)(where, value, sizes)
+
+
+INFO = entries(
+    {
+        "status": text,
+        "title": text,
+        "task_unit": label,
+        "weighted_unit": label,
+        "robots": rows(_ROBOT, "robot"),
+        "axes": rows(label, "axis", distinct=True),
+        "pairs": rows(rows(whole(below="robot"), least=2, distinct=True), "pair"),
+        "gains": entries({"Lambda": numbers, "beta": numbers}),
+        "versions": each(label),
+    },
+    {
+        "units": each(label),
+        **dict.fromkeys(("axis_units", "weighted_units"), rows(label, "axis")),
+        "coupling": label,
+        "signs": rows(rows(number), "pair"),
+        "outputs": each(entries({"unit": label, "axes": rows(label, least=1)})),
+        **dict.fromkeys(("integrator", "engine", "plant"), label),
+        **dict.fromkeys(("dt", "log_dt", "duration"), positive),
+        "control_period": optional(positive),
+        "saturate": boolean,
+        "decimated": whole(1),
+        "disturbances": rows(_DISTURBANCE),
+        "payloads": rows(_PAYLOAD),
+        "events": rows(entries({"t": number, "part": label})),
+        "damping": rows(entries({**_WINDOW, "stop": number})),
+        "limits": rows(_LEFT_LIMIT),
+        "saturation": rows(_CUT_OFF),
+        "step_error": optional(_step_error),
+        **dict.fromkeys(("adaptation", "law", "network"), _PART),
+        "held_joints": rows(_HELD, "robot"),
+    },
+)
+
+
+def check_info(info: Any) -> None:
+    """Refuse an info that somebody who reads it later would stumble over.
+
+    Raises:
+        ResultError: the entry, what is expected there, and what is found.
+    """
+    form = info.get("format") if isinstance(info, dict) else type(info).__name__
+    if form not in FORMATS:
+        raise ResultError(f"expected the format '{FORMAT}', found {form!a:.80}")
+    entries({"sizes": SIZES})("info", info, {})
+    INFO("info", info, info["sizes"])
+    _check_robots(info["robots"], info["sizes"])
+    for name, about in info.get("outputs", {}).items():
+        if not name.isidentifier() or about["axes"][0] != "time":
+            raise ResultError(
+                f"expected an identifier with 'time' as its first axis, found {about['axes']!a:.80}",
+                subject=f"info, outputs, {name}",
+            )
+
+
+def _check_robots(robots: list[dict[str, Any]], sizes: Mapping[str, int]) -> None:
+    """What a robot says of itself has to fit together, and into the arrays."""
+    if len({robot["name"] for robot in robots}) < len(robots):
+        raise ResultError("expected another name for each robot, found one twice", subject="info, robots")
+    for k, robot in enumerate(robots):
+        found = {name: len(robot[name]) for name in ("joints", "parameters", "theta")}
+        found |= {name: len(robot[name]) for name in ("torque_limits", "joint_units") if name in robot}
+        fits = found["joints"] <= sizes["joint"] and found["parameters"] <= sizes["parameter"]
+        per_joint = {found.get(name, found["joints"]) for name in ("torque_limits", "joint_units")}
+        if not fits or found["theta"] != found["parameters"] or per_joint != {found["joints"]}:
+            raise ResultError(
+                "expected as many theta as parameters, and torque_limits and joint_units as joints, up to "
+                f"{sizes['parameter']} and {sizes['joint']}, found {found}",
+                subject=f"info, robots[{k}]",
+            )

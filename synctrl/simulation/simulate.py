@@ -20,6 +20,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
+import numpy as np
+
 from ..checks import boolean, choice, instance, label, positive_number
 from ..control.adaptation import Adaptation
 from ..control.controller import Controller
@@ -31,18 +33,15 @@ from ..coupling.cell import Cell
 from ..coupling.member_checks import warn_of_unasked_friction
 from ..errors import InputError
 from ..renamed import names_elsewhere
-from .clock import TIE, make_clock
+from .clock import TIE, make_clock, multiple
 from .closed_loop import ClosedLoop
-from .disturbances import Disturbance, DisturbanceSchedule
-from .engines import Engine, find_engine
-from .handover import Progress
+from .engines import Engine, Run, find_engine, run_adaptive
+from .guard import Progress
 from .integrators import ADAPTIVE
-from .payloads import Payload
+from .limits import warn_of_saturation
 from .plant import PHYSICS, Plant
 from .result import Result
-from .run import Run, run_adaptive
-from .sampled import steps_per_sample
-from .saturation import warn_of_saturation
+from .schedules import Disturbance, DisturbanceSchedule, Payload
 from .step_error import StepError, warn_of_step
 
 
@@ -186,7 +185,7 @@ class Experiment:
         if control_period is None:
             edges += loop.messages.between(0.0, positive_number("duration", duration))
         clock = make_clock(duration, dt, edges, self.cell.breaks, log_dt)
-        every = None if control_period is None else steps_per_sample(control_period, dt)
+        every = None if control_period is None else multiple("control_period", control_period, dt)
         info: dict[str, Any] = {"integrator": "rk4", "dt": float(dt), "duration": float(duration)}
         info["log_dt"] = float(dt if log_dt is None else log_dt)
         info["engine"] = "pinocchio"
@@ -197,7 +196,8 @@ class Experiment:
         info["friction"] = [member.friction_from for member in self.cell.members]
         info["disturbances"] = [_describe(d) for d in self.disturbances]
         info["payloads"] = [payload.as_dict() for payload in self.payloads]
-        info["events"] = loop.events_within(clock.end - TIE * dt)
+        events = [float(t) for t in np.sort(loop.events) if 0 <= t < clock.end - TIE * dt]
+        info["events"] = [{"t": t, "part": type(loop.plant).__qualname__} for t in events]
         return Run(self, loop, clock, schedule, every, info, StepError(self.cell.n, self.cell.nv))
 
 
@@ -253,7 +253,7 @@ def _carry_out(
     if adaptive:
         _needs_rk4(integrator, engine, run.info["control_period"])
     elif (reason := by.refuses(run)) is not None:
-        raise InputError(reason)
+        raise InputError(reason, subject="engine")
     run.check()
     warn_of_unasked_friction(run.experiment.cell)
     result = run_adaptive(run, integrator, rtol, atol, progress) if adaptive else by.run(run, progress)
@@ -264,7 +264,8 @@ def _carry_out(
 
 def _needs_rk4(integrator: str, engine: str | Engine, control_period: float | None) -> None:
     if engine != "pinocchio":
-        raise InputError(f"engine={engine!r} has the integrator 'rk4' only, found {integrator!r}")
+        expected = f"engine={engine!r} has 'rk4' only"
+        raise InputError(f"{expected}, found {integrator!r}", subject="integrator", found=integrator)
     if control_period is not None:
         expected = "sampled control needs the integrator 'rk4'"
         raise InputError(f"{expected}, found {integrator!r}", subject="control_period")
@@ -279,4 +280,4 @@ def _describe(disturbance: Disturbance) -> dict[str, Any]:
     }
 
 
-__getattr__ = names_elsewhere(__name__, ".run", "run_reference")
+__getattr__ = names_elsewhere(__name__, ".engines", "run_reference")

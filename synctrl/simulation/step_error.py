@@ -103,10 +103,9 @@ class StepError:
 
     def _sum_up(self) -> None:
         """Keep the worst of the instants seen one by one, and the last two of them for those that follow."""
-        rows = slice(0, self._count)
-        errors = np.fmax(self._gap_errors(rows), self._simpson_errors(rows))
-        k, at = np.unravel_index(errors.argmax(), errors.shape) if errors.size else (0, 0)
-        if errors.size:
+        if self._count > 2:
+            errors = self._errors(*(kept[: self._count] for kept in (self._v, self._a, self._gaps, self._h)))
+            k, at = np.unravel_index(errors.argmax(), errors.shape)
             speeds = np.abs(self._v[2 : self._count])
             speed = speeds.max(where=np.isfinite(speeds), initial=0.0)
             self.note(float(errors[k, at]), float(speed), int(at), float(self._t[k + 2]))
@@ -114,20 +113,17 @@ class StepError:
             kept[:2] = kept[self._count - 2 : self._count].copy()
         self._count = 2
 
-    def _gap_errors(self, rows: slice) -> np.ndarray:
-        """(h/6) |k_4 - k_1| of every instant; what is not finite does not count."""
-        return _finite(np.abs(self._gaps[rows][2:]) * (self._h[rows][2:, None] / 6))
+    def _errors(self, v: np.ndarray, a: np.ndarray, gaps: np.ndarray, h: np.ndarray) -> np.ndarray:
+        """Errors of every instant; what is not finite does not count.
 
-    def _simpson_errors(self, rows: slice) -> np.ndarray:
-        """What every two steps have gained against Simpson's rule, where they are equal and smooth."""
-        v, a, h = self._v[rows], self._a[rows], self._h[rows]
+        The larger one of (h/6) |k_4 - k_1|, and of what two steps that are equal and smooth have gained
+        against Simpson's rule.
+        """
+        step = h[2:, None]
         equal = (h[2:] > 0) & (np.abs(h[2:] - h[1:-1]) <= EQUAL * h[2:])
-        rule = (h[2:, None] / 3) * (a[:-2] + 4 * a[1:-1] + a[2:])
-        return _finite(np.abs(v[2:] - v[:-2] - rule) * equal[:, None])
-
-
-def _finite(errors: np.ndarray) -> np.ndarray:
-    return np.where(np.isfinite(errors), errors, 0.0)
+        rule = (step / 3) * (a[:-2] + 4 * a[1:-1] + a[2:])
+        found = np.abs(gaps[2:]) * (step / 6), np.abs(v[2:] - v[:-2] - rule) * equal[:, None]
+        return np.fmax(*(np.where(np.isfinite(errors), errors, 0.0) for errors in found))
 
 
 def step_report(

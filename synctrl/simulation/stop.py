@@ -12,8 +12,8 @@ import numpy as np
 from ..errors import SimulationError
 from ..robots.units import unit_for
 from .closed_loop import ClosedLoop
-from .disturbances import DisturbanceSchedule
 from .rates import HELD, HELD_SPRING, RUNGE_KUTTA, SWING, Rate, loop_rates
+from .schedules import DisturbanceSchedule
 
 #: a joint that moves farther than this in one step is not followed any more, rad
 FAR = 0.2
@@ -124,11 +124,6 @@ class Stop:
         speed = np.nan_to_num(np.abs(self.speed_after[list(robots)]), nan=np.inf)
         k, joint = np.unravel_index(np.argmax(speed >= 0.999 * speed.max()), speed.shape)
         return robots[int(k)], int(joint)
-
-    def place(self, robot: int | None, joint: int | None) -> str:
-        """A joint in words, or a robot."""
-        name = "the cell" if robot is None else self.loop.cell.names[robot]
-        return name if joint is None else f"joint {joint + 1} of {name}"
 
     def unit(self, turning: str, robot: int, joint: int) -> str:
         """Unit of something of a joint that has the unit `turning` for joints that turn."""

@@ -18,8 +18,8 @@ from .factors import (
     true_parameters,
     weights,
 )
+from .journal import load, trajectories
 from .sweep import Sweep
-from .table import load, trajectories
 
 __all__ = [
     "Choice",

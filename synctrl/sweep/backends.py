@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import logging
+import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
+from pathlib import Path
+from traceback import walk_stack
+from types import ModuleType
 from typing import Any
 
 from ..errors import InputError, MissingDependencyError, SweepError
-from .main_guard import check_main_guard
 from .worker import Job, Outcome, Runner, Task, run_batch
+
+GUARD = 'if __name__ == "__main__":'
 
 Batch = Sequence[Task]
 #: batches -> outcomes of each, in any order
@@ -22,19 +28,19 @@ class WorkerDied(SweepError):
 
 
 @contextlib.contextmanager
-def serial(runner: Runner) -> Iterator[Crew]:
+def serial(runner: Runner, *_: Any) -> Iterator[Crew]:
     """One run after another, in this process."""
     yield lambda batches: ([runner.outcome(task) for task in batch] for batch in batches)
 
 
 @contextlib.contextmanager
-def joblib(job: Job, workers: int) -> Iterator[Crew]:
+def joblib(runner: Runner, workers: int, *_: Any) -> Iterator[Crew]:
     """Worker processes of this machine."""
     _need("joblib")
     from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-    payload = pickled(job)
+    payload = pickled(runner.job)
 
     def crew(batches: Iterable[Batch]) -> Iterator[list[Outcome]]:
         parallel = Parallel(n_jobs=workers, backend="loky", return_as="generator_unordered", batch_size=1)
@@ -42,18 +48,18 @@ def joblib(job: Job, workers: int) -> Iterator[Crew]:
         try:
             yield from outcomes
         except TerminatedWorkerError as error:
-            raise WorkerDied(_died(str(error))) from error
+            raise _died(error) from error
 
     yield crew
 
 
 @contextlib.contextmanager
-def dask(job: Job, workers: int, client: Any) -> Iterator[Crew]:
+def dask(runner: Runner, workers: int, client: Any) -> Iterator[Crew]:
     """A Dask cluster: a client, the address of a scheduler, or None for a cluster on this machine."""
     _need("distributed", "dask[distributed]")
     from distributed import KilledWorker, as_completed
 
-    payload = pickled(job)
+    payload = pickled(runner.job)
     with _connected(client, workers) as connected:
 
         def submit(batch: Batch) -> Any:
@@ -69,11 +75,14 @@ def dask(job: Job, workers: int, client: Any) -> Iterator[Crew]:
                     for batch in islice(waiting, 1):
                         running.add(submit(batch))
             except KilledWorker as error:
-                raise WorkerDied(_died(str(error))) from error
+                raise _died(error) from error
             finally:
                 connected.cancel(list(running.futures))
 
         yield crew
+
+
+BACKENDS = {"joblib": joblib, "dask": dask, "serial": serial}
 
 
 @contextlib.contextmanager
@@ -122,8 +131,52 @@ def pickled(job: Job) -> bytes:
         return bytes(cloudpickle.dumps(job))
     except Exception as error:
         raise InputError(
-            f"this sweep cannot be sent to other processes: {error}; use backend='serial'"
+            f"it cannot be sent to other processes: {error}; use backend='serial'", subject="sweep"
         ) from error
+
+
+def check_main_guard(what: str) -> None:
+    """Refuse to start processes from a line of the main script that each of them would run again.
+
+    Nothing is refused where no script is imported again, as in a notebook or under `python -m package`.
+
+    Args:
+        what: what starts the processes.
+
+    Raises:
+        SweepError: the script is no file, or its line that is being run has no main guard; the message names
+            file and line.
+    """
+    main = sys.modules["__main__"]
+    file, spec = getattr(main, "__file__", None), getattr(main, "__spec__", None)
+    if file is None or (spec is not None and spec.name.endswith("__main__")):
+        return
+    if not Path(file).is_file():
+        raise SweepError(f"{what} starts processes that import '{file}', which is no file; put it into one")
+    line = _running_line(main)
+    if line is not None and not _is_guarded(Path(file), line):
+        raise SweepError(
+            f"{what} starts processes that import '{file}', and its line {line} would start more of them "
+            f"there; put that line below `{GUARD}`"
+        )
+
+
+def _running_line(main: ModuleType) -> int | None:
+    """The line of the main script that is being run, or None if it is another thread that runs it."""
+    for frame, line in walk_stack(sys._getframe()):
+        if frame.f_globals is vars(main) and frame.f_code.co_name == "<module>":
+            return line
+    return None
+
+
+def _is_guarded(file: Path, line: int) -> bool:
+    """Whether a line of a script stands in an `if` that asks for `__name__`."""
+    tree = ast.parse(file.read_bytes())
+    return any(
+        node.lineno <= line <= (node.end_lineno or line) and "__name__" in ast.unparse(node.test)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If)
+    )
 
 
 def _need(module: str, package: str | None = None) -> None:
@@ -131,7 +184,8 @@ def _need(module: str, package: str | None = None) -> None:
 
     if find_spec(module) is None:
         raise MissingDependencyError(
-            f"this needs {package or module}: pip install 'synctrl[sweep]'; or use backend='serial'"
+            "it is not installed: pip install 'synctrl[sweep]'; or use backend='serial'",
+            subject=package or module,
         )
 
 
@@ -142,5 +196,6 @@ def _root(error: BaseException) -> BaseException:
     return error
 
 
-def _died(message: str) -> str:
-    return f"a worker process ended in the middle of its work: {message.strip().splitlines()[0]}"
+def _died(error: Exception) -> WorkerDied:
+    reason = str(error).strip().splitlines()[0]
+    return WorkerDied(f"it ended in the middle of its work: {reason}", subject="worker process")

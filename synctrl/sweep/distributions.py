@@ -23,17 +23,10 @@ _SHORT.maxstring = LETTERS
 
 
 class Values(Protocol):
-    """Values a factor can have."""
+    """Values a factor can have; those of a distribution are drawn one by one, by `draw(rng)`."""
 
     def describe(self) -> dict[str, Any]:
         """Kind and parameters, as plain data."""
-
-
-class Distribution(Values, Protocol):
-    """Values that are drawn."""
-
-    def draw(self, rng: np.random.Generator) -> Value:
-        """One value."""
 
 
 @dataclass(frozen=True)
@@ -46,14 +39,9 @@ class _Interval:
     def __post_init__(self) -> None:
         kind = type(self).__name__
         for name in ("low", "high"):
-            object.__setattr__(self, name, self._number(f"{kind}, {name}", getattr(self, name)))
+            object.__setattr__(self, name, finite_number(f"{kind}, {name}", getattr(self, name)))
         if not self.low < self.high:
             raise InputError(f"expected low < high, found {self.low:g} and {self.high:g}", subject=kind)
-
-    @staticmethod
-    def _number(name: str, value: object) -> float:
-        """One end as a number, if it can be one."""
-        return finite_number(name, value)
 
     def at(self, share: float) -> float:
         """The value below which a share of the distribution lies, 0 <= share <= 1."""
@@ -84,7 +72,9 @@ class LogUniform(_Interval):
         InputError: not above 0, or not low < high.
     """
 
-    _number = staticmethod(positive_number)
+    def __post_init__(self) -> None:
+        positive_number("LogUniform, low", self.low)
+        super().__post_init__()
 
     def at(self, share: float) -> float:
         return float(np.clip(self.low * (self.high / self.low) ** share, self.low, self.high))

@@ -3,35 +3,23 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Sequence
-from itertools import islice
-from pathlib import Path
+from collections.abc import Callable, Iterator, Sequence
 from time import perf_counter
-from typing import Any, TypedDict
+from typing import Any
 
 from ..checks import choice, count
-from . import backends
-from .doubts import Doubts
-from .journal import KEPT, Journal
+from .backends import BACKENDS, WorkerDied
+from .journal import Journal, kept_file
+from .measures import Doubt
 from .rows import Row
 from .worker import Job, Outcome, Runner, Task
 
-BACKENDS = ("joblib", "dask", "serial")
 #: how long a batch should take, s: what it costs to send one is then far below a hundredth of it
 BATCH_TIME = 1.0
 #: batches per worker at least, so that all of them have something to do until the end
 SHARES = 4
 #: how often the rest is begun again after a worker has died without a single run being finished in between
 RETRIES = 2
-
-
-class CrewOptions(TypedDict, total=False):
-    """Who makes the runs of a sweep or a search: arguments of `Evaluation`, which says what they mean."""
-
-    workers: int
-    backend: str
-    client: Any
-    batch: int | None
 
 
 class Evaluation:
@@ -47,7 +35,7 @@ class Evaluation:
 
     Attributes:
         rows: of all runs that are made, by number of the run.
-        doubts: what is to be doubted of those that were made here.
+        doubts: what is to be doubted of those that were made here, to their end, by number of the run.
     """
 
     def __init__(
@@ -60,23 +48,17 @@ class Evaluation:
         batch: int | None = None,
     ):
         self.workers, self._batch = count("workers", workers), batch
-        self._backend, self._client = choice("backend", backend, BACKENDS), client
+        self._backend, self._client = choice("backend", backend, tuple(BACKENDS)), client
         if batch is not None:
             count("batch", batch)
         self._runner, self._journal = Runner(job), journal  # whatever has to be compiled is compiled here
         self.rows: dict[int, Row] = {} if journal is None else journal.rows
-        self.doubts = Doubts()
+        self.doubts: dict[int, Doubt] = {}
 
     @contextlib.contextmanager
     def open(self) -> Iterator[None]:
         """Have the workers ready."""
-        job = self._runner.job
-        crews = {
-            "serial": lambda: backends.serial(self._runner),
-            "joblib": lambda: backends.joblib(job, self.workers),
-            "dask": lambda: backends.dask(job, self.workers, self._client),
-        }
-        with crews[self._backend]() as self._crew:
+        with BACKENDS[self._backend](self._runner, self.workers, self._client) as self._crew:
             yield
 
     def run(self, tasks: Sequence[Task]) -> Iterator[list[Row]]:
@@ -93,10 +75,12 @@ class Evaluation:
         attempts = RETRIES
         while todo:
             try:
-                for outcomes in self._crew(batches(todo, self._batch or 1)):
+                size = self._batch or 1
+                batches = (todo[k : k + size] for k in range(0, len(todo), size))
+                for outcomes in self._crew(batches):
                     yield self._write(outcomes)
                 return
-            except backends.WorkerDied:
+            except WorkerDied:
                 left = [task for task in todo if task.run not in self.rows]
                 attempts = RETRIES if len(left) < len(todo) else attempts - 1
                 if attempts < 0:
@@ -117,8 +101,7 @@ class Evaluation:
 
     def _write(self, outcomes: Sequence[Outcome]) -> list[Row]:
         rows = [outcome.row for outcome in outcomes]
-        for outcome in outcomes:
-            self.doubts.add(outcome.row[0], outcome.doubt)
+        self.doubts.update({each.row[0]: each.doubt for each in outcomes if each.doubt is not None})
         if self._journal is None:
             self.rows.update({row[0]: row for row in rows})
             return rows
@@ -129,16 +112,8 @@ class Evaluation:
         return rows
 
 
-def batches(tasks: Sequence[Task], size: int) -> Iterator[list[Task]]:
-    """The tasks in lists of a size."""
-    waiting = iter(tasks)
-    while batch := list(islice(waiting, size)):
-        yield batch
-
-
-def kept_file(folder: str | Path, run: int) -> Path:
-    """Where the trajectories of a run are kept."""
-    return Path(folder) / KEPT / f"{run:06d}.npz"
+#: an evaluation of a job and a journal, if there is one, by workers that were chosen before
+Evaluator = Callable[[Job, Journal | None], Evaluation]
 
 
 def progress_bar(total: int, done: int, shown: bool) -> Any:

@@ -8,9 +8,7 @@ from functools import partial
 from types import NoneType
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from ..checks import choice, instance, positive_number
+from ..checks import choice, count, instance, positive_number
 from ..control.gains import Gains
 from ..errors import InputError
 from ..simulation.result import Result
@@ -211,9 +209,6 @@ def _indexed(name: str, values: Values, change: Change, **indices: int | None) -
 def _name(name: str, **indices: int | None) -> str:
     """`name`, with the indices that are given: `true_parameters_robot0_body1`."""
     for what, index in indices.items():
-        if index is None:
-            continue
-        if isinstance(index, bool) or not isinstance(index, (int, np.integer)) or index < 0:
-            raise InputError(f"expected the index of a {what}, counted from 0, found {index!r}", subject=name)
-        name += f"_{what}{index}"
+        if index is not None:
+            name += f"_{what}{count(what, index, least=0)}"
     return name

@@ -17,13 +17,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, Self
 
-from ..errors import ResultError
+from ..checks import count
+from ..errors import MissingDependencyError, ResultError
 from ..files import read_regular, reported, write_whole
+from ..simulation.result import Result
 from .description import ABOUT, FORMAT, difference, read_about, row_format
 from .distributions import Value
-from .rows import Format, Row, Runs, fault_of_values, line_of, wrong_line
+from .rows import Draws, Format, Generations, Row, fault_of_values, line_of, wrong_line
 
 RUNS, TABLE, KEPT = "runs.jsonl", "table.csv", "runs"
+#: columns that are text; all others are numbers, unless a factor's values are words
+TEXT = ("status", "cause")
 
 
 class Journal:
@@ -64,7 +68,7 @@ class Journal:
             )
         return None
 
-    def begin(self, about: Mapping[str, Any], runs: Runs) -> None:
+    def begin(self, about: Mapping[str, Any], runs: Draws | Generations) -> None:
         """Write what the sweep is, or compare it with what is written; and read the runs that are done.
 
         Args:
@@ -147,21 +151,67 @@ class Journal:
             ) from error
 
 
-def read_rows(folder: str | Path, about: Mapping[str, Any]) -> dict[int, Row]:
-    """Rows of the finished runs in a folder, by number; an incomplete last line does not count.
+def load(folder: str | Path) -> Any:
+    """The rows of all finished runs, also of a sweep that is not finished.
+
+    `table.attrs` has what the sweep is: factors, measures with their definitions and units, versions.
 
     Args:
-        folder: where.
-        about: what its description says, see `read_about`.
+        folder: what `Sweep.run` was given.
+
+    Returns:
+        A pandas DataFrame with the numbers of the runs as its index, sorted; `table.to_xarray()` makes an
+        xarray Dataset of it.
 
     Raises:
-        ResultError: the file cannot be read.
-        SweepFileError: a complete line that cannot be of this sweep; the message names file and line.
+        ResultError: no sweep, or one that is damaged; the message names the file.
+        SweepFileError: a line that cannot be of this sweep; the message names the file and the line.
+        MissingDependencyError: pandas is not installed.
     """
+    try:
+        import pandas as pd
+    except ImportError as error:
+        raise MissingDependencyError("reading a table needs pandas: pip install 'synctrl[sweep]'") from error
+    about = read_about(folder)
+    columns = about["columns"]
     path = Path(folder) / RUNS
     with reported("read", path):
         content = read_regular(path) if path.exists() else b""
-    return row_format(about).read(path, content)
+    rows = row_format(about).read(path, content)
+    table = pd.DataFrame([rows[run] for run in sorted(rows)], columns=columns)
+    for name in columns[1:]:
+        if name in TEXT or any(isinstance(value, str) for value in table[name]):
+            table[name] = table[name].astype(object).where(table[name].notna(), "")
+        else:
+            table[name] = table[name].astype(float)
+    table = table.astype({"run": int}).set_index("run")
+    table.attrs.update(about)
+    return table
+
+
+def trajectories(folder: str | Path, run: int) -> Result:
+    """The trajectories that were kept of a run, see `keep_every` of `Sweep.run`.
+
+    Raises:
+        InputError: no number of a run.
+        ResultError: none were kept, or the file is damaged or of another run.
+    """
+    read_about(folder)
+    path = kept_file(folder, count("run", run, least=0))
+    if not path.is_file():
+        raise ResultError(
+            f"no trajectories of run {run} in '{folder}': run the sweep with keep_every", file=path
+        )
+    result = Result.load(path)
+    if result.info.get("run") != run:
+        found = result.info.get("run")
+        raise ResultError(f"'{path}': expected run {run}, found run {found!r}", file=path, found=found)
+    return result
+
+
+def kept_file(folder: str | Path, run: int) -> Path:
+    """Where the trajectories of a run are kept."""
+    return Path(folder) / KEPT / f"{run:06d}.npz"
 
 
 def lock(file: IO[bytes], folder: Path) -> None:

@@ -1,8 +1,8 @@
-"""What a sweep keeps of a run: a few numbers over all robots, pairs and axes."""
+"""What a sweep keeps of a run: a few numbers over all robots, pairs and axes, and whether to trust them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -13,13 +13,13 @@ from ..analysis.metrics import (
     ERRORS,
     SETTLING_FRACTION,
     Band,
-    ErrorMetrics,
     Metrics,
     finite_or_none,
     metrics,
 )
 from ..analysis.metrics import squared as squared_unit
 from ..coupling.cell import Cell
+from ..errors import SaturationWarning, StepWarning, warn
 from ..robots.units import joined, unit_for
 from ..simulation.result import Result
 from ..simulation.step_error import LIMIT
@@ -32,15 +32,21 @@ class Measure(NamedTuple):
     unit: str
 
 
-#: how the values of all robots (or pairs) and axes become one
-_OVER_ALL: Mapping[str, str] = MappingProxyType(
+#: how the values of all robots (or pairs) and axes become one: in words, and as a function of them
+_OVER_ALL: Mapping[str, tuple[str, Callable[[np.ndarray], Any]]] = MappingProxyType(
     {
-        "peak": "the largest over all {rows} and axes",
-        "rms": "the root of the mean of the squares over all {rows} and axes",
-        "ise": "the sum over all {rows} and axes",
-        "final": "the largest over all {rows} and axes, without its sign",
-        "settling_time": "the latest over all {rows} and axes; empty if one has not settled; the band is "
-        f"{SETTLING_FRACTION:.0%} of the largest error of the run of the base experiment",
+        "peak": ("the largest over all {rows} and axes", np.max),
+        "rms": (
+            "the root of the mean of the squares over all {rows} and axes",
+            lambda x: np.sqrt(np.mean(x**2)),
+        ),
+        "ise": ("the sum over all {rows} and axes", np.sum),
+        "final": ("the largest over all {rows} and axes, without its sign", lambda x: np.abs(x).max()),
+        "settling_time": (
+            "the latest over all {rows} and axes; empty if one has not settled; the band is "
+            f"{SETTLING_FRACTION:.0%} of the largest error of the run of the base experiment",
+            np.max,
+        ),
     }
 )
 _SHORT = {"tracking_error": "tracking", "sync_error": "sync"}
@@ -70,7 +76,7 @@ def definitions(cell: Cell) -> dict[str, Measure]:
     for kind, unit in units.items():
         square = joined(f"{squared_unit(each)}·s" for each in unit.split(", "))
         special = {"ise": square, "settling_time": "s"}
-        for name, how in _OVER_ALL.items():
+        for name, (how, _) in _OVER_ALL.items():
             text = f"{DEFINITIONS[name].split(';')[0]}; {how.format(rows=_ROWS[kind])}"
             found[f"{_SHORT[kind]}_{name}"] = Measure(text, special.get(name, unit))
     text = f"{DEFINITIONS['peak_torque']}; the largest over all robots and joints"
@@ -91,7 +97,11 @@ def measures(result: Result, bands: Mapping[str, Band]) -> list[float | None]:
     """
     with np.errstate(over="ignore", invalid="ignore"):
         computed: Metrics = metrics(result, bands)
-        values: list[Any] = [value for kind in ERRORS for value in _over_all(getattr(computed, kind))]
+        values: list[Any] = [
+            over_all(getattr(getattr(computed, kind), name))
+            for kind in ERRORS
+            for name, (_, over_all) in _OVER_ALL.items()
+        ]
     values += [computed.peak_torque.max(), cut_off(result), (result.info["step_error"] or {}).get("estimate")]
     return [finite_or_none(value) for value in values]
 
@@ -101,12 +111,58 @@ def cut_off(result: Result) -> float:
     return max((entry["share"] for entry in result.info["saturation"]), default=0.0)
 
 
-def _over_all(error: ErrorMetrics) -> list[float]:
-    """In the order of `_OVER_ALL`."""
-    return [
-        error.peak.max(),
-        np.sqrt(np.mean(error.rms**2)),
-        error.ise.sum(),
-        np.abs(error.final).max(),
-        error.settling_time.max(),
-    ]
+class Doubt(NamedTuple):
+    """Why the measures of one run are to be doubted.
+
+    Attributes:
+        estimate: error of its worst step, as a share of its largest velocity; None if its step will do.
+        advised: a step that does, s, or None.
+        share: of the instants at which the torque of a joint was cut off, the largest; 0 if none was.
+    """
+
+    estimate: float | None
+    advised: float | None
+    share: float
+
+
+def doubt_of(result: Result) -> Doubt:
+    """What is to be doubted of a run, by its `info`."""
+    step = result.info["step_error"] or {}
+    advised = step.get("advised_step")
+    return Doubt(None if advised is None else step["estimate"], advised, cut_off(result))
+
+
+def warn_of(doubts: Mapping[int, Doubt], what: str, dt: float) -> None:
+    """Warn whoever called the package, once of each kind, of what a single run would warn of.
+
+    Args:
+        doubts: of runs that went to their end, by number of the run.
+        what: made the runs, for the message.
+        dt: their step, s.
+    """
+    all_runs = f"of the {len(doubts)} runs that were made to their end"
+    errors = {run: doubt.estimate for run, doubt in doubts.items() if doubt.estimate is not None}
+    if errors:
+        worst = _largest(errors)
+        shortest = min(doubt.advised for doubt in doubts.values() if doubt.advised is not None)
+        warn(
+            f"{what}: dt = {dt:g} s is too long in {len(errors)} {all_runs}; in run {worst} a step errs by "
+            f"{errors[worst]:.2g} of the largest velocity, expected at most {LIMIT:g}. Begin again with a "
+            f"step of at most {shortest:g} s",
+            StepWarning,
+        )
+    shares = {run: doubt.share for run, doubt in doubts.items() if doubt.share > 0}
+    if shares:
+        worst = _largest(shares)
+        warn(
+            f"{what}: torque was cut off in {len(shares)} {all_runs}, most in run {worst}, at one joint for "
+            f"{shares[worst]:.0%} of the time. Estimates and integrals of the synchronization errors went on "
+            "meanwhile as if the robots had got it; lower the gains or their ranges, or ask for a slower "
+            "motion",
+            SaturationWarning,
+        )
+
+
+def _largest(values: Mapping[int, float]) -> int:
+    """The run with the largest value, the first one if there are more: whoever made it, and when."""
+    return max(values, key=lambda run: (values[run], -run))

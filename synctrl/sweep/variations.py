@@ -16,7 +16,7 @@ from ..robots.base_parameters import BaseParameters
 from ..robots.friction_parameters import FrictionParameters
 from ..robots.parameters import FullParameters, LinearParameters, Parameters
 from ..robots.robot import Robot
-from ..simulation.disturbances import Disturbance
+from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
 from .distributions import Value
 
@@ -92,30 +92,23 @@ def with_scaled_disturbance(experiment: Experiment, value: float, disturbance: i
 
 def with_disturbance_from(experiment: Experiment, value: float, disturbance: int) -> Experiment:
     """A disturbance that starts at another time and lasts as long as before."""
-
-    def move(d: Disturbance) -> Disturbance:
-        return replace(d, start=value, stop=value + (d.stop - d.start))
-
-    return _with_disturbance(experiment, disturbance, move)
+    return _with_disturbance(
+        experiment, disturbance, lambda d: replace(d, start=value, stop=value + (d.stop - d.start))
+    )
 
 
 def with_scaled_weights(experiment: Experiment, value: float, robot: int | None = None) -> Experiment:
     """Weights c_i of the coupling times a number."""
-    cell = experiment.cell
+    cell, old = experiment.cell, experiment.cell.coupling
     scale = np.ones((cell.n, 1, 1))
     scale[_index("robot", robot, cell.n)] = value
-    coupling = scaled_coupling(cell.coupling, cell.m, scale)
-    return replace(experiment, cell=Cell(cell.members, coupling, cell.space, cell.name))
-
-
-def scaled_coupling(coupling: Coupling, m: int, scale: np.ndarray) -> Coupling:
-    """A coupling with its weights times a number for each robot, (n, 1, 1); in space of dimension m."""
 
     def at(t: float) -> tuple[Any, ...]:
-        return tuple(scale * part[0] for part in coupling.weights(np.array([t]), m)[:3])
+        return tuple(scale * part[0] for part in old.weights(np.array([t]), cell.m)[:3])
 
-    c = at(0.0)[0] if coupling.is_constant else at
-    return Coupling(coupling.robots, coupling.edges, coupling.signs, c, coupling.name, coupling.unit)
+    c = at(0.0)[0] if old.is_constant else at
+    coupling = Coupling(old.robots, old.edges, old.signs, c, old.name, old.unit)
+    return replace(experiment, cell=Cell(cell.members, coupling, cell.space, cell.name))
 
 
 def same_parameters(parameters: Parameters, robot: Robot) -> Parameters:

@@ -1,8 +1,8 @@
-"""What equations leave to linear algebra: LAPACK for numbers, something else for symbols."""
+"""What equations leave to linear algebra: LAPACK for numbers, something else for symbols; and padded rows."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -40,10 +40,6 @@ def _inverse(A: np.ndarray) -> np.ndarray:
         return result
 
 
-def _determinant(A: np.ndarray) -> np.ndarray:
-    return np.linalg.det(A)[..., None]
-
-
 def _smallest(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """NaN only for the matrices that are not finite, so that the run's guard can name the robot."""
     finite = np.isfinite(A).all(axis=(-2, -1), keepdims=True)
@@ -53,4 +49,12 @@ def _smallest(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 #: of numbers
-LAPACK = Algebra(_inverse, _determinant, _smallest)
+LAPACK = Algebra(_inverse, lambda A: np.linalg.det(A)[..., None], _smallest)
+
+
+def padded(rows: Sequence[np.ndarray]) -> np.ndarray:
+    """Rows of different lengths as one array, (n, longest), filled up with zeros."""
+    array = np.zeros((len(rows), max(len(row) for row in rows)))
+    for target, row in zip(array, rows, strict=True):
+        target[: len(row)] = row
+    return array

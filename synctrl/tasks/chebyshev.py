@@ -107,7 +107,7 @@ class SmoothFunction:
         return np.clip(np.searchsorted(self._starts, times, side="right") - 1, 0, None)
 
 
-def certify(function: Function, duration: float, breaks: Iterable[float] = ()) -> SmoothFunction:
+def fit_smooth(function: Function, duration: float, breaks: Iterable[float] = ()) -> SmoothFunction:
     """Polynomials for a function of time with rows for n robots, (n, m, m), accurate as `tolerances` says.
 
     Args:

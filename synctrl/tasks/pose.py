@@ -30,10 +30,10 @@ class BoundPoseSpace(BoundTipSpace):
         turning = np.matvec(left, wd)
         left_dot = rotations.left_jacobian_inverse_dot(e[..., 3:], turning - x_dot[..., 3:])
         J_o_dot = left_dot.mT @ J_t[..., 3:, :] + left.mT @ J_t_dot[..., 3:, :]
-        J_dot = _below(J_t_dot[..., :3, :], J_o_dot)
+        J_dot = np.append(J_t_dot[..., :3, :], J_o_dot, axis=-2)
         inversion = self._inverse.invert(J, J_dot, *motion)
         turning_dot = np.matvec(left_dot, wd) + np.matvec(left, wd_dot)
-        rates = np.stack((_beside(xd_dot[..., :3], turning), _beside(xd_ddot[..., :3], turning_dot)))
+        rates = np.append(desired[1:, ..., :3], np.stack((turning, turning_dot)), axis=-1)
         moved, error = np.stack((x, x_dot)), np.stack((e, rates[0] - x_dot))
         return Measurement(moved, error, rates, J, inversion.J_inv, J_dot, inversion)
 
@@ -52,9 +52,7 @@ class PoseSpace(TipSpace):
     Condition numbers and damping thresholds mix metres and radians here.
 
     Args:
-        max_condition: a Jacobian with a larger condition number counts as singular.
-        singularity: "stop" ends a run at a singular Jacobian with an error. "damped", or a `Damping`, goes
-            on with damped least squares; the result's `info["damping"]` then says when and how much.
+        max_condition, singularity: see `CartesianSpace`.
         redundancy: what arms with more than six joints do with the rest.
 
     Raises:
@@ -110,13 +108,6 @@ def compare(
     """
     e_o, phi = rotations.log(np.stack((rotations.exp(target[..., 3:]) @ R.mT, R)))
     left = rotations.left_jacobian_inverse(e_o)
-    task_J = _below(J[..., :3, :], left.mT @ J[..., 3:, :])
-    return _beside(position, phi), _beside(target[..., :3] - position, e_o), task_J, left
-
-
-def _beside(linear: np.ndarray, angular: np.ndarray) -> np.ndarray:
-    return np.concatenate((linear, angular), axis=-1)
-
-
-def _below(linear: np.ndarray, angular: np.ndarray) -> np.ndarray:
-    return np.concatenate((linear, angular), axis=-2)
+    task_J = np.append(J[..., :3, :], left.mT @ J[..., 3:, :], axis=-2)
+    x, e = np.append(position, phi, axis=-1), np.append(target[..., :3] - position, e_o, axis=-1)
+    return x, e, task_J, left

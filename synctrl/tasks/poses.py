@@ -13,10 +13,10 @@ from typing import Any, NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, finite_number, instance, positive_number
-from ..errors import InputError, TrajectoryError
+from ..checks import finite_array, finite_number, instance, offers, positive_number
+from ..errors import InputError
 from . import rotations
-from .trajectories import Cubic, Hold, Motion, Trajectory
+from .trajectories import Cubic, Hold, Motion, Trajectory, value_at
 
 
 class Turning(NamedTuple):
@@ -131,14 +131,11 @@ class FunctionOrientation:
 
     def _at(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         rotation, velocity, acceleration = self._functions
-        try:
-            return (
-                rotations.rotation_matrix("rotation", rotation(t)),
-                finite_array("velocity", velocity(t), (3,)),
-                finite_array("acceleration", acceleration(t), (3,)),
-            )
-        except InputError as error:
-            raise TrajectoryError(f"{error}", subject=f"orientation at t = {t:g} s") from error
+        return (
+            value_at("rotation", rotation, t, rotations.rotation_matrix),
+            value_at("velocity", velocity, t, finite_array, (3,)),
+            value_at("acceleration", acceleration, t, finite_array, (3,)),
+        )
 
 
 class PoseTrajectory:
@@ -158,10 +155,7 @@ class PoseTrajectory:
         _check_dimension("position", position, 3)
         self.position = position
         self.orientation = AxisRotation.fixed(np.eye(3)) if orientation is None else orientation
-        if not callable(self.orientation) or not hasattr(self.orientation, "breaks"):
-            raise InputError(
-                f"expected an orientation such as AxisRotation, found {orientation!r}", subject="orientation"
-            )
+        offers("orientation", self.orientation, ("__call__", "breaks"), "an orientation such as AxisRotation")
         self.breaks = tuple(sorted({*position.breaks, *self.orientation.breaks}))
 
     def __call__(self, t: ArrayLike) -> Motion:
@@ -211,7 +205,7 @@ def _check_dimension(name: str, trajectory: Any, m: int) -> None:
     if dimension != m:
         numbers = f"{m} number{'s' * (m != 1)}"
         found = repr(trajectory) if dimension is None else f"one of {dimension}"
-        raise InputError(f"expected a trajectory of {numbers}, found {found}", subject=name)
+        raise InputError(f"expected a trajectory of {numbers}, found {found}", subject=name, found=dimension)
 
 
 def _unit(name: str, vector: ArrayLike) -> np.ndarray:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,10 +21,10 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, non_negative_number, positive_number
 from ..errors import InputError
 from ..robots.robot import Robot
-from .algebra import LAPACK, Algebra
-from .padding import padded
+from .algebra import LAPACK, Algebra, padded
 
 Posture = tuple[np.ndarray, np.ndarray, np.ndarray]
+Joints = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,52 +119,35 @@ class Inversion(NamedTuple):
     damping_rate: Any = None
 
 
-class Inverted(Protocol):
-    """What a way to joint space needs to know of an instant; a `Measurement` does."""
-
-    J: Any
-    J_inv: Any
-    J_dot: Any
-    inversion: Any
-
-
-class InverseMap(Protocol):
-    """A way from task space to joint space."""
-
-    @property
-    def algebra(self) -> Algebra:
-        """Of the numbers, or symbols, that it works on."""
-
-    def invert(self, J: np.ndarray, J_dot: np.ndarray, q: np.ndarray, v: np.ndarray) -> Inversion:
-        """Everything about this instant that does not depend on the reference."""
-
-    def to_joints(
-        self, task: Inverted, xref_dot: np.ndarray, xref_ddot: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """v_ref and a_ref = d/dt v_ref, (..., nv), from the reference in task space, (..., m)."""
-
-
 class Inverse:
     """J^-1, for robots with as many joints as task coordinates.
 
     v_ref = J^-1 xref', a_ref = J^-1 (xref'' - J' v_ref).
+
+    Args:
+        algebra: of the numbers, or symbols, that it works on.
     """
 
     def __init__(self, algebra: Algebra = LAPACK):
         self.algebra = algebra
 
     def invert(self, J: np.ndarray, J_dot: np.ndarray, q: np.ndarray, v: np.ndarray) -> Inversion:
+        """Everything about this instant that does not depend on the reference."""
         return Inversion(self.algebra.inverse(J))
 
-    def to_joints(
-        self, task: Inverted, xref_dot: np.ndarray, xref_ddot: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def to_joints(self, task: Any, xref_dot: np.ndarray, xref_ddot: np.ndarray) -> Joints:
+        """v_ref and a_ref = d/dt v_ref, (..., nv), from the reference in task space, (..., m).
+
+        Args:
+            task: J, J_inv, J_dot and inversion of this instant, for example a `Measurement`.
+            xref_dot, xref_ddot: the reference.
+        """
         J_inv = task.J_inv
         v_ref = np.matvec(J_inv, xref_dot)
         return v_ref, np.matvec(J_inv, xref_ddot - np.matvec(task.J_dot, v_ref))
 
 
-class Pseudoinverse:
+class Pseudoinverse(Inverse):
     """J# = W^-1 J^T G with G = (J W^-1 J^T)^-1, and a posture task in its null space.
 
     With mu = G (xref' - J zeta):
@@ -181,14 +164,13 @@ class Pseudoinverse:
     """
 
     def __init__(self, W_inv: np.ndarray, posture: np.ndarray, gain: np.ndarray, algebra: Algebra = LAPACK):
-        self.W_inv, self.posture, self.gain, self.algebra = W_inv, posture, gain, algebra
+        super().__init__(algebra)
+        self.W_inv, self.posture, self.gain = W_inv, posture, gain
 
     def invert(self, J: np.ndarray, J_dot: np.ndarray, q: np.ndarray, v: np.ndarray) -> Inversion:
         return self._inversion(J, q, v)
 
-    def to_joints(
-        self, task: Inverted, xref_dot: np.ndarray, xref_ddot: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def to_joints(self, task: Any, xref_dot: np.ndarray, xref_ddot: np.ndarray) -> Joints:
         J, J_dot, inversion = task.J, task.J_dot, task.inversion
         J_inv, G, zeta, zeta_dot = inversion[:4]
         gap = xref_dot - np.matvec(J, zeta)
@@ -250,7 +232,7 @@ def velocity_lost(J: np.ndarray, v_ref: np.ndarray, xref_dot: np.ndarray) -> np.
 
 def inverse_map(
     square: bool, damping: Damping | None, posture: Posture, algebra: Algebra = LAPACK
-) -> InverseMap:
+) -> Inverse:
     """The way to the joints of robots.
 
     Args:

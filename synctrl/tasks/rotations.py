@@ -114,12 +114,6 @@ def left_jacobian_inverse_dot(phi: np.ndarray, phi_dot: np.ndarray) -> np.ndarra
     return -0.5 * K_dot + growth * (K @ K) + b * (product + product.mT)
 
 
-def rotation_from_rpy(rpy: ArrayLike) -> np.ndarray:
-    """Rotation about the fixed axes x, y, z in that order, (3, 3), from three angles, rad."""
-    x, y, z = finite_array("rpy", rpy, (3,))[:, None] * _EYE
-    return exp(z) @ exp(y) @ exp(x)
-
-
 def rotation_matrix(name: str, value: ArrayLike) -> np.ndarray:
     """`value` if it is a rotation matrix.
 

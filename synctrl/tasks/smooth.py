@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance, positive_number
-from ..errors import InputError, TrajectoryError
+from ..errors import TrajectoryError
 from . import rotations
-from .chebyshev import Function, NotSmoothError, SmoothFunction, certify
+from .chebyshev import Function, NotSmoothError, SmoothFunction, fit_smooth
 from .poses import Turning
-from .trajectories import MOTION_PARTS, Motion, finite_value
+from .trajectories import MOTION_PARTS, Motion, value_at
 
 
 class SmoothTrajectory:
@@ -37,7 +37,7 @@ class SmoothTrajectory:
         self.dimension = int(np.size(position(0.0)))
 
         def rows(t: float) -> np.ndarray:
-            return finite_value("position", position, t, (self.dimension,))[None, :, None]
+            return value_at("position", position, t, finite_array, (self.dimension,))[None, :, None]
 
         self._function, self.breaks = _certified(rows, duration, breaks)
         self.duration = self._function.duration
@@ -60,8 +60,7 @@ class SmoothOrientation:
 
     Args:
         rotation: function of t returning a rotation matrix, (3, 3); smooth between the breaks.
-        duration: it can be used from 0 to this time, s.
-        breaks: instants at which a derivative jumps, s.
+        duration, breaks: see `SmoothTrajectory`.
 
     Raises:
         InputError: no function, a duration that is not positive, or breaks that are no numbers.
@@ -72,11 +71,7 @@ class SmoothOrientation:
         instance("rotation", rotation, Callable, "a function of time")  # type: ignore[arg-type]
 
         def matrices(t: float) -> np.ndarray:
-            value = finite_value("rotation", rotation, t, (3, 3))
-            try:
-                return rotations.rotation_matrix("rotation", value)[None]
-            except InputError as error:
-                raise TrajectoryError(f"{error}", subject=f"orientation at t = {t:g} s") from error
+            return value_at("rotation", rotation, t, rotations.rotation_matrix)[None]
 
         self._function, self.breaks = _certified(matrices, duration, breaks)
         self.duration = self._function.duration
@@ -100,12 +95,12 @@ def _certified(
     """A function of shape (1, a, b) from 0 to `duration`, and its breaks."""
     instants = tuple(finite_array("breaks", breaks, (None,)).tolist())
     try:
-        return certify(function, positive_number("duration", duration), instants), instants
+        return fit_smooth(function, positive_number("duration", duration), instants), instants
     except NotSmoothError as error:
         raise TrajectoryError(
             f"the {MOTION_PARTS[error.order]} cannot be found: {error}, with `breaks` where a derivative "
             "jumps"
-        ) from None
+        ).about(MOTION_PARTS[error.order], time=error.time) from None
 
 
 def _at(function: SmoothFunction, times: np.ndarray) -> np.ndarray:
@@ -115,7 +110,7 @@ def _at(function: SmoothFunction, times: np.ndarray) -> np.ndarray:
         raise TrajectoryError(
             f"expected a time from 0 to {function.duration:g} s, for which the motion was made, found "
             f"t = {outside:g} s; make it for a longer duration"
-        )
+        ).about("t", found=outside)
     return function.at(times)[:, :, 0]
 
 

@@ -18,12 +18,11 @@ from ..checks import choice, instance, positive_number
 from ..errors import InputError
 from ..robots.robot import Robot
 from .algebra import LAPACK, Algebra
+from .measurement import Kinematics, Tips
 from .measurement import Measurement as Measurement
-from .redundancy import Damping, InverseMap, Posture, Redundancy, inverse_map
-from .tips import Kinematics, Tips
+from .redundancy import Damping, Inverse, Joints, Posture, Redundancy, inverse_map
 
 AXES = "xyz"
-Joints = tuple[np.ndarray, np.ndarray]
 
 
 class BoundSpace(Protocol):
@@ -149,7 +148,7 @@ class BoundTipSpace(ABC):
         square: which robots have as many joints as there are task coordinates, (..., 1).
     """
 
-    def __init__(self, space: Any, tips: Kinematics, inverse: InverseMap, square: np.ndarray):
+    def __init__(self, space: Any, tips: Kinematics, inverse: Inverse, square: np.ndarray):
         self._space, self._tips, self._inverse, self._square = space, tips, inverse, square
         self.limits, self.to_joints = space.limits, inverse.to_joints
 
@@ -187,10 +186,7 @@ class TipSpace(ABC):
 
     Args:
         m: number of task coordinates.
-        max_condition: a Jacobian with a larger condition number counts as singular.
-        singularity: "stop" ends a run at a singular Jacobian with an error. "damped", or a `Damping`, goes
-            on with damped least squares; the result's `info["damping"]` then says when and how much.
-        redundancy: what arms do with joints that the task leaves free.
+        max_condition, singularity, redundancy: see `CartesianSpace`.
 
     Raises:
         InputError: another word, or a limit that is not positive.
@@ -205,7 +201,9 @@ class TipSpace(ABC):
         self.m = m
         self.redundancy = Redundancy() if redundancy is None else redundancy
         instance("redundancy", self.redundancy, Redundancy, "a Redundancy")
-        self.damping = _damping(singularity)
+        self.damping = singularity if isinstance(singularity, Damping) else None
+        if self.damping is None and choice("singularity", singularity, ("stop", "damped")) == "damped":
+            self.damping = Damping()
         limit = positive_number("max_condition", max_condition)
         self.max_condition = limit if self.damping is None else np.inf
 
@@ -223,11 +221,8 @@ class TipSpace(ABC):
         """
         for robot in robots:
             if robot.nv < self.m:
-                raise InputError(
-                    f"expected robots with at least {self.m} joints, "
-                    f"found robot '{robot.name}' with {robot.nv}",
-                    subject=repr(self),
-                )
+                expected = f"expected robots with at least {self.m} joints"
+                raise InputError(f"{expected}, found '{robot.name}' with {robot.nv}", subject=repr(self))
         return self.over(Tips(robots), [[robot.nv] for robot in robots], self.redundancy.spread(robots))
 
     def over(
@@ -292,9 +287,3 @@ class CartesianSpace(TipSpace):
 
     def __repr__(self) -> str:
         return f"CartesianSpace('{self.axes}')"
-
-
-def _damping(singularity: str | Damping) -> Damping | None:
-    if isinstance(singularity, Damping):
-        return singularity
-    return Damping() if choice("singularity", singularity, ("stop", "damped")) == "damped" else None

@@ -7,7 +7,7 @@ A trajectory is called with one time or with an array of times and returns `Moti
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -193,24 +193,28 @@ class FunctionTrajectory:
     def __call__(self, t: ArrayLike) -> Motion:
         times = np.asarray(t, dtype=float)
         parts = [
-            [finite_value(name, function, tk, (self.dimension,)) for tk in times.ravel().tolist()]
+            [value_at(name, function, tk, finite_array, (self.dimension,)) for tk in times.ravel().tolist()]
             for name, function in self._functions.items()
         ]
         return Motion(*(np.array(part).reshape(*times.shape, self.dimension) for part in parts))
 
 
-def finite_value(name: str, function: Callable, t: float, shape: tuple[int, ...]) -> np.ndarray:
-    """What a function of one time gives at t.
+def value_at(name: str, function: Callable, t: float, check: Callable, *expected: Any) -> np.ndarray:
+    """What a function of one time gives at t, checked.
+
+    Args:
+        name: of the function, for messages.
+        function: of t.
+        t: s.
+        check: `finite_array` or another that raises an `InputError`, called with name, value and `expected`.
 
     Raises:
-        TrajectoryError: another shape, or numbers that are not finite; with the time.
+        TrajectoryError: what `check` refuses; with the time.
     """
     try:
-        return finite_array(name, function(t), shape)
+        return check(name, function(t), *expected)
     except InputError as error:
-        failure = TrajectoryError(f"{error} at t = {t:g} s")
-        failure.subject, failure.found = name, error.found
-        raise failure from error
+        raise TrajectoryError(f"{error} at t = {t:g} s").about(name, found=error.found, time=t) from error
 
 
 def _times(factor: np.ndarray, vector: np.ndarray) -> np.ndarray:

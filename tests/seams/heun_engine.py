@@ -1,6 +1,6 @@
 """An engine of one's own: the trapezoidal predictor-corrector of second order, for continuous control."""
 
-from synctrl.simulation.run import collect
+from synctrl.simulation.engines import collect
 
 
 class Heun:

@@ -24,7 +24,7 @@ from synctrl import (
     PoseSpace,
     load_robot,
 )
-from synctrl.compiled import build, cache, elf, program
+from synctrl.compiled import build, cache, program
 from synctrl.compiled.program import Program
 from synctrl.errors import CompilationError
 from synctrl.robots.catalog import catalog_names
@@ -182,8 +182,8 @@ def test_every_cut_of_a_real_library_is_noticed(folder, record_property):
     Program(ring("planar2r", 3, np.array([0.5, 1.2]), "xy").closed_loop())
     (library,) = folder.glob("*.so")
     whole = library.read_bytes()
-    assert elf.is_whole(whole)
-    assert not any(elf.is_whole(whole[:k]) for k in range(len(whole)))
+    assert build.is_whole(whole)
+    assert not any(build.is_whole(whole[:k]) for k in range(len(whole)))
     record_property("figure", f"{len(whole):,} cuts of a library under a digest that fits: none was loaded")
 
 
@@ -194,7 +194,7 @@ def test_headers_of_any_content_are_judged_without_an_error(folder, record_prope
         changed = bytearray(whole)
         for place in rng.integers(4, 400, size=4):
             changed[place] = int(rng.integers(256))
-        taken += elf.is_whole(bytes(changed))
+        taken += build.is_whole(bytes(changed))
     record_property("figure", f"20,000 mutated headers: no error, {20_000 - taken:,} refused")
 
 
@@ -222,7 +222,7 @@ def test_no_mode_in_which_others_may_write_is_taken(folder, record_property):
         for bits in range(0o10000):
             path.chmod(bits)
             if bits & 0o022:
-                with pytest.raises(CompilationError, match="can be written by others"):
+                with refused(CompilationError, found="can be written by others"):
                     build.cached_library("key", lambda: iter([SOURCE]), lambda library: None)
                 refused += 1
         path.chmod(own)

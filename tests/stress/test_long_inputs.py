@@ -9,7 +9,7 @@ from machines import random_robot
 from motions import random_sines
 
 from synctrl import Cell, Coupling, Friction, FullParameters, Hold, Member, Robot, load_robot
-from synctrl.coupling.motion_checks import check_motions
+from synctrl.coupling.reachability import check_motions
 from synctrl.errors import InputError
 from synctrl.robots.catalog import CATALOG
 

@@ -13,8 +13,7 @@ from ...coupling.cell import Cell
 from ...errors import InputError
 from ...robots.pseudo_inertia import pullback
 from ...robots.robot import Robot
-from ..gains import read_gain, spread_rows
-from ..ragged_gain import RaggedGain
+from ..gains import RaggedGain, read_gain, spread_rows
 from .protocol import Adaptation, Seen
 
 

@@ -80,13 +80,15 @@ class BoundSunMills:
         e, e_dot = errors.error
         e_star = errors.weighted + beta_shares[:2]  # (10), (29), and the derivative
         u = np.matvec(c, errors.rates) + beta_shares[1:] + Lambda * e_star  # (11), (30), and the derivative
-        u += np.matvec(c_dot, np.array((e, errors.rates[0] + e_dot)))
-        u[1] += np.matvec(c_ddot, e)
-        xref_dot = np.matvec(c_inv, u[0])
-        velocity = xref_dot if self.reference_acceleration == "exact" else errors.x_dot  # (13) prints x'
-        xref_ddot = np.matvec(c_inv, u[1] - np.matvec(c_dot, velocity))
+        if errors.weights.move:
+            u += np.matvec(c_dot, np.array((e, errors.rates[0] + e_dot)))
+            u[1] += np.matvec(c_ddot, e)
+        xref = np.matvec(c_inv, u)
+        if errors.weights.move:
+            velocity = xref[0] if self.reference_acceleration == "exact" else errors.x_dot  # (13) prints x'
+            xref[1] -= np.matvec(c_inv, np.matvec(c_dot, velocity))
         force = np.matvec(c.mT, self.K_eps * errors.shares[1])  # the last term of (13) and (32)
-        return Asked(xref_dot, xref_ddot, force, e_star[0], u)
+        return Asked(xref[0], xref[1], force, e_star[0], u)
 
     def proof(self, along: Along) -> Proof:
         """Springs on epsilon and E, and what they lose, (19), (24), (34) and (39)."""

@@ -1,12 +1,15 @@
-"""Sampled control: torque and adaptation are held between samples, as a digital controller does.
+"""Who acts when: continuous control at every instant, sampled control at instants of its own.
 
-This is another problem than the continuous law: its error falls with the first power of the period, and too
-long a period makes the closed loop unstable. The controller is a `DiscreteController`, as it would run on
-robots: what it remembers is its own, and the plant is moved from one of its samples to the next.
+Continuous control is one differential equation with the plant. With sampled control torque and adaptation are
+held between samples, as a digital controller does. This is another problem than the continuous law: its error
+falls with the first power of the period, and too long a period makes the closed loop unstable. The controller
+is a `DiscreteController`, as it would run on robots: what it remembers is its own, and the plant is moved
+from one of its samples to the next.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import replace
 from typing import Any
 
@@ -15,20 +18,45 @@ import numpy as np
 from ..control.controller import Signals
 from ..control.discrete import DiscreteController
 from ..coupling.cell import Reference
-from .clock import Clock, multiple
-from .closed_loop import ClosedLoop
-from .state import State
+from .advance import Step, due
+from .clock import Clock
+from .closed_loop import ClosedLoop, State
 from .step_error import StepError
-from .steps import Step
 
 
-def steps_per_sample(period: float, dt: float) -> int:
-    """How many steps a sample lasts.
+class Continuous:
+    """`Control` that acts at every instant.
 
-    Raises:
-        InputError: the period is not positive, or no multiple of dt.
+    Args:
+        loop: the closed loop.
+        clock: its instants.
+        step_error: told what the worst step was.
     """
-    return multiple("control_period", period, dt)
+
+    def __init__(self, loop: ClosedLoop, clock: Clock, step_error: StepError):
+        self._loop, self._step_error = loop, step_error
+        self._messages = deque(loop.messages.between(0.0, clock.end))
+        self._h, self._expected = 0.0, np.nan
+
+    def begin(self, step: Step, y: State, rate: State) -> Signals:
+        reference, messages = step.stages[0], due(self._messages, step.middle)
+        if messages:
+            y.memory[...] = self._loop.messages.received(messages, reference, y.motion, y.memory)
+        signals = step.loop.derive(reference, y, step.push, rate)
+        h = self._h if step.joined else 0.0
+        self._step_error.add(step.t, y.v, h, self._expected - rate.v, rate.v)
+        return signals
+
+    def rate(self, step: Step, reference: Reference, y: State, rate: State) -> None:
+        step.loop.derive(reference, y, step.push, rate)
+
+    def arrive(self, step: Step, y: State, expected: Any = np.nan) -> None:
+        self._h, self._expected = step.h, expected
+        step.loop.settle(y)
+
+    def finish(self, t: float, y: State) -> Signals:
+        self._step_error.add(t, y.v)
+        return self._loop.final(t, y)
 
 
 class Sampled:
@@ -45,13 +73,13 @@ class Sampled:
     def __init__(self, loop: ClosedLoop, clock: Clock, every: int, period: float, step_error: StepError):
         self._loop, self._every, self._step_error = loop, every, step_error
         self._controller = DiscreteController(loop.controller, period)
-        self._at_end = self._sample if clock.sampled_at_end(every) else self._look_at
+        self._acts_at_end = clock.sampled_at_end(every)
         self._after = loop.state(np.zeros(loop.size))
         step_error.add(0.0, loop.cell.v0)
 
     def begin(self, step: Step, y: State, rate: State) -> Signals:
-        due = step.checked and step.number % self._every == 0
-        signals = self._sample(step.t, y) if due else self._look(step.stages[0], y)
+        samples = step.checked and step.number % self._every == 0
+        signals = self._sample(step.t, y) if samples else self._look(step.stages[0], y)
         self.rate(step, step.stages[0], y, rate)
         step.loop.watch(y, signals, rate.v)
         return signals
@@ -67,7 +95,9 @@ class Sampled:
         y.memory[...] = self._memory + since * self._memory_dot
 
     def finish(self, t: float, y: State) -> Signals:
-        return self._at_end(t, y)
+        if self._acts_at_end:
+            return self._sample(t, y)
+        return self._look(self._loop.cell.references(np.array([t]))[0], y)
 
     def _sample(self, t: float, y: State) -> Signals:
         """Let the controller act on the state, which gets its estimates and memory."""
@@ -82,7 +112,3 @@ class Sampled:
     def _look(self, reference: Reference, y: State) -> Signals:
         """What the law would compute between two samples, with the torque that is held."""
         return replace(self._loop.look(reference, y), tau=self._tau)
-
-    def _look_at(self, t: float, y: State) -> Signals:
-        """`_look` at time t, s."""
-        return self._look(self._loop.cell.references(np.array([t]))[0], y)
