@@ -82,6 +82,11 @@ def test_the_axis_that_a_collada_file_calls_up_plays_no_part_here_or_in_pinocchi
     np.testing.assert_allclose(box([shape]), [theirs.min(axis=0), theirs.max(axis=0)])
 
 
+def test_empty_lines_before_a_collada_file_do_no_harm(tmp_path):
+    ((shape, _),) = drawn(tmp_path / "a.dae", b" \n\n" + meshes.collada())
+    np.testing.assert_allclose(box([shape]), [[0, 0, 0], [1, 2, 3]])
+
+
 def test_nodes_within_nodes_draw_a_shape_as_often_as_they_say(tmp_path):
     nodes = f"<library_nodes><node id='a'>{2 * meshes.SHAPE}</node></library_nodes>"
     scene = '<node><instance_node url="#a"/><instance_node url="#a"/></node>'

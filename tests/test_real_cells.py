@@ -140,5 +140,5 @@ def test_scenes_of_other_runs_are_refused(tmp_path):
     with pytest.raises(InputError, match="Attached"):
         payload_scene(run("four Pandas"), PAYLOAD)
     other = a460_pair().simulate(0.02)
-    with pytest.raises(InputError, match="along x, y and z, found the coordinates shoulder_pan_joint"):
+    with pytest.raises(InputError, match="along x, y and z, found the coordinates joint1"):
         formation_scene(other)

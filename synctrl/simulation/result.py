@@ -30,6 +30,8 @@ OUTPUTS = "outputs/"
 class Result:
     """A run at T logged instants: n robots, p synchronization errors, m task coordinates, nv joints.
 
+    Units are those of joints that turn; joints that slide are in m, m/s and N, see `units`.
+
     Attributes:
         t: (T,), s.
         x, x_desired: task coordinates, (T, n, m), rad or m.

@@ -38,6 +38,8 @@ def check_mesh(file: Path) -> bytes:
     if suffix not in FORMATS:
         raise Unusable(f"expected one of the formats {', '.join(FORMATS)}")
     data = read_regular(file, MAX_MESH_BYTES)
+    if suffix == ".dae":
+        data = data.lstrip()  # some have empty lines before what has to come first
     if data.startswith(_LFS):
         raise Unusable("it is a Git-LFS pointer; fetch the mesh with: git lfs pull")
     triangles = FORMATS[suffix](data)
