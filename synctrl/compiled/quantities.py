@@ -115,9 +115,7 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "z_sampled": Quantity("work", "n", "Z", "state of the adaptation at the last sample"),
         "z_dot_sampled": Quantity("work", "n", "Z", "its rate there"),
         "since": Quantity("work", "one", "1", "how long a sample lasts, s; 0 before the first"),
-        "leapt": Quantity(
-            "work", "n", "Z", "state of the adaptation after a sample, for example along a curve"
-        ),
+        "leapt": Quantity("work", "n", "Z", "state of the adaptation after a sample, along a curve"),
         "settled": Quantity("work", "n", "Z", "state of the adaptation after a step, for example projected"),
     }
 )
