@@ -33,7 +33,7 @@ class ChungSlotine:
     """
 
     statement = (
-        "e goes to zero, with unknown parameters too: V' = -s_q^T K_r s_q - rho^T K_2 rho; velocity errors of "
+        "e goes to zero, parameters known or not: V' = -s_q^T K_r s_q - rho^T K_2 rho; velocity errors of "
         "neighbours are damped, differences between position errors are not pulled together"
     )
 

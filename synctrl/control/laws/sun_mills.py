@@ -33,7 +33,9 @@ class SunMills:
         InputError: an unknown word.
     """
 
-    statement = "e and epsilon go to zero, with unknown parameters too; with the xref'' of (13) under the gain condition"
+    statement = (
+        "e and epsilon go to zero, parameters known or not; with xref'' of (13) under the gain condition"
+    )
 
     def __init__(self, reference_acceleration: str = "exact", k_r_space: str = "joint"):
         self.reference_acceleration = choice(
