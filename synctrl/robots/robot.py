@@ -15,8 +15,8 @@ from .friction import Friction
 from .model_checks import check_inertia, check_joints, check_numbering
 from .per_thread import PerThread
 from .units import joint_units
+from .urdf.changes import with_bodies
 from .urdf.document import Document, Pose
-from .urdf.inertials import with_bodies
 from .urdf.report import NOTHING, Report
 
 _WORLD_AXES = pin.LOCAL_WORLD_ALIGNED

@@ -1,6 +1,7 @@
 """Documents of robots: read strictly, checked, written anew for Pinocchio."""
 
 from .build import build_model, model_from_xml
+from .changes import lock_joints
 from .description import (
     Description,
     describe,
@@ -8,7 +9,6 @@ from .description import (
     read_urdf,
     urdf_folder,
 )
-from .locks import lock_joints
 
 __all__ = [
     "Description",

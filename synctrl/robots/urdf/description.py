@@ -15,19 +15,16 @@ import pinocchio as pin
 
 from ...checks import boolean, instance
 from ...errors import FrameNotFound, RobotError, near
+from .branches import check_tip, default_tip
 from .build import build_model, check_model
+from .changes import settle_locks, with_inertials
 from .checks import check_bodies, check_some_mass, check_tree
 from .document import Document, Inertial
-from .frictions import stated_friction
-from .inertials import with_inertials
-from .locks import settle_locks
 from .meshes import build_visual, find_pictures
-from .names import remark_names
 from .packages import Packages
+from .remarks import remark_names, stated_friction, suspect
 from .report import NOTHING, Notes, Report, warn_of
 from .sources import read_source
-from .suspicions import suspect
-from .tips import check_tip, default_tip
 from .xml import quoted
 
 

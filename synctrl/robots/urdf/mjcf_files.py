@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from .packages import Packages
-from .regular import Unusable, read_regular
+from .packages import Packages, Unusable, read_regular
 from .report import Notes
 from .xml import Element, parse_xml, quoted, read_bytes
 
