@@ -17,7 +17,7 @@ from test_animation import ends, node
 from synctrl import Cell, Coupling, Experiment, Hold, JointSpace, Member, Result, Robot, load_robot
 from synctrl.errors import InputError, RobotWarning
 from synctrl.experiments import mobile_robot
-from synctrl.robots.written import read_robot, write_robot
+from synctrl.robots.documents import read_robot, write_robot
 from synctrl.show import scene_of
 from synctrl.show.arms import ALARM
 from synctrl.show.cell_scene import STILL

@@ -14,8 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .forest import SMALL, Forest, Selection, alike, as_selection, shares
-from .friction_parameters import FrictionParameters, with_friction_columns
-from .parameters import FullParameters, LinearParameters, Parameters
+from .parameters import (
+    FrictionParameters,
+    FullParameters,
+    LinearParameters,
+    Parameters,
+    with_friction_columns,
+)
 
 #: what is linear in the regressor of all inertial parameters, and so can share a forest
 _RIGID = (FullParameters.regressor, LinearParameters.regressor)

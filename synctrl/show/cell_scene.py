@@ -10,8 +10,8 @@ import numpy as np
 from ..analysis.metrics import row_names
 from ..checks import positive_number
 from ..errors import InputError, SynctrlError
+from ..robots.documents import read_robot
 from ..robots.robot import Robot
-from ..robots.written import read_robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .arms import ALARM, add_arms, add_disturbances, has_shapes, tip_positions, titled_scene

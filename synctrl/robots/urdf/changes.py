@@ -252,12 +252,8 @@ def _without_range(document: Document, notes: Notes) -> Document:
         return document
     for joint in arm:
         notes.add("assumed", f"{joint.title}, limit", "the range 0 to 0 of every joint is none", joint.line)
-    names = {joint.name for joint in arm}
-    return replace(document, joints=tuple(_open(j) if j.name in names else j for j in document.joints))
-
-
-def _open(joint: Joint) -> Joint:
-    return replace(joint, limit=replace(joint.limit or Limit(), lower=None, upper=None))
+    opened = {j.name: replace(j, limit=replace(j.limit or Limit(), lower=None, upper=None)) for j in arm}
+    return replace(document, joints=tuple(opened.get(j.name, j) for j in document.joints))
 
 
 def _narrow(document: Document) -> Found:

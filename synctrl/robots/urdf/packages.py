@@ -57,7 +57,8 @@ class Packages:
         if not _is_plain(name):
             return None
         above = (folder for folder in self._above if _package_name(folder) == name)
-        return next(above, None) or self._others.get(name) or _first_folder(self._installed, name)
+        installed = (holder / name for holder in self._installed if os.path.isdir(holder / name))
+        return next(above, None) or self._others.get(name) or next(installed, None)
 
     @property
     def _above(self) -> tuple[Path, ...]:
@@ -138,10 +139,6 @@ def _is_plain(name: str) -> bool:
 def _is_laid_out(folder: Path) -> bool:
     """Whether a folder looks like a package: descriptions and meshes side by side."""
     return os.path.isdir(folder / MESHES) and any(os.path.isdir(folder / name) for name in DESCRIPTIONS)
-
-
-def _first_folder(holders: Iterable[Path], name: str) -> Path | None:
-    return next((holder / name for holder in holders if os.path.isdir(holder / name)), None)
 
 
 def _below(folder: Path, depth: int) -> Iterator[Path]:

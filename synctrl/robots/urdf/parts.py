@@ -8,7 +8,6 @@ and said if the joint moves; a shape or colour that cannot be read is left out, 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -123,15 +122,13 @@ SHAPES = ("box", "cylinder", "sphere", "capsule", "mesh")
 
 def read_shapes(link: Element, tag: str, materials: dict[str, Material]) -> tuple[Geometry, ...]:
     """The shapes of a link that can be read; `tag` is "visual" or "collision"."""
-    return tuple(_readable(link, tag, materials))
-
-
-def _readable(link: Element, tag: str, materials: dict[str, Material]) -> Iterator[Geometry]:
+    shapes = []
     for element in link.all(tag):
         try:
-            yield _geometry(element, materials)
+            shapes.append(_geometry(element, materials))
         except RobotError as error:
             element.notes.absorb(error)
+    return tuple(shapes)
 
 
 def _geometry(element: Element, materials: dict[str, Material]) -> Geometry:

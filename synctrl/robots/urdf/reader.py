@@ -6,7 +6,6 @@ Elements of other programs are left alone, unless they add to the mechanism: wit
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from ...errors import near
 from .document import INERTIA, MOVING_TYPES, NO_INERTIA, Document, Inertial, Joint, Link, Mimic, Vector
 from .parts import Material, read_limit, read_materials, read_origin, read_shapes
 from .report import Notes
-from .xml import Element, parse_xml, quoted, read_bytes, shown_tag
+from .xml import Element, parse_xml, quoted, shown_tag
 
 JOINT_TYPES = (*MOVING_TYPES, "fixed")
 JOINT_PARTS = (
@@ -27,19 +26,15 @@ _NO_AXIS = 1e-6
 _UNIT_AXIS = 1e-3
 
 
-def read_document(file: Path, notes: Notes | None = None) -> Document:
-    """A URDF file as a document whose every value is finite and of the right kind.
+def read_text(file: Path, data: bytes, notes: Notes | None = None) -> Document:
+    """The content of a URDF file as a document whose every value is finite and of the right kind.
 
-    How the values fit together is not looked at here, see `check_tree` and `check_bodies`.
+    How the values fit together is not looked at here, see `check_tree` and `check_bodies`. `notes` takes what
+    is left out and assumed.
 
     Raises:
-        RobotError: with file, line, link or joint, what was found and what is expected.
+        RobotError: with line, link or joint, what was found and what is expected.
     """
-    return read_text(file, read_bytes(file), notes)
-
-
-def read_text(file: Path, data: bytes, notes: Notes | None = None) -> Document:
-    """`read_document` for the content `data` of `file`; `notes` takes what is left out and assumed."""
     root = parse_xml(str(file), data, notes)
     if root.tag != "robot":
         root.refuse("a URDF with the root element <robot>", f"<{shown_tag(root.tag)}>")
@@ -86,17 +81,16 @@ def _inertial(element: Element) -> Inertial | None:
     mass.know((), ("value",))
     if inertia is None:
         element.note("assumed", "without an <inertia> the mass is taken as that of a point")
+        moments = NO_INERTIA
+    else:
+        inertia.know((), INERTIA)
+        moments = tuple(inertia.number(key) for key in INERTIA)
     return Inertial(
         mass=mass.number("value"),
-        inertia=NO_INERTIA if inertia is None else _moments(inertia),
+        inertia=moments,
         origin=read_origin(element),
         line=element.line,
     )
-
-
-def _moments(inertia: Element) -> Vector:
-    inertia.know((), INERTIA)
-    return tuple(inertia.number(key) for key in INERTIA)
 
 
 # -- joints ------------------------------------------------------------------------------------------------
@@ -195,13 +189,6 @@ _ADVICE = "unexpanded xacro; expand the file with xacro first, or load the .xacr
 _CLOSES = ("loop_joint", "closed_loop", "loop_closure", "ball_constraint", "linear_bushing_rpy", "equality")
 
 
-def everything(element: Element) -> Iterator[Element]:
-    """An element and all in it."""
-    yield element
-    for child in element.children:
-        yield from everything(child)
-
-
 def refuse_xacro(root: Element) -> None:
     """Refuse macros, and expressions in the robot itself, wherever they stand.
 
@@ -211,10 +198,10 @@ def refuse_xacro(root: Element) -> None:
         RobotError: with the advice to expand the file.
     """
     unused = [child for child in root.children if child.tag in _DEFINITIONS and not child.children]
-    for element in everything(root):
+    for element in root.walk():
         if element.tag.startswith("xacro:") and element not in unused:
             element.refuse(_EXPANDS, f"<{shown_tag(element.tag)}>: {_ADVICE}")
-    robot = (part for child in root.children if child.tag not in EXTENSIONS for part in everything(child))
+    robot = (part for child in root.children if child.tag not in EXTENSIONS for part in child.walk())
     for element in (root, *robot):
         for key, value in element.attributes.items():
             if "${" in value or "$(" in value:
@@ -227,13 +214,13 @@ def refuse_loops(root: Element) -> None:
     Raises:
         RobotError: with the element.
     """
-    for element in everything(root):
+    for element in root.walk():
         name = element.tag.rpartition(":")[2]
         if name in _CLOSES or (":" in element.tag and name == "joint"):
             element.refuse("a tree of links and joints", f"<{shown_tag(element.tag)}>, which closes a loop")
     carried = {end.attributes.get("link", "") for joint in root.all("joint") for end in joint.all("child")}
     for extension in (child for child in root.children if child.tag in EXTENSIONS):
-        for element in everything(extension):
+        for element in extension.walk():
             if element.tag == "joint" and _joins(element, carried):
                 element.refuse("a tree of links and joints", "a joint for a simulator, which closes a loop")
 
