@@ -136,9 +136,9 @@ def load_description(
         raise InputError(f"expected a name or a path, found {type(source).__name__}", subject="robot")
     options: dict[str, Any] = {"inertials": inertials, "strict": strict, "xacro_args": xacro_args}
     if isinstance(source, str) and source.startswith(PREFIX):
-        place = described(source.removeprefix(PREFIX))
-        source, package_dirs = place.file, (*named_folders(package_dirs), *place.package_dirs)
-        options["xacro_args"] = place.arguments(xacro_args)
+        source, folders, own_args = described(source.removeprefix(PREFIX))
+        package_dirs = (*named_folders(package_dirs), *folders)
+        options["xacro_args"] = xacro_args if own_args is None else {**own_args, **(xacro_args or {})}
     if isinstance(source, Path) or _looks_like_path(source):
         return read_urdf(source, package_dirs, tip=tip, locked=locked, **options)
     found = _load(source, locked or {}, options)
@@ -186,30 +186,15 @@ _FILES = ("URDF_PATH", "XACRO_PATH", "MJCF_PATH")
 _FOLDERS = ("PACKAGE_PATH", "REPOSITORY_PATH")
 
 
-@dataclass(frozen=True)
-class Described:
-    """What a module of robot_descriptions says.
-
-    Attributes:
-        file: the URDF, xacro file or MJCF.
-        package_dirs: the folders of its packages.
-        xacro_args: the module's own values of a xacro file's arguments; None for another file.
-    """
-
-    file: Path
-    package_dirs: tuple[str | Path, ...]
-    xacro_args: Mapping[str, object] | None
-
-    def arguments(self, given: Mapping[str, object] | None) -> Mapping[str, object] | None:
-        """The arguments of the file, those given by the user first."""
-        return given if self.xacro_args is None else {**self.xacro_args, **(given or {})}
-
-
-def described(name: str) -> Described:
+def described(name: str) -> tuple[Path, tuple[str | Path, ...], Mapping[str, object] | None]:
     """Where a robot of robot_descriptions is; it is downloaded if it is not there yet.
 
     Args:
         name: of the module, for example "iiwa14_description".
+
+    Returns:
+        The file (a URDF, xacro or MJCF), the folders of its packages, and the module's own values of a xacro
+        file's arguments; None for another file.
 
     Raises:
         RobotError: no such name, with the near ones, or a download that fails, with the reason.
@@ -223,7 +208,7 @@ def described(name: str) -> Described:
         raise RobotError(f"{expected}, found none of {', '.join(_FILES)}", subject=f"robot {name!a}")
     args = said.get("XACRO_ARGS", {}) if attribute == "XACRO_PATH" else None
     folders = [said[folder] for folder in _FOLDERS if said.get(folder)]
-    return Described(Path(said[attribute]), (*folders, *said.get("XACRO_PACKAGE_PATHS", {}).values()), args)
+    return Path(said[attribute]), (*folders, *said.get("XACRO_PACKAGE_PATHS", {}).values()), args
 
 
 def _module(name: str) -> ModuleType:

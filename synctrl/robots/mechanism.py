@@ -106,9 +106,6 @@ def _snap(values: np.ndarray) -> np.ndarray:
     return values
 
 
-# -- limits of joints --------------------------------------------------------------------------------------
-
-
 #: models made by hand have such numbers where there is no limit
 UNLIMITED = 1e300
 

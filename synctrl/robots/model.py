@@ -136,9 +136,6 @@ def joint_poses(model: pin.Model, q: np.ndarray) -> np.ndarray:
     return poses
 
 
-# -- memory for its algorithms -----------------------------------------------------------------------------
-
-
 T = TypeVar("T")
 
 

@@ -104,15 +104,10 @@ def _in_forest(robots: Sequence[int], parameters: Sequence[Any]) -> Group:
 
 
 def _compute_with_friction(
-    compute: Regressors,
-    smoothing: np.ndarray,
-    armature: bool,
-    q: np.ndarray,
-    v: np.ndarray,
-    v_ref: np.ndarray,
-    a_ref: np.ndarray,
+    compute: Regressors, smoothing: np.ndarray, armature: bool, q: np.ndarray, *rates: np.ndarray
 ) -> np.ndarray:
-    return with_friction_columns(compute(q, v, v_ref, a_ref), v, v_ref, a_ref, smoothing, armature)
+    v, v_ref, a_ref = rates
+    return with_friction_columns(compute(q, *rates), v, v_ref, a_ref, smoothing, armature)
 
 
 def _alone(i: int, parameters: Parameters, nv: int) -> Group:

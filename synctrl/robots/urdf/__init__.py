@@ -2,13 +2,7 @@
 
 from .build import build_model, model_from_xml
 from .changes import lock_joints
-from .description import (
-    Description,
-    describe,
-    existing_file,
-    read_urdf,
-    urdf_folder,
-)
+from .description import Description, describe, existing_file, read_urdf, urdf_folder
 
 __all__ = [
     "Description",

@@ -132,7 +132,8 @@ def default_tip(document: Document, held: Collection[str], notes: Notes) -> str:
     """
     branches = Branches(document)
     end = branches.moving[branches.ends[0]]
-    tip, last = _outermost(document, end.child, held), _last(document)
+    tip, parents = _outermost(document, end.child, held), {joint.parent for joint in document.joints}
+    last = [link.name for link in document.links if link.name not in parents][-1]
     where = f"robot {quoted(document.name)}"
     others = [name for name in branches.moving if name not in branches.chains[end.name]]
     if others:
@@ -147,12 +148,6 @@ def default_tip(document: Document, held: Collection[str], notes: Notes) -> str:
             "assumed", where, f"the tip is taken to be {quoted(tip)}; {quoted(last)} is fixed to the base"
         )
     return tip
-
-
-def _last(document: Document) -> str:
-    """The last link, in the order of the document, that carries no other."""
-    parents = {joint.parent for joint in document.joints}
-    return [link.name for link in document.links if link.name not in parents][-1]
 
 
 def _outermost(document: Document, link: str, held: Collection[str]) -> str:

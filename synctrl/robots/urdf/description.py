@@ -201,9 +201,6 @@ def existing_file(path: str | Path) -> Path:
     raise RobotError(f"expected a URDF file, found {kind}{hint}", file=file)
 
 
-# -- kinds of files ----------------------------------------------------------------------------------------
-
-
 def read_source(
     file: Path, packages: Packages, notes: Notes, xacro_args: Mapping[str, object] | None = None
 ) -> Document:

@@ -228,8 +228,7 @@ def _check_accessors(header: _JsonObject, binary: bytes) -> None:
         raise Unusable("it asks for more numbers than any mesh has")
     primitives = [primitive for mesh in header["meshes"] for primitive in mesh["primitives"]]
     for position in {primitive["attributes"]["POSITION"] for primitive in primitives}:
-        if not np.isfinite(_positions(header, accessors[position], binary)).all():
-            raise Unusable("it has corners that are not finite")
+        _require_finite(_positions(header, accessors[position], binary))
 
 
 def _positions(header: _JsonObject, accessor: _JsonObject, binary: bytes) -> np.ndarray:

@@ -59,8 +59,6 @@ def _smaller(ends: np.ndarray, name: str, notes: Notes) -> float:
     return low
 
 
-# -- dynamics ----------------------------------------------------------------------------------------------
-
 SAMPLES = 3
 SAME = 1e-9
 """Relative to the largest torque; rounding alone is some 1e-15."""

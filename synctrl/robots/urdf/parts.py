@@ -108,11 +108,8 @@ def _range(limit: Element) -> tuple[float | None, float | None, str]:
             said = f"no {key} is stated; it is 0, as in every URDF"
         elif math.isinf(value):
             said = f"{key} {value:g} is taken as no limit"
-    return *(_open(0.0 if value is None else value) for value in (lower, upper)), said  # type: ignore[return-value]
-
-
-def _open(value: float) -> float | None:
-    return None if math.isinf(value) else value
+    lower, upper = (None if math.isinf(end := value or 0.0) else end for value in (lower, upper))
+    return lower, upper, said
 
 
 # -- shapes ------------------------------------------------------------------------------------------------

@@ -107,9 +107,6 @@ def remark_names(document: Document, notes: Notes) -> None:
         notes.add("assumed", where, f"joint {quoted(name)} is told from a link or the world of that name")
 
 
-# -- friction ----------------------------------------------------------------------------------------------
-
-
 def stated_friction(document: Document) -> Iterator[Note]:
     """One remark, if a joint that moves has friction: no oddity, so it is no warning by itself."""
     rubbing = [joint for joint in document.moving_joints if joint.damping or joint.friction]
