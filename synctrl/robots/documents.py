@@ -1,35 +1,29 @@
 """Making robot descriptions: planar arms from numbers, payloads welded on, joints locked; and writing them.
 
 Each function returns a new `Document`; `describe` makes a robot of it at once, `write_urdf` a file that
-`read_urdf` reads back to the same dynamics, and `write_robot` plain data that a result holds. The documents
-are this package's own and not those of yourdfpy, whose reader fills in what is missing without a word, and
-whose writer takes roll and yaw from a rotation one by one, which loses their digits near a pitch of 90 deg.
-The tests have yourdfpy read what is written here.
+`read_urdf` reads back to the same dynamics. The documents are this package's own and not those of yourdfpy,
+whose reader fills in what is missing without a word, and whose writer takes roll and yaw from a rotation one
+by one, which loses their digits near a pitch of 90 deg. The tests have yourdfpy read what is written here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import LONGEST_LABEL, finite_array, positive_number, symmetric_matrix, unprintable
-from ..errors import FrameNotFound, InputError, RobotError
+from ..checks import finite_array, positive_number, symmetric_matrix
+from ..errors import FrameNotFound, InputError
 from ..files import write_whole
 from .catalog import load_description
-from .robot import Robot
 from .urdf.changes import lock_joints
 from .urdf.checks import check_bodies, check_tree, inertial_fault
-from .urdf.description import Description, describe, urdf_folder
+from .urdf.description import Description
 from .urdf.document import Document, Geometry, Inertial, Joint, Limit, Link, Pose, Shape, upper_triangle
 from .urdf.meshes import SCHEMES
-from .urdf.packages import data_folder
-from .urdf.reader import read_text
 from .urdf.remarks import is_plain, triangle_fault
 from .urdf.writer import to_xml
 
@@ -215,75 +209,3 @@ def _check_meshes(document: Document, file: Path) -> None:
                 raise document.error(
                     f"mesh '{filename}': expected to write {folders}", link, line=geometry.line
                 )
-
-
-# -- plain data that a file can hold -----------------------------------------------------------------------
-
-
-#: characters; longer descriptions are not kept
-LONGEST = 100_000
-#: what was written for each robot that still exists: a robot does not change
-_WRITTEN: WeakKeyDictionary[Robot, dict[str, str]] = WeakKeyDictionary()
-
-
-def write_robot(robot: Robot) -> dict[str, str]:
-    """What it takes to make a robot again: its "urdf", placed and with its joints locked, and its "tip".
-
-    "file" is where it was read from, beside which its meshes are, unless that comes with this package or with
-    example-robot-data. A robot that no document describes, or too long a one, gives nothing.
-    """
-    if robot not in _WRITTEN:
-        _WRITTEN[robot] = _write(robot)
-    return dict(_WRITTEN[robot])
-
-
-def _write(robot: Robot) -> dict[str, str]:
-    document = robot.document
-    if document is None:
-        return {}
-    links = tuple(replace(link, collisions=()) for link in document.links)
-    text = to_xml(replace(document, links=links))
-    if len(text) > LONGEST or unprintable(text.replace("\n", " ")):
-        return {}
-    found = {"tip": robot.tip}
-    if document.file is not None and not _stock(document.file):
-        found["file"] = str(document.file.absolute())
-    short = {key: word for key, word in found.items() if len(word) <= LONGEST_LABEL and not unprintable(word)}
-    return {**short, "urdf": text}
-
-
-def _stock(file: Path) -> bool:
-    """Whether a file comes with an installation."""
-    return any(file.is_relative_to(folder) for folder in (urdf_folder(), data_folder()) if folder)
-
-
-def read_robot(
-    about: Mapping[str, Any], name: str, joints: Iterable[str], package_dirs: Iterable[str | Path] = ()
-) -> Robot:
-    """The robot that `write_robot` wrote.
-
-    Its text is read as strictly as any file; meshes are looked for beside the file that it came from.
-
-    Args:
-        about: what was written.
-        name: what to call the robot.
-        joints: names of the joints that it has to have.
-        package_dirs: folders in which packages with its meshes are looked for.
-
-    Raises:
-        RobotError: nothing was written, or it makes no such robot.
-    """
-    if "urdf" not in about:
-        raise RobotError("its description was not kept", subject=f"robot '{name}'")
-    file = Path(about["file"]) if "file" in about else None
-    document = read_text(file or Path(f"{name}.urdf"), about["urdf"].encode())
-    found = describe(replace(document, file=file), package_dirs)
-    robot = Robot(
-        found.model, about.get("tip", found.tip), visual=found.visual, name=name, document=found.document
-    )
-    if robot.joint_names != tuple(joints):
-        raise RobotError(
-            f"expected the joints {', '.join(joints)}, found {', '.join(robot.joint_names)}",
-            subject=f"robot '{name}'",
-        )
-    return robot

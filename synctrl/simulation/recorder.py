@@ -17,8 +17,8 @@ import numpy as np
 from ..checks import printable
 from ..coupling.cell import Cell
 from ..errors import InputError
-from ..robots.documents import write_robot
 from ..robots.mechanism import joint_limits
+from ..robots.written import write_robot
 from .advance import Sample
 from .clock import Clock
 from .closed_loop import ClosedLoop, State
