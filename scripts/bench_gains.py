@@ -35,7 +35,7 @@ from synctrl import (
 )
 from synctrl.control.excursion import POINTS, excursion
 from synctrl.robots.catalog import catalog_names
-from synctrl.robots.limits import joint_limits
+from synctrl.robots.mechanism import joint_limits
 from synctrl.robots.payload import Load, carrying
 
 #: rad/s; s; s, of the motion there and back; share of the true parameters that is known; kg

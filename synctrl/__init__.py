@@ -12,8 +12,7 @@ from .renamed import serve_old_names
 from .robots.base_parameters import BaseParameters
 from .robots.catalog import load_robot
 from .robots.friction import Friction
-from .robots.friction_parameters import FrictionParameters
-from .robots.parameters import FullParameters, LinearParameters
+from .robots.parameters import FrictionParameters, FullParameters, LinearParameters
 from .robots.robot import Robot
 from .simulation.mujoco import mujoco_model
 from .simulation.result import Result

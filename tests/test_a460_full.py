@@ -16,7 +16,7 @@ from synctrl.errors import InputError, NonFiniteError
 from synctrl.experiments import a460_full_pair, a460_pair
 from synctrl.experiments.a460_pair import WRIST
 from synctrl.robots.documents import lock
-from synctrl.robots.limits import joint_limits
+from synctrl.robots.mechanism import joint_limits
 from synctrl.robots.urdf import describe
 from synctrl.simulation.advance import Sample
 from synctrl.simulation.guard import Guard

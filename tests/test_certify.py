@@ -27,7 +27,7 @@ from synctrl.analysis.convergence import convergence
 from synctrl.analysis.replay import replay
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, planar_four
-from synctrl.robots.friction_parameters import FrictionParameters
+from synctrl.robots.parameters import FrictionParameters
 
 pytestmark = pytest.mark.filterwarnings("ignore::synctrl.errors.CouplingWarning")  # odd rings are meant
 PUSH = Disturbance(robot=0, torque=2.0, start=0.01, stop=0.03)

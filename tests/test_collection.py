@@ -11,7 +11,7 @@ import pytest
 
 from synctrl import load_robot
 from synctrl.errors import MissingDependencyError, RobotError, RobotWarning
-from synctrl.robots import collection
+from synctrl.robots import catalog
 from synctrl.robots.urdf import xacro as xacro_module
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
@@ -100,6 +100,6 @@ def test_a_module_without_a_file_is_said(modules: Path) -> None:
 
 
 def test_without_the_package_the_advice_is_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(collection, "find_spec", lambda name: None)
+    monkeypatch.setattr(catalog, "find_spec", lambda name: None)
     with pytest.raises(MissingDependencyError, match=r"synctrl\[robot_descriptions\]"):
         load_robot("robot_descriptions:arm_description")

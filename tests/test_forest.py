@@ -16,8 +16,7 @@ from synctrl.analysis.certify import certify
 from synctrl.robots.base_parameters import BaseParameters
 from synctrl.robots.forest import LARGE, SMALL, Forest, as_selection, forests
 from synctrl.robots.friction import Friction
-from synctrl.robots.friction_parameters import FrictionParameters
-from synctrl.robots.parameters import FullParameters, planar_two_link_parameters
+from synctrl.robots.parameters import FrictionParameters, FullParameters, planar_two_link_parameters
 from synctrl.robots.regressors import _groups, make_regressors
 from synctrl.simulation.plant import pinocchio_dynamics
 from synctrl.tasks.measurement import Tips

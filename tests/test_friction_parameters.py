@@ -14,8 +14,7 @@ from synctrl import Cell, Friction, FrictionParameters, LinearParameters, load_r
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair
 from synctrl.experiments.a460_pair import FRICTION
-from synctrl.robots.friction_parameters import friction_diagonals, with_friction_columns
-from synctrl.robots.parameters import planar_two_link_parameters
+from synctrl.robots.parameters import friction_diagonals, planar_two_link_parameters, with_friction_columns
 
 
 def machine(seed: int) -> tuple[np.random.Generator, FrictionParameters, object, Friction]:

@@ -32,7 +32,7 @@ from synctrl import (
 )
 from synctrl.errors import InputError, LimitWarning, UnreachableError
 from synctrl.robots.documents import planar_arm
-from synctrl.robots.limits import joint_limits
+from synctrl.robots.mechanism import joint_limits
 from synctrl.robots.urdf.description import describe
 from synctrl.robots.urdf.document import Document
 from synctrl.tasks.inverse_kinematics import start_in, unwound

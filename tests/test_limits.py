@@ -9,7 +9,7 @@ import pytest
 
 from synctrl import Cell, Coupling, Cubic, Experiment, Gains, Member, Result, Robot, load_robot
 from synctrl.robots.documents import planar_arm
-from synctrl.robots.limits import joint_limits
+from synctrl.robots.mechanism import joint_limits
 from synctrl.robots.urdf import describe
 from synctrl.robots.urdf.document import Limit
 from synctrl.simulation.limits import applied_torque, limit_report

@@ -21,7 +21,7 @@ from synctrl import load_robot
 from synctrl.errors import RobotWarning
 from synctrl.robots.catalog import load_description
 from synctrl.robots.urdf import Description
-from synctrl.robots.urdf.regular import Unusable
+from synctrl.robots.urdf.packages import Unusable
 from synctrl.show import scene_of
 from synctrl.show.mesh_files import read_mesh
 from synctrl.show.meshes import MeshLibrary

@@ -21,8 +21,7 @@ from synctrl.errors import RobotError, RobotWarning
 from synctrl.robots.urdf import mesh_files, read_urdf
 from synctrl.robots.urdf.document import Document, Geometry, Link, Shape
 from synctrl.robots.urdf.meshes import find_pictures
-from synctrl.robots.urdf.packages import Packages
-from synctrl.robots.urdf.regular import Unusable
+from synctrl.robots.urdf.packages import Packages, Unusable
 from synctrl.robots.urdf.report import Notes
 from synctrl.show.mesh_files import read_mesh
 

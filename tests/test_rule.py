@@ -18,7 +18,7 @@ from urdf_corpus import GOOD, write
 from synctrl import Cell, Coupling, Experiment, Gains, Hold, Member, Robot, load_robot
 from synctrl.control.adaptation import Natural
 from synctrl.errors import FrameNotFound, InputError, RobotError, RobotWarning
-from synctrl.robots.limits import joint_limits
+from synctrl.robots.mechanism import joint_limits
 from synctrl.robots.urdf.document import Inertial, Pose
 from synctrl.show import scene_of
 

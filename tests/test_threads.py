@@ -35,7 +35,7 @@ from shared_work import (
 from synctrl import CartesianSpace, Coupling, PoseSpace
 from synctrl.errors import CouplingWarning, InputError
 from synctrl.experiments import mixed_four, planar_four
-from synctrl.robots.per_thread import PerThread
+from synctrl.robots.model import PerThread
 
 #: duration of a run, s
 SHORT = 4e-3

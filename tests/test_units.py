@@ -14,8 +14,7 @@ from sliders import GANTRY, SCARA, load, pair
 from synctrl import CartesianSpace, Cell, Coupling, Disturbance, JointSpace, Member, Result, load_robot
 from synctrl.analysis.metrics import as_data, metrics
 from synctrl.errors import InputError, NonFiniteError, SaturationWarning
-from synctrl.robots.kinematics import joint_poses
-from synctrl.robots.units import joined, unit_for
+from synctrl.robots.model import joined, joint_poses, unit_for
 from synctrl.simulation.result import LAYOUT
 from synctrl.simulation.simulate import Experiment
 from synctrl.sweep import Grid, Sweep, gain

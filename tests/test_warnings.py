@@ -13,7 +13,7 @@ import synctrl
 from synctrl import Cell, Coupling, Cubic, Experiment, Member, load_robot
 from synctrl.errors import CouplingWarning, RobotWarning, SaturationWarning, StepWarning
 from synctrl.robots.friction import Friction
-from synctrl.robots.friction_parameters import FrictionParameters
+from synctrl.robots.parameters import FrictionParameters
 
 ARM = load_robot("planar2r")
 ODD = Path(__file__).parent / "cases" / "urdf" / "effort_zero.urdf"

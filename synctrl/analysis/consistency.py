@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..robots.friction_parameters import count_bodies
+from ..robots.parameters import count_bodies
 from ..robots.pseudo_inertia import smallest_eigenvalues
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment

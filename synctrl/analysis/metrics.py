@@ -17,7 +17,7 @@ import numpy as np
 from ..checks import finite_array, instance, non_negative_number
 from ..errors import InputError
 from ..files import reported, write_whole
-from ..robots.units import joined
+from ..robots.model import joined
 from ..simulation.result import Result
 
 FORMAT = "synctrl metrics 1"

@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 
 from ..control.controller import Controller
-from ..robots.friction_parameters import FrictionParameters
 from ..robots.mechanism import Mechanism, mechanism
+from ..robots.parameters import FrictionParameters
 from ..tasks.algebra import Algebra
 from ..tasks.measurement import Kinematics
 from ..tasks.redundancy import Posture

@@ -28,8 +28,7 @@ from ..coupling.cell import Cell
 from ..coupling.coupling import Coupling
 from ..errors import InputError
 from ..robots.base_parameters import BaseParameters
-from ..robots.friction_parameters import FrictionParameters
-from ..robots.parameters import FullParameters, LinearParameters
+from ..robots.parameters import FrictionParameters, FullParameters, LinearParameters
 from ..robots.robot import Robot
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.plant import Plant

@@ -22,8 +22,7 @@ from ..coupling.cell import Cell, Member, Reference
 from ..coupling.coupling import Coupling
 from ..coupling.weights import Weights
 from ..robots.friction import Friction
-from ..robots.friction_parameters import FrictionParameters
-from ..robots.parameters import FullParameters, LinearParameters, Parameters
+from ..robots.parameters import FrictionParameters, FullParameters, LinearParameters, Parameters
 from ..robots.robot import Robot
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.plant import Plant

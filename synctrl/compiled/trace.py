@@ -18,7 +18,7 @@ from ..control.laws import Asked, Errors
 from ..control.laws.protocol import ROWS
 from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.weights import Weights
-from ..robots.friction_parameters import friction_diagonals
+from ..robots.parameters import friction_diagonals
 from ..robots.symbolic import Symbols
 from ..tasks.measurement import Poses, Positions
 from ..tasks.redundancy import Inversion, velocity_lost

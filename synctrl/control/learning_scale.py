@@ -8,8 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..robots.base_parameters import BaseParameters
-from ..robots.friction_parameters import FrictionParameters
-from ..robots.parameters import FullParameters, LinearParameters, Parameters
+from ..robots.parameters import FrictionParameters, FullParameters, LinearParameters, Parameters
 from ..robots.pseudo_inertia import pullback
 from ..robots.robot import Robot
 

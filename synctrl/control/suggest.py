@@ -16,7 +16,7 @@ import numpy as np
 from ..checks import instance, non_negative_number, positive_number
 from ..coupling.cell import Cell
 from ..errors import GainWarning, warn
-from ..robots.limits import joint_limits
+from ..robots.mechanism import joint_limits
 from ..robots.payload import Load, carrying
 from ..robots.robot import Robot
 from .excursion import Excursion, excursion

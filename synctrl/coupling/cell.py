@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, instance, offers
 from ..errors import InputError, UnreachableError
 from ..robots.friction import Friction
+from ..robots.model import joined
 from ..robots.parameters import Parameters
 from ..robots.robot import Robot
-from ..robots.units import joined
 from ..tasks.algebra import padded
 from ..tasks.inverse_kinematics import start_in
 from ..tasks.spaces import JointSpace, Space, units_of

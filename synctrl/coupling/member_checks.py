@@ -17,8 +17,7 @@ from ..checks import finite_array, instance, label, offers, per_joint
 from ..errors import InputError, RobotWarning, warn
 from ..robots.base_parameters import KINDS, parameters_of
 from ..robots.friction import Friction
-from ..robots.friction_parameters import FrictionParameters
-from ..robots.parameters import FullParameters, LinearParameters, Parameters
+from ..robots.parameters import FrictionParameters, FullParameters, LinearParameters, Parameters
 from ..robots.robot import Robot
 from ..tasks.trajectories import MOTION_PARTS
 

@@ -21,7 +21,7 @@ from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
 from ..robots.catalog import load_robot
 from ..robots.friction import Friction
-from ..robots.friction_parameters import FrictionParameters
+from ..robots.parameters import FrictionParameters
 from ..robots.robot import Robot
 from ..simulation.held_joints import HeldJointsPlant, Pid
 from ..simulation.simulate import Experiment

@@ -1,14 +1,22 @@
-"""Robots by name: this package's own, and the fixed-base arms of example-robot-data."""
+"""Robots by name: this package's own, and those of example-robot-data and of robot_descriptions.
+
+Importing a module of robot_descriptions downloads the repository that holds the robot, into that package's
+own cache. It says where the files are; they are read as any others.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
+from pkgutil import iter_modules
+from types import ModuleType
 from typing import Any
 
 from ..errors import InputError, MissingDependencyError, RobotError, near
-from .collection import PREFIX, described
 from .robot import Robot
 from .urdf.description import Description, read_urdf, urdf_folder
 from .urdf.document import Inertial
@@ -128,9 +136,9 @@ def load_description(
         raise InputError(f"expected a name or a path, found {type(source).__name__}", subject="robot")
     options: dict[str, Any] = {"inertials": inertials, "strict": strict, "xacro_args": xacro_args}
     if isinstance(source, str) and source.startswith(PREFIX):
-        place = described(source.removeprefix(PREFIX))
-        source, package_dirs = place.file, (*named_folders(package_dirs), *place.package_dirs)
-        options["xacro_args"] = place.arguments(xacro_args)
+        source, folders, own_args = described(source.removeprefix(PREFIX))
+        package_dirs = (*named_folders(package_dirs), *folders)
+        options["xacro_args"] = xacro_args if own_args is None else {**own_args, **(xacro_args or {})}
     if isinstance(source, Path) or _looks_like_path(source):
         return read_urdf(source, package_dirs, tip=tip, locked=locked, **options)
     found = _load(source, locked or {}, options)
@@ -166,3 +174,60 @@ def _folder(name: str, entry: Entry) -> Path:
             subject=f"robot '{name}'",
         )
     return data / "example-robot-data" / "robots"
+
+
+# -- robots of the package robot_descriptions --------------------------------------------------------------
+
+
+PACKAGE = "robot_descriptions"
+PREFIX = f"{PACKAGE}:"
+_NAME = re.compile(r"[a-z][a-z0-9_]*", re.ASCII)
+_FILES = ("URDF_PATH", "XACRO_PATH", "MJCF_PATH")
+_FOLDERS = ("PACKAGE_PATH", "REPOSITORY_PATH")
+
+
+def described(name: str) -> tuple[Path, tuple[str | Path, ...], Mapping[str, object] | None]:
+    """Where a robot of robot_descriptions is; it is downloaded if it is not there yet.
+
+    Args:
+        name: of the module, for example "iiwa14_description".
+
+    Returns:
+        The file (a URDF, xacro or MJCF), the folders of its packages, and the module's own values of a xacro
+        file's arguments; None for another file.
+
+    Raises:
+        RobotError: no such name, with the near ones, or a download that fails, with the reason.
+        MissingDependencyError: robot_descriptions is not installed.
+    """
+    module = _module(name)
+    said = vars(module)
+    attribute = next((a for a in _FILES if said.get(a)), None)
+    if attribute is None:
+        expected = "expected a URDF, a xacro file or MJCF"
+        raise RobotError(f"{expected}, found none of {', '.join(_FILES)}", subject=f"robot {name!a}")
+    args = said.get("XACRO_ARGS", {}) if attribute == "XACRO_PATH" else None
+    folders = [said[folder] for folder in _FOLDERS if said.get(folder)]
+    return Path(said[attribute]), (*folders, *said.get("XACRO_PACKAGE_PATHS", {}).values()), args
+
+
+def _module(name: str) -> ModuleType:
+    found = find_spec(PACKAGE)
+    if found is None:
+        raise MissingDependencyError(
+            f"it comes from the package {PACKAGE}, which is not installed; install it with: "
+            "pip install 'synctrl[robot_descriptions]'",
+            subject=f"robot {name!a}",
+        )
+    names = [module.name for module in iter_modules(found.submodule_search_locations)]
+    if not _NAME.fullmatch(name) or name not in names:
+        raise RobotError(
+            f"expected a name of {PACKAGE}, found {name!a}{near(name, names)}", subject="robot", found=name
+        )
+    try:
+        return import_module(f"{PACKAGE}.{name}")
+    except Exception as error:
+        raise RobotError(
+            f"expected a robot of {PACKAGE}, found: {type(error).__name__}: {error}",
+            subject=f"robot {name!a}",
+        ) from error

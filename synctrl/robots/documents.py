@@ -19,13 +19,12 @@ from ..checks import finite_array, positive_number, symmetric_matrix
 from ..errors import FrameNotFound, InputError
 from ..files import write_whole
 from .catalog import load_description
+from .urdf.changes import lock_joints
 from .urdf.checks import check_bodies, check_tree, inertial_fault
 from .urdf.description import Description
 from .urdf.document import Document, Geometry, Inertial, Joint, Limit, Link, Pose, Shape, upper_triangle
-from .urdf.locks import lock_joints
 from .urdf.meshes import SCHEMES
-from .urdf.names import is_plain
-from .urdf.suspicions import triangle_fault
+from .urdf.remarks import is_plain, triangle_fault
 from .urdf.writer import to_xml
 
 Source = Document | Description | str | Path

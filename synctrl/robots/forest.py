@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 import pinocchio as pin
 
-from .per_thread import PerThread
+from .model import PerThread
 from .robot import Robot
 
 #: joints of a forest at most

@@ -1,7 +1,8 @@
 """Mechanism: the numbers of a robot's model that do not change during a run, wherever it stands.
 
 These numbers become constants of generated code, so robots that agree in them share it. Where a robot stands,
-and what its bodies weigh, differs from robot to robot and is an input of the code.
+and what its bodies weigh, differs from robot to robot and is an input of the code. What its joints are made
+for, their ranges, speeds and torques, is here too.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ import numpy as np
 import pinocchio as pin
 
 from ..errors import RobotError
+from .model import subspace
 from .robot import Robot
-from .units import subspace
 
 #: numbers this close to 0, 1 or -1 in fixed placements are taken as such, so that terms with them vanish
 SNAP = 1e-15
@@ -103,3 +104,35 @@ def _snap(values: np.ndarray) -> np.ndarray:
     for exact in (-1.0, 0.0, 1.0):
         values[np.abs(values - exact) < SNAP] = exact
     return values
+
+
+#: models made by hand have such numbers where there is no limit
+UNLIMITED = 1e300
+
+
+@dataclass(frozen=True, eq=False)
+class JointLimits:
+    """Limits of the joints of one robot; infinite where there is none.
+
+    Attributes:
+        lower, upper: range of the positions, (nv,), rad or m; infinite for joints that turn without end.
+        velocity: largest speed, (nv,), rad/s or m/s.
+        torque: largest torque, (nv,), N·m or N.
+    """
+
+    lower: np.ndarray
+    upper: np.ndarray
+    velocity: np.ndarray
+    torque: np.ndarray
+
+
+def joint_limits(robot: Robot) -> JointLimits:
+    """The limits that a robot's description states."""
+    model = robot.model
+    lower, upper = np.full((2, robot.nv), [[-np.inf], [np.inf]])
+    for joint in model.joints[1:]:
+        if joint.nq == 1:  # a joint that turns without end has two numbers, and no range
+            lower[joint.idx_v] = model.lowerPositionLimit[joint.idx_q]
+            upper[joint.idx_v] = model.upperPositionLimit[joint.idx_q]
+    limits = (lower, upper, np.array(model.velocityLimit), np.array(model.effortLimit))
+    return JointLimits(*(np.where(np.abs(x) < UNLIMITED, x, np.copysign(np.inf, x)) for x in limits))

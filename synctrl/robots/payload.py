@@ -11,8 +11,9 @@ import numpy as np
 import pinocchio as pin
 
 from ..checks import finite_array, instance, positive_number, symmetric_matrix
-from ..errors import FrameNotFound, InputError
+from ..errors import InputError
 from .documents import weld
+from .model import frame_id
 from .robot import Robot
 from .urdf.document import Document
 
@@ -68,9 +69,7 @@ def carrying(robot: Robot, load: Load) -> Robot:
         InputError: the frame does not move.
     """
     name = load.frame or robot.tip
-    if not robot.model.existFrame(name):
-        raise FrameNotFound(robot.name, name, [frame.name for frame in robot.model.frames])
-    frame = robot.model.frames[robot.model.getFrameId(name)]
+    frame = robot.model.frames[frame_id(robot.name, robot.model, name)]
     if frame.parentJoint == 0:
         raise InputError(
             f"expected one of robot '{robot.name}' that moves, found '{name}'", subject="payload, frame"

@@ -14,8 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .forest import SMALL, Forest, Selection, alike, as_selection, shares
-from .friction_parameters import FrictionParameters, with_friction_columns
-from .parameters import FullParameters, LinearParameters, Parameters
+from .parameters import (
+    FrictionParameters,
+    FullParameters,
+    LinearParameters,
+    Parameters,
+    with_friction_columns,
+)
 
 #: what is linear in the regressor of all inertial parameters, and so can share a forest
 _RIGID = (FullParameters.regressor, LinearParameters.regressor)
@@ -99,15 +104,10 @@ def _in_forest(robots: Sequence[int], parameters: Sequence[Any]) -> Group:
 
 
 def _compute_with_friction(
-    compute: Regressors,
-    smoothing: np.ndarray,
-    armature: bool,
-    q: np.ndarray,
-    v: np.ndarray,
-    v_ref: np.ndarray,
-    a_ref: np.ndarray,
+    compute: Regressors, smoothing: np.ndarray, armature: bool, q: np.ndarray, *rates: np.ndarray
 ) -> np.ndarray:
-    return with_friction_columns(compute(q, v, v_ref, a_ref), v, v_ref, a_ref, smoothing, armature)
+    v, v_ref, a_ref = rates
+    return with_friction_columns(compute(q, *rates), v, v_ref, a_ref, smoothing, armature)
 
 
 def _alone(i: int, parameters: Parameters, nv: int) -> Group:

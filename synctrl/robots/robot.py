@@ -10,14 +10,12 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance, per_joint
-from ..errors import FrameNotFound, InputError
+from ..errors import InputError
 from ..renamed import names_elsewhere
 from .friction import Friction
-from .model_checks import check_inertia, check_joints, check_numbering
-from .per_thread import PerThread
-from .units import joint_units
+from .model import PerThread, check_inertia, check_joints, check_numbering, frame_id, joint_units
+from .urdf.changes import with_bodies
 from .urdf.document import Document, Pose
-from .urdf.inertials import with_bodies
 from .urdf.report import NOTHING, Report
 
 _WORLD_AXES = pin.LOCAL_WORLD_ALIGNED
@@ -65,7 +63,7 @@ class Robot:
         self.report = report
         check_joints(self.name, model)
         check_numbering(self.name, model)
-        self.tip, self.tip_id = tip, self._frame_id(tip)
+        self.tip, self.tip_id = tip, frame_id(self.name, model, tip)
         self.nv: int = model.nv
         self.joint_names: tuple[str, ...] = tuple(model.names)[1:]
         self.joint_units: tuple[str, ...] = joint_units(model)
@@ -270,12 +268,6 @@ class Robot:
     def _stored(self, q: np.ndarray) -> np.ndarray:
         """Joint positions that are known to fit, as Pinocchio stores them."""
         return q if self._plain_q else pin.integrate(self.model, self._neutral, q)
-
-    def _frame_id(self, frame: str) -> int:
-        instance("frame", frame, str, "a name")
-        if not self.model.existFrame(frame):
-            raise FrameNotFound(self.name, frame, [f.name for f in self.model.frames])
-        return int(self.model.getFrameId(frame))
 
     def _with(self, model: pin.Model, tip: str | None = None, **changes: Any) -> Self:
         """A robot with this model, and with what else it has but for the changes."""

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 
 from ..robots.urdf.mesh_files import MAX_MESH_BYTES, check_mesh
-from ..robots.urdf.packages import Packages
-from ..robots.urdf.regular import Unusable, read_regular
-from ..robots.urdf.textures import mean_of
+from ..robots.urdf.meshes import mean_of
+from ..robots.urdf.packages import Packages, Unusable, read_regular
 from .shapes import Color, Shape, mesh
 
 CREASE = np.radians(35)  # faces that meet at less than this are shaded as one

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import RobotError
-from ..robots.urdf.regular import Unusable
+from ..robots.urdf.packages import Unusable
 from .mesh_files import merged, read_mesh
 from .shapes import Color, Shape, box, capsule, cylinder, ellipsoid
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, instance, positive_number, printable
 from ..errors import InputError, RobotWarning, warn
 from ..files import write_whole
-from ..robots.kinematics import joint_poses
+from ..robots.model import joint_poses
 from . import shapes
 from .colors import ColorLike, hex_color, read_color, within_unit
 from .html import frame, page

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import pinocchio as pin
 
+from ..robots.model import SLIDES, subspace
 from ..robots.robot import Robot
-from ..robots.units import SLIDES, subspace
 from ..tasks.rotations import from_quaternion
 from .colors import ColorLike, read_color
 from .rotations import towards

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import NonFiniteError, OrientationError, SimulationError, SingularJacobianError
-from ..robots.units import joined, unit_for
+from ..robots.model import joined, unit_for
 from .closed_loop import ClosedLoop
 from .schedules import DisturbanceSchedule
 from .stop import Excess, Push, Stop

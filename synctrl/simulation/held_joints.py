@@ -13,9 +13,9 @@ from ..checks import finite_array
 from ..control.gains import spread
 from ..coupling.cell import Cell
 from ..errors import InputError
-from ..robots.limits import joint_limits
+from ..robots.mechanism import joint_limits
+from ..robots.model import joined, unit_for
 from ..robots.robot import Robot
-from ..robots.units import joined, unit_for
 from .plant import Output, Plant
 
 #: outputs of a run with held joints

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, NonFiniteError, SynctrlError
-from ..robots.units import unit_for
+from ..robots.model import unit_for
 from .advance import Control, Step
 from .clock import Clock, before
 from .closed_loop import ClosedLoop, State

@@ -14,8 +14,8 @@ from ..control.controller import Signals
 from ..coupling.cell import Cell
 from ..errors import SaturationWarning, warn
 from ..renamed import names_elsewhere
-from ..robots.limits import joint_limits
-from ..robots.units import unit_for
+from ..robots.mechanism import joint_limits
+from ..robots.model import unit_for
 from ..tasks.redundancy import velocity_lost
 from .plant import Output, Plant
 

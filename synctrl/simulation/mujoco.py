@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, instance, positive_number
 from ..coupling.cell import Cell
 from ..errors import InputError, MissingDependencyError
-from ..robots.per_thread import PerThread
+from ..robots.model import PerThread
 from ..robots.robot import Robot
 from ..robots.urdf.document import Document
 from ..robots.urdf.writer import dynamics_xml

@@ -12,7 +12,7 @@ import numpy as np
 from ..checks import choice, instance
 from ..coupling.cell import Cell
 from ..robots.forest import forests
-from ..robots.limits import joint_limits
+from ..robots.mechanism import joint_limits
 from ..robots.robot import Robot
 from ..tasks.algebra import padded
 from .schedules import Payload, PayloadSchedule

@@ -17,7 +17,7 @@ import numpy as np
 from ..checks import printable
 from ..coupling.cell import Cell
 from ..errors import InputError
-from ..robots.limits import joint_limits
+from ..robots.mechanism import joint_limits
 from ..robots.written import write_robot
 from .advance import Sample
 from .clock import Clock

@@ -24,7 +24,7 @@ import numpy as np
 
 from ..errors import ResultError
 from ..files import whole_file
-from ..robots.units import TURNS, unit_for
+from ..robots.model import TURNS, unit_for
 from .schema import check_info, read_json
 
 #: what reading a file that is no archive, or a damaged one, may raise

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..robots.units import TURNS, joined, unit_for
+from ..robots.model import TURNS, joined, unit_for
 from .result_file import LAYOUT, unit_of
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import SimulationError
-from ..robots.units import unit_for
+from ..robots.model import unit_for
 from .closed_loop import ClosedLoop
 from .rates import HELD, HELD_SPRING, RUNGE_KUTTA, SWING, Rate, loop_rates
 from .schedules import DisturbanceSchedule

@@ -8,19 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..analysis.metrics import (
-    DEFINITIONS,
-    ERRORS,
-    SETTLING_FRACTION,
-    Band,
-    Metrics,
-    finite_or_none,
-    metrics,
-)
+from ..analysis.metrics import DEFINITIONS, ERRORS, SETTLING_FRACTION, Band, Metrics, finite_or_none, metrics
 from ..analysis.metrics import squared as squared_unit
 from ..coupling.cell import Cell
 from ..errors import SaturationWarning, StepWarning, warn
-from ..robots.units import joined, unit_for
+from ..robots.model import joined, unit_for
 from ..simulation.result import Result
 from ..simulation.step_error import LIMIT
 

@@ -13,8 +13,7 @@ from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
 from ..errors import InputError
 from ..robots.base_parameters import BaseParameters
-from ..robots.friction_parameters import FrictionParameters
-from ..robots.parameters import FullParameters, LinearParameters, Parameters
+from ..robots.parameters import FrictionParameters, FullParameters, LinearParameters, Parameters
 from ..robots.robot import Robot
 from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..checks import finite_array, instance
 from ..errors import InputError, LimitWarning, UnreachableError, warn
-from ..robots.limits import joint_limits
+from ..robots.mechanism import joint_limits
+from ..robots.model import TURNS
 from ..robots.robot import Robot
-from ..robots.units import TURNS
 from .spaces import CartesianSpace
 
 RESTARTS = 20

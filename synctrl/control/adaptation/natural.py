@@ -10,7 +10,7 @@ import numpy as np
 from ...checks import non_negative_number, positive_number
 from ...coupling.cell import Cell
 from ...errors import InputError
-from ...robots.friction_parameters import count_bodies
+from ...robots.parameters import count_bodies
 from ...robots.pseudo_inertia import dual, inertial_parameters, pseudo_inertia
 from .protocol import Seen
 

@@ -1,14 +1,8 @@
 """Documents of robots: read strictly, checked, written anew for Pinocchio."""
 
 from .build import build_model, model_from_xml
-from .description import (
-    Description,
-    describe,
-    existing_file,
-    read_urdf,
-    urdf_folder,
-)
-from .locks import lock_joints
+from .changes import lock_joints
+from .description import Description, describe, existing_file, read_urdf, urdf_folder
 
 __all__ = [
     "Description",

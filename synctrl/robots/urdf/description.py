@@ -1,7 +1,8 @@
-"""Reading a URDF so that nothing wrong gets through, whoever wrote it.
+"""Reading a robot's file so that nothing wrong gets through, whoever wrote it.
 
-The file is read strictly into a `Document`, the document is checked, and Pinocchio is handed what was
-checked, written anew: it never sees the file. Then its model is compared with the document.
+The file (a URDF, xacro that expands to one, or MJCF) is read strictly into a `Document`, the document is
+checked, and Pinocchio is handed what was checked, written anew: it never sees the file. Then its model is
+compared with the document.
 """
 
 from __future__ import annotations
@@ -14,21 +15,23 @@ from typing import Any
 import pinocchio as pin
 
 from ...checks import boolean, instance
-from ...errors import FrameNotFound, RobotError, near
+from ...errors import InputError, RobotError, RobotWarning, near, warn
+from ..model import frame_id
+from .branches import check_tip, default_tip
 from .build import build_model, check_model
+from .changes import settle_locks, with_inertials
 from .checks import check_bodies, check_some_mass, check_tree
 from .document import Document, Inertial
-from .frictions import stated_friction
-from .inertials import with_inertials
-from .locks import settle_locks
 from .meshes import build_visual, find_pictures
-from .names import remark_names
+from .mjcf import read_mjcf
+from .mjcf_files import ROOT as MJCF_ROOT
 from .packages import Packages
-from .report import NOTHING, Notes, Report, warn_of
-from .sources import read_source
-from .suspicions import suspect
-from .tips import check_tip, default_tip
-from .xml import quoted
+from .reader import read_text
+from .remarks import remark_names, stated_friction, suspect
+from .report import NOTHING, Notes, Report
+from .xacro import SUFFIX as XACRO_SUFFIX
+from .xacro import expand
+from .xml import parse_xml, quoted, read_bytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +62,7 @@ class Description:
         Raises:
             FrameNotFound: there is none of that name.
         """
-        instance("frame", tip, str, "a name")
-        if not self.model.existFrame(tip):
-            raise FrameNotFound(self.name, tip, [frame.name for frame in self.model.frames])
+        frame_id(self.name, self.model, tip)
         return replace(self, tip=tip)
 
     @property
@@ -141,9 +142,12 @@ def describe(
     check_model(document, model)
     document = find_pictures(document, Packages(document.file, package_dirs), notes)
     visual = build_visual(document, model)
-    tip = _tip(document, model, tip, held, notes)
+    if tip is None:
+        tip = default_tip(document, held, notes)
+    frame_id(document.name, model, tip)
     report = replace(notes.report(document.source), known=tuple(stated_friction(document)))
-    warn_of(report)
+    if report.notes:
+        warn(report.summary(), RobotWarning)
     name = document.name if document.name.isprintable() else quoted(document.name)
     return Description(name, model, visual, tip, document, tuple(held), report)
 
@@ -161,16 +165,6 @@ def _settled(
     remark_names(document, notes)
     suspect(document, notes)
     return document, held
-
-
-def _tip(
-    document: Document, model: pin.Model, tip: str | None, held: Mapping[str, float], notes: Notes
-) -> str:
-    if tip is None:
-        return default_tip(document, held, notes)
-    if not model.existFrame(tip):
-        raise FrameNotFound(document.name, tip, [frame.name for frame in model.frames])
-    return tip
 
 
 # -- files -------------------------------------------------------------------------------------------------
@@ -205,3 +199,23 @@ def existing_file(path: str | Path) -> Path:
         f"; in its folder there are: {', '.join(beside[:5])}" if beside else ""
     )
     raise RobotError(f"expected a URDF file, found {kind}{hint}", file=file)
+
+
+def read_source(
+    file: Path, packages: Packages, notes: Notes, xacro_args: Mapping[str, object] | None = None
+) -> Document:
+    """A file as a document: xacro if it is called so, else what its root element says.
+
+    Raises:
+        RobotError: with file, line, link or joint, what was found and what is expected.
+        InputError: `xacro_args` for another kind of file.
+        MissingDependencyError: xacro or MuJoCo is needed, and not installed.
+    """
+    if file.suffix.lower() == XACRO_SUFFIX:
+        return read_text(file, expand(file, xacro_args, packages).encode(), notes)
+    if xacro_args is not None:
+        raise InputError(f"expected none for a file that is no xacro file: {file}", subject="xacro_args")
+    data = read_bytes(file)
+    if file.suffix.lower() != ".urdf" and parse_xml(str(file), data).tag == MJCF_ROOT:
+        return read_mjcf(file, packages, notes)
+    return read_text(file, data, notes)

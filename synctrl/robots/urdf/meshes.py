@@ -1,13 +1,16 @@
 """Finding the meshes and textures that a description names, in its packages and nowhere else.
 
 Names are resolved once, when a description is read: what is drawn later is the file that was found then. See
-`mesh_files` for what is looked at in a file. A mesh that cannot be shown is left out.
+`mesh_files` for what is looked at in a file. A mesh that cannot be shown is left out; of a texture the mean
+colour is shown.
 """
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 import coal
@@ -16,10 +19,8 @@ import pinocchio as pin
 
 from .document import Document, Geometry, Link, Shape, Vector
 from .mesh_files import check_mesh
-from .packages import Packages
-from .regular import Unusable, read_regular, require_regular
+from .packages import Packages, Unusable, read_regular, require_regular
 from .report import Notes
-from .textures import MAX_TEXTURE_BYTES, mean_color
 from .xml import quoted
 
 DEFAULT_COLOR = (0.9, 0.9, 0.9, 1.0)
@@ -148,3 +149,45 @@ def _fault(file: Path) -> str:
     except Unusable as error:
         return str(error)
     return ""
+
+
+# -- textures ----------------------------------------------------------------------------------------------
+
+FORMATS = ("PNG", "JPEG", "BMP", "GIF", "TGA", "WEBP")
+MAX_TEXTURE_BYTES = 64_000_000
+MAX_PIXELS = 64_000_000
+
+
+def mean_color(data: bytes) -> Vector:
+    """The mean colour, red, green, blue, alpha from 0 to 1, of the picture in a file with this content.
+
+    Raises:
+        Unusable: it is of another format, too large, or broken.
+    """
+    from PIL import Image
+
+    try:
+        image = Image.open(io.BytesIO(data), formats=FORMATS)
+    except Exception as error:  # each format has its own
+        raise Unusable(f"expected a picture in one of the formats {', '.join(FORMATS)}") from error
+    return mean_of(image)
+
+
+def mean_of(image: Any) -> Vector:
+    """The mean colour of a picture, opaque.
+
+    Raises:
+        Unusable: it is of another format (some are programs), has too many pixels, or is broken.
+    """
+    from PIL.Image import Resampling
+
+    if image.format not in FORMATS:
+        raise Unusable(f"expected a picture in one of the formats {', '.join(FORMATS)}")
+    if image.width * image.height > MAX_PIXELS:
+        raise Unusable(f"expected a picture of at most {MAX_PIXELS / 1e6:g} million pixels, found more")
+    try:
+        pixel = image.convert("RGB").resize((1, 1), Resampling.BOX).tobytes()
+    except Exception as error:  # each format has its own
+        raise Unusable(f"the picture is broken ({error})") from error
+    r, g, b = (level / 255 for level in pixel)
+    return r, g, b, 1.0

@@ -15,9 +15,8 @@ import pinocchio as pin
 
 from ...errors import MissingDependencyError, RobotError
 from .document import Document, Geometry, Inertial, Joint, Link, Mimic, Pose, Shape, upper_triangle
-from .mjcf_check import check_dynamics
 from .mjcf_files import Whole, read_whole
-from .mjcf_limits import joint_limits
+from .mjcf_model import check_dynamics, joint_limits
 from .packages import Packages
 from .report import Notes
 from .xml import quoted

@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from .packages import Packages
-from .regular import Unusable, read_regular
+from .packages import Packages, Unusable, read_regular
 from .report import Notes
 from .xml import Element, parse_xml, quoted, read_bytes
 
@@ -78,7 +77,7 @@ class _Reader:
                 child.attributes.pop(name, None)
         self._leave_out_pictures(root)
         weighty = _weighty_meshes(root, compiler.get("inertiafromgeom") == "true")
-        for element in _walk(root):
+        for element in root.walk():
             if element.tag in REFUSED:
                 element.refuse("one rigid mechanism", REFUSED[element.tag])
             if element.tag == "mesh" and "file" in element.attributes:
@@ -111,7 +110,7 @@ class _Reader:
         element.refuse("a file beside this one, or in its package", quoted(named))
 
     def _leave_out_pictures(self, root: Element) -> None:
-        for element in _walk(root):
+        for element in root.walk():
             for child in element.children:
                 if child.tag in ("texture", "skin"):
                     child.note("left out", f"a {child.tag}; it is only seen")
@@ -148,27 +147,21 @@ class _Reader:
             raise element.error(f"expected {expected}, found {found}") from error
 
 
-def _walk(element: Element) -> Iterator[Element]:
-    yield element
-    for child in element.children:
-        yield from _walk(child)
-
-
 def _weighty_meshes(root: Element, all_of_them: bool) -> set[str]:
     """Names of the meshes that can give a body its mass, or a primitive its size."""
     named = {
-        geom.attributes["mesh"] for geom in _walk(root) if geom.tag == "geom" and "mesh" in geom.attributes
+        geom.attributes["mesh"] for geom in root.walk() if geom.tag == "geom" and "mesh" in geom.attributes
     }
     if all_of_them:
         return named
-    return {name for body in _walk(root) if body.tag == "body" for name in _weights(body)}
+    return {name for body in root.walk() if body.tag == "body" for name in _weights(body)}
 
 
 def _weights(body: Element) -> Iterator[str]:
     """Meshes from which MuJoCo computes the mass of this body."""
     if body.all("inertial"):
         return
-    frames = [body, *(frame for child in body.all("frame") for frame in _walk(child))]
+    frames = [body, *(frame for child in body.all("frame") for frame in child.walk())]
     for geom in (geom for frame in frames if frame.tag in ("body", "frame") for geom in frame.all("geom")):
         if "mesh" in geom.attributes and geom.attributes.get("mass") != "0":
             yield geom.attributes["mesh"]

@@ -1,12 +1,14 @@
-"""Packages of robot descriptions: where they are, and which folders a description may read.
+"""Files that a robot description names: where packages are, what may be read, and reading it.
 
 A package is a folder with a package.xml, and is called what that file says, whatever the folder's name is.
-Where that file is missing, a folder with `meshes` beside `urdf` or `robots` is a package of its own name.
+Where that file is missing, a folder with `meshes` beside `urdf` or `robots` is a package of its own name. Of
+files that somebody else has named, regular ones only are read, and never more of them than was asked for.
 """
 
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Iterable, Iterator
 from functools import cached_property
 from importlib import metadata
@@ -14,7 +16,6 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from ...checks import instance
-from .regular import Unusable, read_regular
 
 MANIFEST = "package.xml"
 DESCRIPTIONS, MESHES = ("urdf", "robots"), "meshes"
@@ -56,7 +57,8 @@ class Packages:
         if not _is_plain(name):
             return None
         above = (folder for folder in self._above if _package_name(folder) == name)
-        return next(above, None) or self._others.get(name) or _first_folder(self._installed, name)
+        installed = (holder / name for holder in self._installed if os.path.isdir(holder / name))
+        return next(above, None) or self._others.get(name) or next(installed, None)
 
     @property
     def _above(self) -> tuple[Path, ...]:
@@ -139,10 +141,6 @@ def _is_laid_out(folder: Path) -> bool:
     return os.path.isdir(folder / MESHES) and any(os.path.isdir(folder / name) for name in DESCRIPTIONS)
 
 
-def _first_folder(holders: Iterable[Path], name: str) -> Path | None:
-    return next((holder / name for holder in holders if os.path.isdir(holder / name)), None)
-
-
 def _below(folder: Path, depth: int) -> Iterator[Path]:
     """The folders below a folder, by name, hidden ones left out; packages are not looked into."""
     try:
@@ -170,3 +168,56 @@ def _package_name(folder: Path) -> str | None:
     except (SyntaxError, ValueError, LookupError):  # not XML, or an encoding that nobody knows
         return folder.name
     return name.strip() or folder.name
+
+
+# -- reading a file that somebody else has named -----------------------------------------------------------
+
+
+class Unusable(Exception):
+    """A file that cannot be used; the words say why."""
+
+
+def read_regular(file: Path, limit: int) -> bytes:
+    """The content of a regular file of at most `limit` bytes.
+
+    Whatever else has a name in a file system (a pipe, a device) may hold a reader for ever: it is not opened.
+    Should one take the file's place meanwhile, opening it does not wait.
+
+    Raises:
+        Unusable: there is no such file, it is not a regular one, it is larger, or it cannot be read.
+    """
+    require_regular(file)
+    try:
+        descriptor = os.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        with open(descriptor, "rb") as stream:
+            _require(os.fstat(descriptor).st_mode)
+            data = stream.read(limit + 1)
+    except OSError as error:
+        raise Unusable(_reason(error)) from error
+    if len(data) > limit:
+        raise Unusable(f"expected at most {limit / 1e6:g} MB, found more")
+    return data
+
+
+def require_regular(file: Path) -> None:
+    """Make sure that a regular file is there, without opening it.
+
+    Raises:
+        Unusable: there is none.
+    """
+    try:
+        _require(os.stat(file).st_mode)
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        raise Unusable(_reason(error)) from error
+
+
+def _require(mode: int) -> None:
+    if not stat.S_ISREG(mode):
+        raise Unusable("it is not a regular file")
+
+
+def _reason(error: OSError | ValueError) -> str:
+    if isinstance(error, FileNotFoundError):
+        return "there is no such file"
+    words = getattr(error, "strerror", None) or str(error)
+    return f"it cannot be read: {words}"

@@ -1,4 +1,7 @@
-"""From the text of a URDF to a `Document`: every value checked where it stands, before anything is built."""
+"""From the text of a URDF to a `Document`: every value checked where it stands, before anything is built.
+
+Elements of other programs are left alone, unless they add to the mechanism: without them it would be another.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +11,9 @@ from pathlib import Path
 
 from ...errors import near
 from .document import INERTIA, MOVING_TYPES, NO_INERTIA, Document, Inertial, Joint, Link, Mimic, Vector
-from .extensions import EXTENSIONS, LINK_EXTENSIONS, refuse_loops, refuse_xacro
-from .limits import read_limit
-from .origins import read_origin
+from .parts import Material, read_limit, read_materials, read_origin, read_shapes
 from .report import Notes
-from .shapes import Material, read_materials, read_shapes
-from .xml import Element, parse_xml, quoted, read_bytes, shown_tag
+from .xml import Element, parse_xml, quoted, shown_tag
 
 JOINT_TYPES = (*MOVING_TYPES, "fixed")
 JOINT_PARTS = (
@@ -26,19 +26,15 @@ _NO_AXIS = 1e-6
 _UNIT_AXIS = 1e-3
 
 
-def read_document(file: Path, notes: Notes | None = None) -> Document:
-    """A URDF file as a document whose every value is finite and of the right kind.
+def read_text(file: Path, data: bytes, notes: Notes | None = None) -> Document:
+    """The content of a URDF file as a document whose every value is finite and of the right kind.
 
-    How the values fit together is not looked at here, see `check_tree` and `check_bodies`.
+    How the values fit together is not looked at here, see `check_tree` and `check_bodies`. `notes` takes what
+    is left out and assumed.
 
     Raises:
-        RobotError: with file, line, link or joint, what was found and what is expected.
+        RobotError: with line, link or joint, what was found and what is expected.
     """
-    return read_text(file, read_bytes(file), notes)
-
-
-def read_text(file: Path, data: bytes, notes: Notes | None = None) -> Document:
-    """`read_document` for the content `data` of `file`; `notes` takes what is left out and assumed."""
     root = parse_xml(str(file), data, notes)
     if root.tag != "robot":
         root.refuse("a URDF with the root element <robot>", f"<{shown_tag(root.tag)}>")
@@ -85,17 +81,16 @@ def _inertial(element: Element) -> Inertial | None:
     mass.know((), ("value",))
     if inertia is None:
         element.note("assumed", "without an <inertia> the mass is taken as that of a point")
+        moments = NO_INERTIA
+    else:
+        inertia.know((), INERTIA)
+        moments = tuple(inertia.number(key) for key in INERTIA)
     return Inertial(
         mass=mass.number("value"),
-        inertia=NO_INERTIA if inertia is None else _moments(inertia),
+        inertia=moments,
         origin=read_origin(element),
         line=element.line,
     )
-
-
-def _moments(inertia: Element) -> Vector:
-    inertia.know((), INERTIA)
-    return tuple(inertia.number(key) for key in INERTIA)
 
 
 # -- joints ------------------------------------------------------------------------------------------------
@@ -180,3 +175,57 @@ def _friction(dynamics: Element, key: str) -> float:
     if value < 0:
         dynamics.note("left out", f"{key} of {value:g}, which would drive the joint")
     return max(value, 0.0)
+
+
+# -- what is in a file besides the robot -------------------------------------------------------------------
+
+EXTENSIONS = ("gazebo", "transmission", "ros2_control", "sensor", "mujoco", "group_state")
+LINK_EXTENSIONS = ("contact", "surface", "gravity", "kinematic", "self_filter", "collision_checking")
+"""Elements of other programs, which say nothing about the mechanism."""
+
+_DEFINITIONS = ("xacro:property", "xacro:arg")
+_EXPANDS = "a plain URDF"
+_ADVICE = "unexpanded xacro; expand the file with xacro first, or load the .xacro file itself"
+_CLOSES = ("loop_joint", "closed_loop", "loop_closure", "ball_constraint", "linear_bushing_rpy", "equality")
+
+
+def refuse_xacro(root: Element) -> None:
+    """Refuse macros, and expressions in the robot itself, wherever they stand.
+
+    Definitions that no expression uses say nothing.
+
+    Raises:
+        RobotError: with the advice to expand the file.
+    """
+    unused = [child for child in root.children if child.tag in _DEFINITIONS and not child.children]
+    for element in root.walk():
+        if element.tag.startswith("xacro:") and element not in unused:
+            element.refuse(_EXPANDS, f"<{shown_tag(element.tag)}>: {_ADVICE}")
+    robot = (part for child in root.children if child.tag not in EXTENSIONS for part in child.walk())
+    for element in (root, *robot):
+        for key, value in element.attributes.items():
+            if "${" in value or "$(" in value:
+                element.refuse(_EXPANDS, f"{quoted(key)} of {quoted(value)}: {_ADVICE}")
+
+
+def refuse_loops(root: Element) -> None:
+    """Refuse elements of other programs that add a joint or close a loop, which would be cut without a word.
+
+    Raises:
+        RobotError: with the element.
+    """
+    for element in root.walk():
+        name = element.tag.rpartition(":")[2]
+        if name in _CLOSES or (":" in element.tag and name == "joint"):
+            element.refuse("a tree of links and joints", f"<{shown_tag(element.tag)}>, which closes a loop")
+    carried = {end.attributes.get("link", "") for joint in root.all("joint") for end in joint.all("child")}
+    for extension in (child for child in root.children if child.tag in EXTENSIONS):
+        for element in extension.walk():
+            if element.tag == "joint" and _joins(element, carried):
+                element.refuse("a tree of links and joints", "a joint for a simulator, which closes a loop")
+
+
+def _joins(joint: Element, carried: set[str]) -> bool:
+    """Whether a joint of a simulator connects two links, other than the world with the base."""
+    ends = [part.content.strip() for tag in ("parent", "child") for part in joint.all(tag)]
+    return len(ends) == 2 and not ("world" in ends and carried.isdisjoint(ends))

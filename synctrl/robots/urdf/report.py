@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import overload
 
-from ...errors import RobotError, RobotWarning, warn
+from ...errors import RobotError
 
 KINDS = ("left out", "assumed", "locked", "suspicious")
 
@@ -123,13 +123,3 @@ class Notes:
     def report(self, source: str) -> Report:
         """What was collected."""
         return Report(tuple(self.collected), source)
-
-
-def warn_of(report: Report) -> None:
-    """The one warning of a robot, if there is anything to say about it.
-
-    Warns:
-        RobotWarning: the summary of the report.
-    """
-    if report.notes:
-        warn(report.summary(), RobotWarning)

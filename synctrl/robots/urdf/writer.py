@@ -89,9 +89,7 @@ def _joint_lines(joint: Joint) -> list[str]:
     lines += [f"    <{_tag('parent', link=joint.parent)}/>", f"    <{_tag('child', link=joint.child)}/>"]
     lines += _origin_lines(joint.origin, "    ")
     if joint.moves:
-        lines += [f"    <{_tag('axis', xyz=joint.axis)}/>"]
-    if joint.moves:
-        lines += [f"    <{_tag('limit', **_bounds(joint))}/>"]
+        lines += [f"    <{_tag('axis', xyz=joint.axis)}/>", f"    <{_tag('limit', **_bounds(joint))}/>"]
     if joint.damping or joint.friction:
         lines += [f"    <{_tag('dynamics', damping=joint.damping, friction=joint.friction)}/>"]
     return [*lines, "  </joint>"]

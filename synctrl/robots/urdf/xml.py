@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -18,6 +18,7 @@ from xml.parsers import expat
 
 from ...checks import unprintable
 from ...errors import RobotError
+from .packages import Unusable, read_regular
 from .report import Notes
 
 MAX_BYTES = 10_000_000
@@ -88,6 +89,12 @@ class Element:
         for other in found[1:]:
             other.note("left out", f"another <{tag}>; that in line {found[0].line} is taken")
         return found[0] if found else None
+
+    def walk(self) -> Iterator[Element]:
+        """This element and all in it."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
 
     def required(self, tag: str) -> Element:
         """The one child with this tag."""
@@ -187,15 +194,11 @@ def _resembles(name: str, word: str) -> bool:
 
 
 def read_bytes(file: Path) -> bytes:
-    """The content of a file that is there and not too large."""
+    """The content of a regular file that is not too large."""
     try:
-        with file.open("rb") as stream:
-            data = stream.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise RobotError(f"cannot be read: {error.strerror}", file=file) from error
-    if len(data) > MAX_BYTES:
-        raise RobotError(f"expected at most {MAX_BYTES / 1e6:g} MB, found more", file=file)
-    return data
+        return read_regular(file, MAX_BYTES)
+    except Unusable as error:
+        raise RobotError(str(error), file=file) from error
 
 
 def parse_xml(file: str, data: bytes, notes: Notes | None = None) -> Element:

@@ -1,15 +1,16 @@
-"""What is possible in a robot description, and yet most often a mistake: said, and taken as it stands."""
+"""What is said about a robot description, and taken as it stands: what may be mistakes, names, friction."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 
 import numpy as np
 
 from .branches import Branches
 from .document import Document, Inertial, Joint
-from .report import Notes
+from .report import Note, Notes
 from .xml import quoted
 
 FARTHEST_COM = 3.0
@@ -82,3 +83,39 @@ def _of_range(joint: Joint) -> str:
         return ""
     length = limit.upper - limit.lower
     return f"a range of {length:g} rad: in degrees?" if length > LONGEST_RANGE else ""
+
+
+# -- names -------------------------------------------------------------------------------------------------
+
+_PLAIN = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]{0,127}", re.ASCII)
+
+
+def is_plain(name: str) -> bool:
+    """Whether every program takes this name."""
+    return bool(_PLAIN.fullmatch(name))
+
+
+def remark_names(document: Document, notes: Notes) -> None:
+    """Remark names that other programs may not take, and joints that are named as a link or the world."""
+    links, joints = ([item.name for item in items] for items in (document.links, document.moving_joints))
+    where = f"robot {quoted(document.name)}"
+    odd = [name for name in (document.name, *links, *joints) if not is_plain(name)]
+    if odd:
+        text = f"{len(odd)} with other characters than A-Z, a-z, 0-9, '_', '-', '.', such as {quoted(odd[0])}"
+        notes.add("assumed", where, f"names are taken as they stand, {text}")
+    for name in sorted({"universe", *links} & set(joints)):
+        notes.add("assumed", where, f"joint {quoted(name)} is told from a link or the world of that name")
+
+
+def stated_friction(document: Document) -> Iterator[Note]:
+    """One remark, if a joint that moves has friction: no oddity, so it is no warning by itself."""
+    rubbing = [joint for joint in document.moving_joints if joint.damping or joint.friction]
+    if rubbing:
+        damping = max(joint.damping for joint in rubbing)
+        friction = max(joint.friction for joint in rubbing)
+        many = f"{len(rubbing)} joint{'s' * (len(rubbing) > 1)}"
+        text = (
+            f"friction, viscous up to {damping:g} and Coulomb up to {friction:g} at {many}, "
+            "acts only if it is asked for, as by Member(robot, ..., friction='urdf'); see Robot.urdf_friction"
+        )
+        yield Note("assumed", f"{rubbing[0].title}, dynamics", text, rubbing[0].line)
