@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
 from ..robots.robot import Robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .legends import plain
 from .plots import new_figure, style
-from .runs import check_run, shown_experiment
+from .runs import check_axes, check_run, shown_experiment
 from .style import DESIRED, robot_color
 
 if TYPE_CHECKING:
@@ -38,10 +37,7 @@ def cell_layout(result: Result, experiment: Experiment | None = None) -> Figure:
         InputError: a run in another space, or one without its experiment.
     """
     check_run(result, "x", "x_desired", "q")
-    if result.info["axes"] != ["x", "y"]:
-        raise InputError(
-            f"expected a run along x and y, found {', '.join(result.info['axes'])}", subject="result"
-        )
+    check_axes(result, "x", "y")
     experiment = shown_experiment(result, experiment)
     with style():
         figure, panels = new_figure(5.4, columns=2, width=8.8, gridspec_kw={"width_ratios": (0.4, 1.0)})

@@ -15,13 +15,11 @@ from ..errors import InputError, RobotWarning, warn
 from ..files import write_whole
 from ..robots.kinematics import joint_poses
 from . import shapes
-from .colors import ColorLike, hex_color, read_color, within_unit
-from .html import frame, page
+from .html import fit_camera, frame, page, view_commands, viewer_axes
 from .meshes import MeshLibrary
-from .nodes import Node, bounding_box, label, pack, paint, scene_commands
-from .rotations import TINY, continuous, towards, unit
+from .nodes import TINY, Node, bounding_box, continuous, label, pack, paint, scene_commands, towards, unit
 from .shapes import Shape
-from .view import fit_camera, view_commands, viewer_axes
+from .style import ColorLike, hex_color, read_color, within_unit
 
 if TYPE_CHECKING:
     import pinocchio as pin
