@@ -12,6 +12,7 @@ from ..simulation.simulate import Experiment
 from ..tasks import rotations
 from ..tasks.poses import Attached
 from .arms import add_bars, add_disturbances, arms_scene, error_color, error_share, tip_positions
+from .nodes import towards
 from .runs import check_axes, check_run, frame_indices, shown_experiment
 from .scene import Scene
 from .style import DESIRED, robot_color
@@ -59,7 +60,7 @@ def planar_scene(
     robots = shown_experiment(result, experiment).cell.robots
     scene = arms_scene(result, robots, frames, fps, caption, [robot_color(i) for i in range(len(robots))])
     height = float(robots[0].tip_position(result.q[0, 0, : robots[0].nv])[2])
-    tips, desired = (_with_height(x[frames], height) for x in (result.x, result.x_desired))
+    tips, desired = (np.insert(x[frames], 2, height, axis=2) for x in (result.x, result.x_desired))
     for k, compared in enumerate(result.info["pairs"]):
         shown = share[frames, k]
         radius = THIN + shown * (THICK - THIN)
@@ -105,7 +106,7 @@ def payload_pair_scene(
     wrists, desired = (tip_positions(robots, q[frames]) for q in (result.q, result.x_desired))
     color = error_color(share[frames].max(axis=1))
     middle, along = wrists.mean(axis=1), wrists[:, 1] - wrists[:, 0]
-    scene.add_box("payload", PAYLOAD, middle, color, quaternion=_turned(along))
+    scene.add_box("payload", PAYLOAD, middle, color, quaternion=towards(along, axis=(1, 0, 0)))
     _add_tracking(scene, result, desired, wrists, PAIR_TIMES)
     add_disturbances(scene, result, robots, frames)
     return scene
@@ -124,18 +125,6 @@ def _shown(result: Result, size: float) -> str:
     """A synchronization error for the caption: degrees for rad, else its own unit."""
     unit = result.unit("sync_error")
     return f"{np.rad2deg(size):.2g} deg" if unit == "rad" else f"{size:.2g} {unit}"
-
-
-def _with_height(xy: np.ndarray, z: float) -> np.ndarray:
-    return np.concatenate([xy, np.full((*xy.shape[:-1], 1), z)], axis=-1)
-
-
-def _turned(along: np.ndarray) -> np.ndarray:
-    """Quaternions x, y, z, w, (T, 4), that turn the x axis along a direction, (T, 3), by the shortest way."""
-    direction = along / np.linalg.norm(along, axis=1, keepdims=True)
-    x = np.broadcast_to([1.0, 0.0, 0.0], direction.shape)
-    quaternion = np.column_stack([np.cross(x, direction), 1 + (x * direction).sum(axis=1)])
-    return quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
 
 
 def formation_scene(result: Result, fps: float = 25) -> Scene:
@@ -183,8 +172,8 @@ def payload_scene(result: Result, size: ArrayLike, fps: float = 25) -> Scene:
     caption = "The payload turns red with the synchronization error; it has no mass."
     cell = shown_experiment(result, None).cell
     scene = arms_scene(result, cell.robots, frames, fps, caption)
-    hands = [member.trajectory for member in cell.members]
-    if len(hands) != 2 or not all(isinstance(hand, Attached) for hand in hands):
+    hands = [hand for member in cell.members if isinstance(hand := member.trajectory, Attached)]
+    if not len(hands) == cell.n == 2:
         raise InputError(
             "expected two robots whose desired motions are Attached to a payload", subject="result"
         )

@@ -99,6 +99,7 @@ def page(
     """
     lines = "\n".join(base64.b64encode(gzip.compress(c, mtime=0)).decode() for c in commands)
     library = _viewer_source("dist/main.min.js")
+    licences = "\n".join(map(_viewer_source, ("LICENSE", "dist/main.min.js.LICENSE.txt")))
     return "\n".join(
         [
             "<!DOCTYPE html>",
@@ -108,7 +109,7 @@ def page(
             f"<title>{escape(title) or 'Scene'}</title><style>{STYLE}</style></head><body>",
             f'<div><div id="meshcat-pane" data-target="{json.dumps(list(target))}"></div></div>',
             f'<div id="words">{_words(title, caption, legend, remarks)}</div>',
-            f'<script type="text/plain" id="licences">{_licences()}</script>',
+            f'<script type="text/plain" id="licences">{licences}</script>',
             f'<script type="text/plain" id="commands">{lines}</script>',
             f"<script>{library}</script><script>{PLAYER}</script></body></html>\n",
         ]
@@ -139,10 +140,6 @@ def _policy(scripts: Iterable[str]) -> str:
         f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; "
         "img-src data: blob:; worker-src blob:; base-uri 'none'; form-action 'none'"
     )
-
-
-def _licences() -> str:
-    return "\n".join(_viewer_source(name) for name in ("LICENSE", "dist/main.min.js.LICENSE.txt"))
 
 
 def _viewer_source(name: str) -> str:

@@ -70,14 +70,8 @@ def _draw_cell(panel: Axes, result: Result, robots: tuple[Robot, ...]) -> None:
         base, reach = chain[0], np.linalg.norm(np.diff(chain, axis=0), axis=1).sum()
         _draw_circle(panel, base, reach, color=robot_color(i), linewidth=0.9, linestyle=":")
         panel.plot(*result.x_desired[:, i].T, color="black", linewidth=2.0, zorder=4)
-        panel.annotate(
-            plain(result.names[i]),
-            base,
-            (-12, -4),
-            textcoords="offset points",
-            ha="right",
-            color=robot_color(i),
-        )
+        look: Any = {"textcoords": "offset points", "ha": "right", "color": robot_color(i)}
+        panel.annotate(plain(result.names[i]), base, (-12, -4), **look)
         bases.append(base)
     for compared in result.info["pairs"]:
         for a, b in combinations(result.x[-1, compared], 2):
@@ -93,19 +87,14 @@ def _draw_cell(panel: Axes, result: Result, robots: tuple[Robot, ...]) -> None:
 
 
 def _draw_arm(panel: Axes, robot: Robot, q: np.ndarray, index: int, alpha: float) -> np.ndarray:
-    """Base, joints and tip as a line; returns them, (nv + 1, 2)."""
-    points, color = _chain(robot, q), robot_color(index)
+    """Base, joints and tip as a line, seen from above; returns them, (nv + 1, 2)."""
+    joints = [robot.with_tip(frame).tip_position(q) for frame in robot.joint_frames]
+    points, color = np.array([*joints, robot.tip_position(q)])[:, :2], robot_color(index)
     panel.plot(*points.T, "-", color=color, linewidth=5, alpha=0.6 * alpha, solid_joinstyle="round")
     panel.plot(*points[1:-1].T, "o", color=color, markersize=6, alpha=alpha)
     panel.plot(*points[0], "s", color="#4a525c", markersize=9, zorder=3)
     panel.plot(*points[-1], "o", color="white", markeredgecolor=color, markersize=6, alpha=alpha, zorder=5)
     return points
-
-
-def _chain(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Origins of the joints, and the tip, seen from above, (nv + 1, 2)."""
-    joints = [robot.with_tip(frame).tip_position(q) for frame in robot.joint_frames]
-    return np.array([*joints, robot.tip_position(q)])[:, :2]
 
 
 def _draw_circle(panel: Axes, center: np.ndarray, radius: float, **look: Any) -> None:

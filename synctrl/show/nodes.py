@@ -208,13 +208,13 @@ def continuous(quaternion: np.ndarray) -> np.ndarray:
     return quaternion * signs[:, None]
 
 
-def towards(along: np.ndarray) -> np.ndarray:
-    """Quaternions, (T, 4), that turn z to the directions `along`, (T, 3); none for one without length."""
-    lengths = np.linalg.norm(along, axis=1, keepdims=True)
-    x, y, z = np.where(lengths > TINY, along / np.maximum(lengths, TINY), [0, 0, 1.0]).T
-    # (z x d, 1 + z . d), normalized; towards -z every axis across z will do.
-    turn = np.stack([-y, x, np.zeros_like(x), 1 + z], axis=1)
-    turn[z < -1 + 1e-12] = [1, 0, 0, 0]
+def towards(along: np.ndarray, axis: tuple[float, float, float] = (0, 0, 1)) -> np.ndarray:
+    """Quaternions, (T, 4), that turn an axis to directions, (T, 3), the shortest way; none for no length."""
+    lengths, start = np.linalg.norm(along, axis=1, keepdims=True), np.array(axis, dtype=float)
+    direction = np.where(lengths > TINY, along / np.maximum(lengths, TINY), start)
+    # (a x d, 1 + a . d), normalized; towards -a every axis across it will do.
+    turn = np.column_stack([np.cross(start, direction), 1 + direction @ start])
+    turn[turn[:, 3] < 1e-12] = [*np.roll(start, 1), 0]
     return continuous(turn / np.linalg.norm(turn, axis=1, keepdims=True))
 
 

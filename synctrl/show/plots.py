@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..analysis.metrics import ERRORS
-from ..checks import choice, finite_array
+from ..checks import choice, finite_array, index
 from ..errors import InputError, ResultError
 from ..files import whole_file
 from ..renamed import names_elsewhere
@@ -141,7 +141,7 @@ def joint_trajectories(result: Result, robot: int, *, width: float = WIDTH) -> F
         InputError: there is no such robot.
     """
     check_run(result, "x", "x_desired")
-    _check_robot(result, robot)
+    index("robot", robot, len(result.names))
     units, names = result.units("x")[robot], result.info["axes"]
     with style():
         above = [LEGEND + TITLE, *[GAP] * (len(names) - 1)]
@@ -153,8 +153,6 @@ def joint_trajectories(result: Result, robot: int, *, width: float = WIDTH) -> F
             panel.plot(result.t, desired, "-.", color=DESIRED, linewidth=1.1, label="desired")
             room = 72 * COORDINATE - text_width(f", {unit}", LABEL_SIZE)
             panel.set_ylabel(f"{shortened(plain(names[k]), room, LABEL_SIZE)}, {unit}")
-            panel.margins(x=0)
-        panels[-1].set_xlabel("time, s")
         panels[0].set_title(titled(result.names[robot], width), loc="left")
         legend(figure, panels[0].get_lines())
     return figure
@@ -221,7 +219,6 @@ def _errors(result: Result, kind: str, what: str, limits: tuple[float, float] | 
         figure, panels = stacked_panels(heights, above, width)
         for panel, part in zip(panels, parts, strict=True):
             _draw_errors(panel, result, kind, what, part)
-        panels[-1].set_xlabel("time, s")
         legend(figure, handles)
     return figure
 
@@ -257,7 +254,6 @@ def _draw_errors(panel: Axes, result: Result, kind: str, what: str, part: _Part)
     panel.set_ylabel(f"{what if part.times == 1 else what.split()[-1]}, {unit}")
     if part.times > 1:
         panel.set_title(f"the same, on 1/{part.times:.2g} of the range", loc="left")
-    panel.margins(x=0)
 
 
 def shade_disturbances(panel: Axes, result: Result) -> None:
@@ -276,12 +272,6 @@ def _read_limits(limits: tuple[float, float]) -> tuple[float, float]:
     if not low < high:
         raise InputError(f"expected the lower one first, found {low:g} and {high:g}", subject="limits")
     return float(low), float(high)
-
-
-def _check_robot(result: Result, robot: int) -> None:
-    last = len(result.names) - 1
-    if isinstance(robot, bool) or not isinstance(robot, (int, np.integer)) or not 0 <= robot <= last:
-        raise InputError(f"expected an index from 0 to {last}, found {robot!r}", subject="robot")
 
 
 def _needed(result: Result, kind: str, columns: Sequence[int] | None = None) -> tuple[float, float]:

@@ -123,7 +123,6 @@ def paths(result: Result, *, width: float = WIDTH) -> Figure:
         for k, panel in enumerate(panels):
             panel.set_title(titled(names[k], width), loc="left")
             _draw_coordinate(panel, result, k)
-        panels[-1].set_xlabel("time, s")
         legend(figure, handles)
     return figure
 
@@ -135,7 +134,6 @@ def _draw_coordinate(panel: Axes, result: Result, k: int) -> None:
         panel.plot(result.t, factor * result.x_desired[:, i, k], "-.", color=DESIRED, linewidth=1.1)
     shade_disturbances(panel, result)
     panel.set_ylabel(unit)
-    panel.margins(x=0)
 
 
 def _figure(result: Result, curves: Sequence[Curves], width: float) -> Figure:
@@ -152,8 +150,6 @@ def _figure(result: Result, curves: Sequence[Curves], width: float) -> Figure:
             y = 1 + LEGEND * legend_rows(handles, room) / PANEL  # above the legend
             panel.set_title(titled(shown.title, width), loc="left", y=y)
             panel.set_ylabel(shown.label)
-            panel.margins(x=0)
-        panels[-1].set_xlabel("time, s")
     return figure
 
 

@@ -176,10 +176,8 @@ class Scene:
 
     def camera(self, position: ArrayLike, target: ArrayLike) -> None:
         """Look from `position` to `target`, (3,) each in m; without this call everything is in view."""
-        eye, aim = (
-            finite_array("camera position", position, (3,)),
-            finite_array("camera target", target, (3,)),
-        )
+        eye = finite_array("camera position", position, (3,))
+        aim = finite_array("camera target", target, (3,))
         if np.linalg.norm(eye - aim) < TINY:
             raise InputError(f"camera: position and target are the same point {eye}; expected two points")
         self._camera = eye, aim
