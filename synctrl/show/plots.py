@@ -142,15 +142,12 @@ def joint_trajectories(result: Result, robot: int, *, width: float = WIDTH) -> F
     """
     check_run(result, "x", "x_desired")
     index("robot", robot, len(result.names))
-    units, names = result.units("x")[robot], result.info["axes"]
+    names = result.info["axes"]
     with style():
         above = [LEGEND + TITLE, *[GAP] * (len(names) - 1)]
         figure, panels = stacked_panels([COORDINATE] * len(names), above, width)
         for k, panel in enumerate(panels):
-            unit, factor = display(units[k])
-            actual, desired = factor * result.x[:, robot, k], factor * result.x_desired[:, robot, k]
-            panel.plot(result.t, actual, color=robot_color(robot), label="actual")
-            panel.plot(result.t, desired, "-.", color=DESIRED, linewidth=1.1, label="desired")
+            unit = draw_coordinate(panel, result, [robot], k)
             room = 72 * COORDINATE - text_width(f", {unit}", LABEL_SIZE)
             panel.set_ylabel(f"{shortened(plain(names[k]), room, LABEL_SIZE)}, {unit}")
         panels[0].set_title(titled(result.names[robot], width), loc="left")
@@ -254,6 +251,16 @@ def _draw_errors(panel: Axes, result: Result, kind: str, what: str, part: _Part)
     panel.set_ylabel(f"{what if part.times == 1 else what.split()[-1]}, {unit}")
     if part.times > 1:
         panel.set_title(f"the same, on 1/{part.times:.2g} of the range", loc="left")
+
+
+def draw_coordinate(panel: Axes, result: Result, robots: Sequence[int], k: int) -> str:
+    """Actual and desired values of a coordinate of some robots; returns the unit in which they are drawn."""
+    unit, factor = display(result.units("x")[robots[0]][k])
+    for i, width in zip(robots, line_widths(len(robots)), strict=True):
+        actual, desired = factor * result.x[:, i, k], factor * result.x_desired[:, i, k]
+        panel.plot(result.t, actual, color=robot_color(i), linewidth=width, label="actual")
+        panel.plot(result.t, desired, "-.", color=DESIRED, linewidth=1.1, label="desired")
+    return unit
 
 
 def shade_disturbances(panel: Axes, result: Result) -> None:

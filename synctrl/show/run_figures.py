@@ -15,11 +15,11 @@ from ..checks import finite_number
 from ..errors import InputError, SynctrlError
 from ..simulation.result import Result
 from ..simulation.views import FIGURES, find_figure
-from .legends import columns_that_fit, fitted, legend, legend_rows, line_widths, plain
+from .legends import columns_that_fit, fitted, legend, legend_rows, plain
 from .panels import GAP, LEFT, LEGEND, RIGHT, TITLE, WIDTH, stacked_panels
-from .plots import columns_by_unit, save, shade_disturbances, style, titled
+from .plots import columns_by_unit, draw_coordinate, save, shade_disturbances, style, titled
 from .runs import check_run
-from .style import DESIRED, LINE_STYLES, PALETTE, LineStyle, display, robot_color
+from .style import DESIRED, PALETTE, line_style, robot_color
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -122,18 +122,10 @@ def paths(result: Result, *, width: float = WIDTH) -> Figure:
         figure, panels = stacked_panels([COORDINATE] * len(names), above, width)
         for k, panel in enumerate(panels):
             panel.set_title(titled(names[k], width), loc="left")
-            _draw_coordinate(panel, result, k)
+            panel.set_ylabel(draw_coordinate(panel, result, range(len(result.names)), k))
+            shade_disturbances(panel, result)
         legend(figure, handles)
     return figure
-
-
-def _draw_coordinate(panel: Axes, result: Result, k: int) -> None:
-    unit, factor = display(result.units("x")[0][k])
-    for i, width in enumerate(line_widths(len(result.names))):
-        panel.plot(result.t, factor * result.x[:, i, k], color=robot_color(i), linewidth=width)
-        panel.plot(result.t, factor * result.x_desired[:, i, k], "-.", color=DESIRED, linewidth=1.1)
-    shade_disturbances(panel, result)
-    panel.set_ylabel(unit)
 
 
 def _figure(result: Result, curves: Sequence[Curves], width: float) -> Figure:
@@ -156,16 +148,11 @@ def _figure(result: Result, curves: Sequence[Curves], width: float) -> Figure:
 def _draw(panel: Axes, result: Result, shown: Curves) -> list[Any]:
     lines = []
     for k, name in enumerate(shown.names):
-        color, look = _look(k)
+        color, look = robot_color(k), line_style(k // len(PALETTE))  # another line where colours repeat
         lines += panel.plot(result.t, shown.values[:, k], ls=look, color=color, label=plain(name))
         for level in shown.levels[k]:
             panel.axhline(level, ls=(0, (5, 3)), color=color, linewidth=0.9)
     return lines
-
-
-def _look(k: int) -> tuple[str, LineStyle]:
-    """Colour and line of a curve: the next kind of line where colours repeat."""
-    return PALETTE[k % len(PALETTE)], LINE_STYLES[k // len(PALETTE) % len(LINE_STYLES)]
 
 
 def _limited(name: str, limit: float | None) -> str:
@@ -248,14 +235,10 @@ def gallery(result: Result, *names: str, width: float = WIDTH) -> Gallery:
             if names or (len(found.missing) + 1 == len(FIGURES)):
                 raise
             found.missing[name] = str(error)
-    if "torque" in found:
-        found.missing.update(_missing_limits(result))
-    return found
-
-
-def _missing_limits(result: Result) -> dict[str, str]:
     unknown = [robot["name"] for robot in result.info["robots"] if "torque_limits" not in robot]
-    return {"torque limits": f"the result does not say those of {', '.join(unknown)}"} if unknown else {}
+    if "torque" in found and unknown:
+        found.missing["torque limits"] = f"the result does not say those of {', '.join(unknown)}"
+    return found
 
 
 def _png(figure: Figure) -> str:
