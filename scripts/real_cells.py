@@ -11,7 +11,7 @@ from pathlib import Path
 from synctrl import Result
 from synctrl.experiments import mixed_four, panda_four, ur5_payload
 from synctrl.experiments.ur5_payload import PAYLOAD
-from synctrl.show.real_cells import formation_scene, payload_scene
+from synctrl.show.animation import formation_scene, payload_scene
 from synctrl.show.scene import Scene
 
 

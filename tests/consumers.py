@@ -15,11 +15,16 @@ from synctrl.errors import SynctrlError
 from synctrl.paper.judge import compare_runs, differences
 from synctrl.paper.plant_sections import step_section
 from synctrl.show import scene_of
-from synctrl.show.animation import payload_pair_scene, planar_scene
+from synctrl.show.animation import (
+    error_colors,
+    formation_scene,
+    payload_pair_scene,
+    payload_scene,
+    planar_scene,
+)
 from synctrl.show.layout import cell_layout
 from synctrl.show.lyapunov_plots import lyapunov_figure
 from synctrl.show.plots import common_limits, joint_trajectories, sync_errors, tracking_errors
-from synctrl.show.real_cells import error_colors, formation_scene, payload_scene
 from synctrl.show.run_figures import estimates, paths, torques
 from synctrl.show.vehicle import vehicle_animation
 

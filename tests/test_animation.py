@@ -54,7 +54,7 @@ def ends(segment):
 def test_bars_join_the_tips_of_the_pairs_that_are_compared(planar):
     scene = planar_scene(planar, fps=FPS)
     for k, (i, j) in enumerate(planar.info["pairs"]):
-        start, end = ends(node(scene, f"segment error {k + 1}"))
+        start, end = ends(node(scene, f"segment error {k + 1}, to {planar.names[j]}"))
         np.testing.assert_allclose(start[:, :2], planar.x[shown(planar), i], atol=1e-9)
         np.testing.assert_allclose(end[:, :2], planar.x[shown(planar), j], atol=1e-9)
 
@@ -63,8 +63,8 @@ def test_bars_grow_and_redden_with_the_synchronization_error(planar):
     limit = 0.1
     scene = planar_scene(planar, limit=limit, fps=FPS)
     size = np.linalg.norm(planar.sync_error[shown(planar)], axis=2)
-    for k in range(4):
-        bar = node(scene, f"segment error {k + 1}")
+    for k, (_, end) in enumerate(planar.info["pairs"]):
+        bar = node(scene, f"segment error {k + 1}, to {planar.names[end]}")
         share = np.clip(size[:, k] / limit, 0, 1)
         np.testing.assert_allclose(bar.scale[:, 0], THIN + share * (THICK - THIN))
         np.testing.assert_allclose(bar.rgb, CALM + share[:, None] * (ALARM - CALM))

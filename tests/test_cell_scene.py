@@ -19,10 +19,9 @@ from synctrl.errors import InputError, RobotWarning
 from synctrl.experiments import mobile_robot
 from synctrl.robots.written import read_robot, write_robot
 from synctrl.show import scene_of
-from synctrl.show.arms import ALARM
+from synctrl.show.arms import ALARM, skeleton
 from synctrl.show.cell_scene import STILL
 from synctrl.show.legends import pair_colors
-from synctrl.show.skeleton import skeleton
 
 
 @pytest.fixture(scope="module")

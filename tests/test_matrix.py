@@ -39,11 +39,10 @@ from synctrl.paper.plant_sections import identification_section
 from synctrl.paper.report import Section, Text, Verdicts, write_page
 from synctrl.paper.theory import baseline_section, certificate_section, draw_certificate
 from synctrl.show import scene_of
-from synctrl.show.animation import planar_scene
+from synctrl.show.animation import formation_scene, planar_scene
 from synctrl.show.layout import cell_layout
 from synctrl.show.lyapunov_plots import lyapunov_figure
 from synctrl.show.plots import common_limits, joint_trajectories, sync_errors, tracking_errors
-from synctrl.show.real_cells import formation_scene
 from synctrl.simulation.guard import Finding
 from synctrl.simulation.guard import stopped as stopped_by
 from synctrl.sweep.description import describe_base

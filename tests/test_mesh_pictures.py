@@ -23,8 +23,7 @@ from synctrl.robots.catalog import load_description
 from synctrl.robots.urdf import Description
 from synctrl.robots.urdf.packages import Unusable
 from synctrl.show import scene_of
-from synctrl.show.mesh_files import read_mesh
-from synctrl.show.meshes import MeshLibrary
+from synctrl.show.meshes import MeshLibrary, read_mesh
 from synctrl.show.shapes import Shape, corners
 
 

@@ -23,7 +23,7 @@ from synctrl.robots.urdf.document import Document, Geometry, Link, Shape
 from synctrl.robots.urdf.meshes import find_pictures
 from synctrl.robots.urdf.packages import Packages, Unusable
 from synctrl.robots.urdf.report import Notes
-from synctrl.show.mesh_files import read_mesh
+from synctrl.show.meshes import read_mesh
 
 CASES = Path(__file__).parent / "cases" / "urdf"
 

@@ -175,7 +175,7 @@ def test_the_layout_shows_bases_reach_and_the_distances_at_the_end(planar):
 
 
 def test_a_layout_needs_a_planar_run_and_its_experiment(planar, pair):
-    with pytest.raises(InputError, match="expected a run along x and y"):
+    with pytest.raises(InputError, match="expected tips along x and y"):
         cell_layout(pair)
     with pytest.raises(InputError, match="still has its experiment"):
         cell_layout(replace(planar, experiment=None))

@@ -15,7 +15,7 @@ from synctrl.analysis.certify import certify
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, mixed_four, panda_four, ur5_payload
 from synctrl.experiments.ur5_payload import PAYLOAD, hand_on_payload, payload_motion
-from synctrl.show.real_cells import error_colors, formation_scene, payload_scene
+from synctrl.show.animation import error_colors, formation_scene, payload_scene
 from synctrl.tasks.rotations import exp
 
 ROOT = Path(__file__).parent.parent
@@ -140,5 +140,5 @@ def test_scenes_of_other_runs_are_refused(tmp_path):
     with pytest.raises(InputError, match="Attached"):
         payload_scene(run("four Pandas"), PAYLOAD)
     other = a460_pair().simulate(0.02)
-    with pytest.raises(InputError, match="along x, y and z, found the coordinates joint1"):
+    with pytest.raises(InputError, match="along x, y and z, found joint1"):
         formation_scene(other)

@@ -27,7 +27,7 @@ from hypothesis.extra.numpy import arrays
 from synctrl.errors import InputError, RobotError, RobotWarning
 from synctrl.show import scene as scene_module
 from synctrl.show import shapes, view
-from synctrl.show.rotations import continuous, towards
+from synctrl.show.nodes import continuous, towards
 from synctrl.show.scene import Scene
 from synctrl.tasks.rotations import from_quaternion as matrices
 

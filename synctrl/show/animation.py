@@ -1,15 +1,19 @@
-"""The paper's cells in motion: four planar arms, and two A460 with their payload."""
+"""Ready cells in motion: the paper's arms, and real robots in formation or with a payload."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..checks import positive_number
+from ..checks import finite_array
 from ..errors import InputError
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .arms import add_bars, add_disturbances, arms_scene, error_color, tip_positions
-from .runs import check_run, frame_indices, shown_experiment
+from ..tasks import rotations
+from ..tasks.poses import Attached
+from .arms import add_bars, add_disturbances, arms_scene, error_color, error_share, tip_positions
+from .nodes import towards
+from .runs import check_axes, check_run, frame_indices, shown_experiment
 from .scene import Scene
 from .style import DESIRED, robot_color
 
@@ -19,6 +23,9 @@ BALL = 0.016  # m, radius of a tip
 PAYLOAD = (0.5, 0.08, 0.05)  # m
 PLANAR_TIMES, PAIR_TIMES = 10.0, 20.0  # how much larger tracking errors are drawn
 FPS = 30.0
+FINE, BAR, TIP = 0.005, 0.008, 0.018  # m, of real robots: a desired path, a bar and a tip
+#: synchronization error of real robots that is shown fully red, as a share of the largest of the run
+RED = 0.3
 #: arrays of a run that its scene is made of
 DRAWN = "x", "x_desired", "sync_error", "q", "disturbance"
 
@@ -43,22 +50,21 @@ def planar_scene(
         InputError: a run in another space, or one without its experiment.
     """
     check_run(result, *DRAWN)
-    if result.info["axes"] != ["x", "y"]:
-        raise InputError(f"result: expected tips along x and y, found {', '.join(result.info['axes'])}")
-    share, limit = _share(result, limit)
+    check_axes(result, "x", "y")
+    share, limit = error_share(result, limit)
     caption = (
         f"Bars between compared tips: synchronization error, thick and red from {_shown(result, limit)}. "
         f"Thin bars at the tips: tracking error, {PLANAR_TIMES:g} times as large. Dark lines: desired paths."
     )
     frames = frame_indices(result, fps)
-    scene = arms_scene(
-        result, experiment, frames, fps, caption, [robot_color(i) for i in range(len(result.names))]
-    )
     robots = shown_experiment(result, experiment).cell.robots
+    scene = arms_scene(result, robots, frames, fps, caption, [robot_color(i) for i in range(len(robots))])
     height = float(robots[0].tip_position(result.q[0, 0, : robots[0].nv])[2])
-    tips, desired = (_with_height(x[frames], height) for x in (result.x, result.x_desired))
-    shown = share[frames]
-    add_bars(scene, "error", result.info["pairs"], tips, THIN + shown * (THICK - THIN), shown)
+    tips, desired = (np.insert(x[frames], 2, height, axis=2) for x in (result.x, result.x_desired))
+    for k, compared in enumerate(result.info["pairs"]):
+        shown = share[frames, k]
+        radius = THIN + shown * (THICK - THIN)
+        add_bars(scene, result, f"error {k + 1}", compared, tips, radius, error_color(shown))
     _add_tracking(scene, result, desired, tips, PLANAR_TIMES)
     add_disturbances(scene, result, robots, frames)
     return scene
@@ -88,19 +94,19 @@ def payload_pair_scene(
             "result: expected two robots in joint space, found "
             f"{result.x.shape[1]} with coordinates in {result.info['task_unit']}"
         )
-    share, limit = _share(result, limit)
+    share, limit = error_share(result, limit)
     caption = (
         f"The payload is drawn, not simulated; fully red from {_shown(result, limit)} of synchronization "
         f"error. Thin bars at the wrists: tracking error, {PAIR_TIMES:g} times as large. "
         "Dark lines: desired paths."
     )
     frames = frame_indices(result, fps)
-    scene = arms_scene(result, experiment, frames, fps, caption)
     robots = shown_experiment(result, experiment).cell.robots
+    scene = arms_scene(result, robots, frames, fps, caption)
     wrists, desired = (tip_positions(robots, q[frames]) for q in (result.q, result.x_desired))
     color = error_color(share[frames].max(axis=1))
     middle, along = wrists.mean(axis=1), wrists[:, 1] - wrists[:, 0]
-    scene.add_box("payload", PAYLOAD, middle, color, quaternion=_turned(along))
+    scene.add_box("payload", PAYLOAD, middle, color, quaternion=towards(along, axis=(1, 0, 0)))
     _add_tracking(scene, result, desired, wrists, PAIR_TIMES)
     add_disturbances(scene, result, robots, frames)
     return scene
@@ -115,26 +121,83 @@ def _add_tracking(scene: Scene, result: Result, desired: np.ndarray, tips: np.nd
         scene.add_sphere(f"end of error of {name}", BALL, far, robot_color(i))
 
 
-def _share(result: Result, limit: float | None) -> tuple[np.ndarray, float]:
-    """Size of every synchronization error as a share of the limit, (T, p), and the limit."""
-    size = np.linalg.norm(result.sync_error, axis=2)
-    limit = float(size.max()) or 1.0 if limit is None else positive_number("limit", limit)
-    return np.clip(size / limit, 0, 1), limit
-
-
 def _shown(result: Result, size: float) -> str:
     """A synchronization error for the caption: degrees for rad, else its own unit."""
     unit = result.unit("sync_error")
     return f"{np.rad2deg(size):.2g} deg" if unit == "rad" else f"{size:.2g} {unit}"
 
 
-def _with_height(xy: np.ndarray, z: float) -> np.ndarray:
-    return np.concatenate([xy, np.full((*xy.shape[:-1], 1), z)], axis=-1)
+def formation_scene(result: Result, fps: float = 25) -> Scene:
+    """Arms with their desired paths, and a bar between the tips of every pair that is compared.
+
+    A bar turns from grey to red with the synchronization error of its pair.
+
+    Args:
+        result: a run in Cartesian space along x, y, z, still with its experiment.
+        fps: frames per second.
+
+    Raises:
+        InputError: a run in another space, or one without its experiment.
+    """
+    check_run(result, *DRAWN)
+    check_axes(result, "x", "y", "z")
+    frames = frame_indices(result, fps)
+    caption = "Bars between compared tips turn red with the synchronization error."
+    scene = arms_scene(result, shown_experiment(result, None).cell.robots, frames, fps, caption)
+    tips = result.x[frames]
+    for i, name in enumerate(result.names):
+        scene.add_line(f"desired path of {name}", result.x_desired[frames, i], robot_color(i), FINE)
+        scene.add_sphere(f"tip of {name}", TIP, tips[:, i], robot_color(i))
+    colors = error_colors(result)[frames]
+    for k, compared in enumerate(result.info["pairs"]):
+        add_bars(scene, result, f"pair {k + 1}", compared, tips, BAR, colors[:, k])
+    return scene
 
 
-def _turned(along: np.ndarray) -> np.ndarray:
-    """Quaternions x, y, z, w, (T, 4), that turn the x axis along a direction, (T, 3), by the shortest way."""
-    direction = along / np.linalg.norm(along, axis=1, keepdims=True)
-    x = np.broadcast_to([1.0, 0.0, 0.0], direction.shape)
-    quaternion = np.column_stack([np.cross(x, direction), 1 + (x * direction).sum(axis=1)])
-    return quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+def payload_scene(result: Result, size: ArrayLike, fps: float = 25) -> Scene:
+    """Two arms whose hands hold a box that lies midway between where each of them holds it.
+
+    The box turns from grey to red with the synchronization error; it is drawn, not simulated.
+
+    Args:
+        result: a run in pose space with `Attached` desired motions, still with its experiment.
+        size: of the box in the payload's axes, (3,), m.
+        fps: frames per second.
+
+    Raises:
+        InputError: a run of other desired motions, or one without its experiment.
+    """
+    check_run(result, *DRAWN)
+    frames = frame_indices(result, fps)
+    caption = "The payload turns red with the synchronization error; it has no mass."
+    cell = shown_experiment(result, None).cell
+    scene = arms_scene(result, cell.robots, frames, fps, caption)
+    hands = [hand for member in cell.members if isinstance(hand := member.trajectory, Attached)]
+    if not len(hands) == cell.n == 2:
+        raise InputError(
+            "expected two robots whose desired motions are Attached to a payload", subject="result"
+        )
+    position, orientation = _held(result.x[frames], hands)
+    extent = finite_array("size", size, (3,))
+    color = error_colors(result)[frames, 0]
+    scene.add_box("payload", extent, position, color, rotations.quaternion(orientation))
+    scene.add_line("desired path", hands[0].body(result.t[frames]).x[:, :3], DESIRED, FINE)
+    scene.add_legend("desired path of the payload", DESIRED)
+    return scene
+
+
+def error_colors(result: Result) -> np.ndarray:
+    """A colour per instant and pair, (T, p, 3), which reddens with the synchronization error."""
+    check_run(result, "sync_error")
+    size = np.linalg.norm(result.sync_error[:, :, :3], axis=2)
+    return error_color(np.clip(size / max(RED * float(size.max()), 1e-12), 0, 1))
+
+
+def _held(x: np.ndarray, hands: list[Attached]) -> tuple[np.ndarray, np.ndarray]:
+    """Position, (T, 3), and orientation, (T, 3, 3), midway between where the two hands hold the payload."""
+    first, second = (rotations.exp(x[:, i, 3:]) @ hand.rotation.T for i, hand in enumerate(hands))
+    half = 0.5 * rotations.log(second @ np.swapaxes(first, 1, 2))
+    places = [
+        x[:, i, :3] - R @ hand.xyz for i, (R, hand) in enumerate(zip((first, second), hands, strict=True))
+    ]
+    return 0.5 * (places[0] + places[1]), rotations.exp(half) @ first

@@ -1,18 +1,20 @@
-"""What animations of arms have in common: the arms, and marks that redden with synchronization errors."""
+"""What scenes of arms have in common: arms, plain links, and marks that redden with their errors."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+import pinocchio as pin
 
+from ..checks import positive_number
+from ..robots.model import SLIDES, subspace
 from ..robots.robot import Robot
 from ..simulation.result import Result
-from ..simulation.simulate import Experiment
-from .runs import shown_experiment
+from ..tasks.rotations import from_quaternion
+from .nodes import towards
 from .scene import Scene
-from .skeleton import skeleton
-from .style import robot_color
+from .style import ColorLike, read_color, robot_color
 
 #: colour and radius, m, of the mark of a torque from outside
 TORQUE, PUSH = "#e0a100", 0.075
@@ -20,46 +22,32 @@ TORQUE, PUSH = "#e0a100", 0.075
 CALM, ALARM = np.array([0.76, 0.79, 0.83]), np.array([0.70, 0.0, 0.11])
 
 
+#: radius of a link and of a joint, and half the length of a rod that slides, as shares of the robot's reach
+LINK, JOINT, ROD = 0.03, 0.045, 0.4
+#: what a robot of no extent is drawn as large as, m
+SMALLEST = 0.2
+
+
 def arms_scene(
     result: Result,
-    experiment: Experiment | None,
+    robots: Sequence[Robot],
     frames: np.ndarray,
     fps: float,
-    caption: str,
+    caption: str = "",
     colors: Sequence[str] | None = None,
 ) -> Scene:
-    """A scene with the arms of a run.
+    """A scene with the arms of a run; those without shapes as balls and capsules in the colour of the robot.
 
     Args:
         result: the run.
-        experiment: what made it; needed for a result loaded from a file.
+        robots: its robots.
         frames: indices of the logged instants that are shown.
         fps: frames per second.
         caption: a line below the title.
         colors: one for each arm; by default those of its parts.
-
-    Raises:
-        InputError: no experiment.
     """
-    scene = titled_scene(result, fps, caption)
-    add_arms(scene, result, shown_experiment(result, experiment).cell.robots, frames, colors)
-    return scene
-
-
-def titled_scene(result: Result, fps: float, caption: str) -> Scene:
-    """A scene with nothing in it, under the title of a run."""
     title = str(result.info["title"])
-    return Scene(fps=fps, title=title[:1].upper() + title[1:], caption=caption)
-
-
-def add_arms(
-    scene: Scene,
-    result: Result,
-    robots: Sequence[Robot],
-    frames: np.ndarray,
-    colors: Sequence[str] | None = None,
-) -> None:
-    """The arms of a run; those without shapes as balls and capsules in the colour of the robot."""
+    scene = Scene(fps=fps, title=title[:1].upper() + title[1:], caption=caption)
     for i, robot in enumerate(robots):
         q = np.array([robot.configuration(row) for row in result.q[frames, i, : robot.nv]])
         visual = robot.visual if has_shapes(robot) else skeleton(robot, robot_color(i))
@@ -68,6 +56,7 @@ def add_arms(
         scene.add_legend(result.names[i], robot_color(i))
         if robot.document is not None:
             scene.add_hidden(result.names[i], (mesh.filename or "" for mesh in robot.document.hidden))
+    return scene
 
 
 def has_shapes(robot: Robot) -> bool:
@@ -94,34 +83,74 @@ def tip_positions(robots: Sequence[Robot], q: np.ndarray) -> np.ndarray:
 
 def add_bars(
     scene: Scene,
+    result: Result,
     name: str,
-    compared: Sequence[Sequence[int]],
+    robots: Sequence[int],
     tips: np.ndarray,
-    radii: np.ndarray,
-    share: np.ndarray,
+    radius: np.ndarray | float,
+    color: np.ndarray,
 ) -> None:
-    """Bars between the tips of robots that are compared, which redden with the synchronization error.
+    """Bars between the tips, (T, n, 3), m, of robots that are compared.
 
     Two robots have one bar from tip to tip. More than two that are compared all at once, as by
     `Coupling.sum`, have one each, from the middle of their tips.
-
-    Args:
-        scene: where they are added.
-        name: of the bars, to which their numbers are added.
-        compared: the robots of each of p synchronization errors, counted from 0.
-        tips: positions of the tips, (T, n, 3), m.
-        radii: of the bars of each error over time, (T, p), m.
-        share: the errors from 0, no error, to 1, fully red, (T, p).
     """
-    for k, robots in enumerate(compared):
-        bars = {f"{name} {k + 1}": (tips[:, robots[0]], tips[:, robots[-1]])}
-        if len(robots) > 2:
-            middle = tips[:, robots].mean(axis=1)
-            bars = {f"{name} {k + 1}, robot {i + 1}": (middle, tips[:, i]) for i in robots}
-        for bar, (start, end) in bars.items():
-            scene.add_segment(bar, start, end, radii[:, k], error_color(share[:, k]))
+    start = tips[:, robots[0]] if len(robots) == 2 else tips[:, robots].mean(axis=1)
+    for end in robots[1:] if len(robots) == 2 else robots:
+        scene.add_segment(f"{name}, to {result.names[end]}", start, tips[:, end], radius, color)
 
 
-def error_color(share: np.ndarray) -> np.ndarray:
+def error_share(result: Result, limit: float | None) -> tuple[np.ndarray, float]:
+    """Size of every synchronization error as a share of the limit, (T, p), and the limit."""
+    size = np.linalg.norm(result.sync_error, axis=2)
+    limit = float(size.max()) or 1.0 if limit is None else positive_number("limit", limit)
+    return np.clip(size / limit, 0, 1), limit
+
+
+def error_color(share: np.ndarray, calm: np.ndarray = CALM) -> np.ndarray:
     """Colours, (..., 3), of marks for errors from 0 to 1, (...)."""
-    return CALM + share[..., None] * (ALARM - CALM)
+    return calm + share[..., None] * (ALARM - calm)
+
+
+def skeleton(robot: Robot, color: ColorLike) -> pin.GeometryModel:
+    """Shapes of a robot that has none: balls where joints turn, rods where they slide, capsules between."""
+    shapes, size = pin.GeometryModel(), max(reach(robot), SMALLEST)
+    rgba = np.array(read_color("color", color))
+    for k, (joint, placement, geometry) in enumerate(_parts(robot, size)):
+        part = pin.GeometryObject(f"part {k + 1}", joint, 0, placement, geometry)
+        part.meshColor = rgba
+        shapes.addGeometryObject(part)
+    return shapes
+
+
+def reach(robot: Robot) -> float:
+    """How far a robot reaches from its first joint at most, m; slides count as at 0."""
+    return float(sum(np.linalg.norm(way) for joint, way in _ways(robot) if joint))
+
+
+def _parts(robot: Robot, size: float) -> Iterator[tuple[int, pin.SE3, object]]:
+    import coal
+
+    for joint, unit in enumerate(robot.joint_units, start=1):
+        yield joint, pin.SE3.Identity(), coal.Sphere(JOINT * size)
+        if unit == SLIDES:
+            rod = ROD * size * subspace(robot.model, joint)[:3]
+            yield joint, _along(-rod, rod), coal.Cylinder(0.4 * LINK * size, 2 * ROD * size)
+    for joint, way in _ways(robot):
+        if joint and np.linalg.norm(way) > 0:
+            yield joint, _along(np.zeros(3), way), coal.Capsule(LINK * size, float(np.linalg.norm(way)))
+
+
+def _ways(robot: Robot) -> Iterator[tuple[int, np.ndarray]]:
+    """A joint, and the way from its origin to that of a next one, or to the tip, in its frame, m."""
+    model = robot.model
+    for child in range(1, model.njoints):
+        yield model.parents[child], model.jointPlacements[child].translation
+    tip = model.frames[robot.tip_id]
+    yield tip.parentJoint, tip.placement.translation
+
+
+def _along(start: np.ndarray, end: np.ndarray) -> pin.SE3:
+    """The frame midway between two points whose z axis leads from one to the other."""
+    R = from_quaternion(towards((end - start)[None]))[0]
+    return pin.SE3(R, 0.5 * (start + end))

@@ -8,19 +8,25 @@ from pathlib import Path
 import numpy as np
 
 from ..analysis.metrics import row_names
-from ..checks import positive_number
 from ..errors import InputError, SynctrlError
 from ..robots.robot import Robot
 from ..robots.written import read_robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .arms import ALARM, add_arms, add_disturbances, has_shapes, tip_positions, titled_scene
-from .colors import read_color
+from .arms import (
+    add_bars,
+    add_disturbances,
+    arms_scene,
+    error_color,
+    error_share,
+    has_shapes,
+    reach,
+    tip_positions,
+)
 from .legends import pair_colors, pair_symbols
 from .runs import check_run, frame_indices, shown_experiment
 from .scene import Scene
-from .skeleton import reach
-from .style import DESIRED, robot_color
+from .style import DESIRED, read_color, robot_color
 
 #: as shares of the reach of the arms: a tip, a desired path, and bars without and with the largest error
 BALL, LINE, THIN, THICK = 0.032, 0.006, 0.006, 0.02
@@ -63,8 +69,7 @@ def scene_of(
     check_run(result, "x", "x_desired", "sync_error", "q", "disturbance")
     robots = _robots(result, experiment, package_dirs)
     frames = frame_indices(result, fps)
-    scene = titled_scene(result, fps, "")
-    add_arms(scene, result, robots, frames)
+    scene = arms_scene(result, robots, frames, fps)
     tips, scale = tip_positions(robots, result.q[frames]), _scale(robots)
     for i, name in enumerate(result.names):
         scene.add_sphere(f"tip of {name}", BALL * scale, tips[:, i], robot_color(i))
@@ -132,20 +137,15 @@ def _add_paths(scene: Scene, result: Result, desired: np.ndarray, width: float) 
 def _add_bars(
     scene: Scene, result: Result, tips: np.ndarray, frames: np.ndarray, limit: float | None, scale: float
 ) -> None:
-    """A bar for each pair, from tip to tip; of more than two robots, from the middle of the tips to each."""
-    size = np.linalg.norm(result.sync_error, axis=2)
-    limit = float(size.max()) or 1.0 if limit is None else positive_number("limit", limit)
-    share = np.clip(size[frames] / limit, 0, 1)
+    """Bars of each pair, in its colour until they redden."""
+    share = error_share(result, limit)[0][frames]
     names, colors = row_names(result, "sync_error"), pair_colors(result)
     colors = colors if len(colors) > 1 else [ONE_PAIR]
     marks = zip(result.info["pairs"], colors, pair_symbols(result), names, strict=True)
     for k, (robots, color, symbol, name) in enumerate(marks):
         calm = np.array(read_color(symbol, color)[:3])
-        shade = calm + share[:, k, None] * (ALARM - calm)
         radius = scale * (THIN + share[:, k] * (THICK - THIN))
-        for end in robots[1:] if len(robots) == 2 else robots:
-            start = tips[:, robots[0]] if len(robots) == 2 else tips[:, robots].mean(axis=1)
-            scene.add_segment(f"{symbol}, to {result.names[end]}", start, tips[:, end], radius, shade)
+        add_bars(scene, result, symbol, robots, tips, radius, error_color(share[:, k], calm))
         scene.add_legend(f"{symbol}: {name.partition(': ')[2]}", color)
 
 

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
 from ..robots.robot import Robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .legends import plain
 from .plots import new_figure, style
-from .runs import check_run, shown_experiment
+from .runs import check_axes, check_run, shown_experiment
 from .style import DESIRED, robot_color
 
 if TYPE_CHECKING:
@@ -38,10 +37,7 @@ def cell_layout(result: Result, experiment: Experiment | None = None) -> Figure:
         InputError: a run in another space, or one without its experiment.
     """
     check_run(result, "x", "x_desired", "q")
-    if result.info["axes"] != ["x", "y"]:
-        raise InputError(
-            f"expected a run along x and y, found {', '.join(result.info['axes'])}", subject="result"
-        )
+    check_axes(result, "x", "y")
     experiment = shown_experiment(result, experiment)
     with style():
         figure, panels = new_figure(5.4, columns=2, width=8.8, gridspec_kw={"width_ratios": (0.4, 1.0)})
@@ -74,14 +70,8 @@ def _draw_cell(panel: Axes, result: Result, robots: tuple[Robot, ...]) -> None:
         base, reach = chain[0], np.linalg.norm(np.diff(chain, axis=0), axis=1).sum()
         _draw_circle(panel, base, reach, color=robot_color(i), linewidth=0.9, linestyle=":")
         panel.plot(*result.x_desired[:, i].T, color="black", linewidth=2.0, zorder=4)
-        panel.annotate(
-            plain(result.names[i]),
-            base,
-            (-12, -4),
-            textcoords="offset points",
-            ha="right",
-            color=robot_color(i),
-        )
+        look: Any = {"textcoords": "offset points", "ha": "right", "color": robot_color(i)}
+        panel.annotate(plain(result.names[i]), base, (-12, -4), **look)
         bases.append(base)
     for compared in result.info["pairs"]:
         for a, b in combinations(result.x[-1, compared], 2):
@@ -97,19 +87,14 @@ def _draw_cell(panel: Axes, result: Result, robots: tuple[Robot, ...]) -> None:
 
 
 def _draw_arm(panel: Axes, robot: Robot, q: np.ndarray, index: int, alpha: float) -> np.ndarray:
-    """Base, joints and tip as a line; returns them, (nv + 1, 2)."""
-    points, color = _chain(robot, q), robot_color(index)
+    """Base, joints and tip as a line, seen from above; returns them, (nv + 1, 2)."""
+    joints = [robot.with_tip(frame).tip_position(q) for frame in robot.joint_frames]
+    points, color = np.array([*joints, robot.tip_position(q)])[:, :2], robot_color(index)
     panel.plot(*points.T, "-", color=color, linewidth=5, alpha=0.6 * alpha, solid_joinstyle="round")
     panel.plot(*points[1:-1].T, "o", color=color, markersize=6, alpha=alpha)
     panel.plot(*points[0], "s", color="#4a525c", markersize=9, zorder=3)
     panel.plot(*points[-1], "o", color="white", markeredgecolor=color, markersize=6, alpha=alpha, zorder=5)
     return points
-
-
-def _chain(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Origins of the joints, and the tip, seen from above, (nv + 1, 2)."""
-    joints = [robot.with_tip(frame).tip_position(q) for frame in robot.joint_frames]
-    return np.array([*joints, robot.tip_position(q)])[:, :2]
 
 
 def _draw_circle(panel: Axes, center: np.ndarray, radius: float, **look: Any) -> None:

@@ -90,12 +90,9 @@ def disturbance_handles(result: Result) -> list[Any]:
 def disturbance_windows(result: Result) -> list[dict[str, Any]]:
     """When torques act from outside, cut off at the ends of the run."""
     first, last = float(result.t[0]), float(result.t[-1])
-    ends = ((window, *np.clip((window["start"], window["stop"]), first, last)) for window in _pushes(result))
+    pushes: Sequence[dict[str, Any]] = result.info.get("disturbances", ())
+    ends = ((window, *np.clip((window["start"], window["stop"]), first, last)) for window in pushes)
     return [{**window, "start": start, "stop": stop} for window, start, stop in ends if start < stop]
-
-
-def _pushes(result: Result) -> Sequence[dict[str, Any]]:
-    return result.info.get("disturbances", ())
 
 
 # -- legends that fit -------------------------------------------------------------------------------------

@@ -34,13 +34,12 @@ def lyapunov_figure(record: Lyapunov) -> Figure:
         record: of `synctrl.analysis.lyapunov.lyapunov`.
     """
     with style():
-        energies, powers = (_visible(terms, tuple(terms)) for terms in (record.energy, record.power))
+        energies, powers = (_visible(terms) for terms in (record.energy, record.power))
         above = [GAP + LEGEND * -(-(len(terms) + 1) // COLUMNS) for terms in (energies, powers)]
         figure, panels = stacked_panels([PANEL, PANEL], above)
         _energies(panels[0], record, energies)
         _powers(panels[1], record, powers)
         for panel in panels:
-            panel.margins(x=0)
             panel.yaxis.set_major_formatter(power_of_ten)
             panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=COLUMNS, borderaxespad=0.2)
     return figure
@@ -84,14 +83,13 @@ def _powers(panel: Axes, record: Lyapunov, shown: Terms) -> None:
     panel.plot(record.t, record.V_dot, color=DESIRED, linewidth=2.0, label="V'", zorder=1)
     panel.axhline(0.0, color="#8a929c", linewidth=0.8)
     panel.set_ylabel("V' and its terms, 1/s")
-    panel.set_xlabel("time, s")
 
 
-def _visible(terms: Mapping[str, np.ndarray], names: tuple[str, ...]) -> Terms:
+def _visible(terms: Mapping[str, np.ndarray]) -> Terms:
     """Names of the terms that can be seen, each with the colour it has in all figures."""
-    sizes = {name: float(np.abs(terms[name]).max()) for name in names}
+    sizes = {name: float(np.abs(terms[name]).max()) for name in terms}
     floor = VISIBLE * max(sizes.values())
-    return [(name, PALETTE[k % len(PALETTE)]) for k, name in enumerate(names) if sizes[name] > floor]
+    return [(name, PALETTE[k % len(PALETTE)]) for k, name in enumerate(terms) if sizes[name] > floor]
 
 
 __getattr__ = names_elsewhere(__name__, "..analysis.lyapunov", "ENERGIES", "POWERS", "THEOREM")

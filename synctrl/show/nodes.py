@@ -1,4 +1,4 @@
-"""The scene as MeshCat commands: a tree of nodes with their shapes, and one animation for all of them.
+"""The scene as MeshCat commands: a tree of nodes with their shapes and rotations, and one animation of all.
 
 The whole tree is one three.js object, in which equal geometries and materials are held once.
 """
@@ -14,11 +14,13 @@ from typing import Any
 import numpy as np
 
 from ..checks import instance
+from ..errors import InputError
 from ..tasks.rotations import from_quaternion
 from .shapes import Color, Shape, corners
 
 ROOT = "/meshcat/<object>"  # where MeshCat puts the object of the path /meshcat
 STILL = 1e-6  # m, and so on: motion below this is not seen
+TINY = 1e-6  # m: too short to have a direction
 
 JSON = dict[str, Any]
 
@@ -197,3 +199,32 @@ def _first_pose(node: Node) -> np.ndarray:
 
 def _column_major(matrix: np.ndarray) -> list[float]:
     return [float(x) for x in matrix.T.ravel()]
+
+
+def continuous(quaternion: np.ndarray) -> np.ndarray:
+    """The same rotations, with the sign of each quaternion chosen so that neighbours in time are near."""
+    turns = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0
+    signs = np.cumprod(np.concatenate([[1.0], np.where(turns, -1.0, 1.0)]))
+    return quaternion * signs[:, None]
+
+
+def towards(along: np.ndarray, axis: tuple[float, float, float] = (0, 0, 1)) -> np.ndarray:
+    """Quaternions, (T, 4), that turn an axis to directions, (T, 3), the shortest way; none for no length."""
+    lengths, start = np.linalg.norm(along, axis=1, keepdims=True), np.array(axis, dtype=float)
+    direction = np.where(lengths > TINY, along / np.maximum(lengths, TINY), start)
+    # (a x d, 1 + a . d), normalized; towards -a every axis across it will do.
+    turn = np.column_stack([np.cross(start, direction), 1 + direction @ start])
+    turn[turn[:, 3] < 1e-12] = [*np.roll(start, 1), 0]
+    return continuous(turn / np.linalg.norm(turn, axis=1, keepdims=True))
+
+
+def unit(name: str, quaternion: np.ndarray) -> np.ndarray:
+    """Quaternions, (T, 4), at length 1, each with the sign that is nearest to the one before.
+
+    Raises:
+        InputError: one is no rotation; the message begins with `name`.
+    """
+    norms = np.linalg.norm(quaternion, axis=1, keepdims=True)
+    if norms.min() < TINY:
+        raise InputError(f"{name}: quaternion: expected a rotation, found one of length {norms.min():g}")
+    return continuous(quaternion / norms)

@@ -47,8 +47,10 @@ def stacked_panels(
         place = LEFT / width, top / height, 1 - (LEFT + RIGHT) / width, own / height
         panels.append(figure.add_axes(place, sharex=panels[0] if panels else None))
         _place_labels(panels[-1], width - LEFT - RIGHT, own)
+        panels[-1].margins(x=0)
     for panel in panels[:-1]:
         panel.tick_params(labelbottom=False)
+    panels[-1].set_xlabel("time, s")
     return figure, panels
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..analysis.metrics import ERRORS
-from ..checks import choice, finite_array
+from ..checks import choice, finite_array, index
 from ..errors import InputError, ResultError
 from ..files import whole_file
 from ..renamed import names_elsewhere
@@ -141,20 +141,15 @@ def joint_trajectories(result: Result, robot: int, *, width: float = WIDTH) -> F
         InputError: there is no such robot.
     """
     check_run(result, "x", "x_desired")
-    _check_robot(result, robot)
-    units, names = result.units("x")[robot], result.info["axes"]
+    index("robot", robot, len(result.names))
+    names = result.info["axes"]
     with style():
         above = [LEGEND + TITLE, *[GAP] * (len(names) - 1)]
         figure, panels = stacked_panels([COORDINATE] * len(names), above, width)
         for k, panel in enumerate(panels):
-            unit, factor = display(units[k])
-            actual, desired = factor * result.x[:, robot, k], factor * result.x_desired[:, robot, k]
-            panel.plot(result.t, actual, color=robot_color(robot), label="actual")
-            panel.plot(result.t, desired, "-.", color=DESIRED, linewidth=1.1, label="desired")
+            unit = draw_coordinate(panel, result, [robot], k)
             room = 72 * COORDINATE - text_width(f", {unit}", LABEL_SIZE)
             panel.set_ylabel(f"{shortened(plain(names[k]), room, LABEL_SIZE)}, {unit}")
-            panel.margins(x=0)
-        panels[-1].set_xlabel("time, s")
         panels[0].set_title(titled(result.names[robot], width), loc="left")
         legend(figure, panels[0].get_lines())
     return figure
@@ -221,7 +216,6 @@ def _errors(result: Result, kind: str, what: str, limits: tuple[float, float] | 
         figure, panels = stacked_panels(heights, above, width)
         for panel, part in zip(panels, parts, strict=True):
             _draw_errors(panel, result, kind, what, part)
-        panels[-1].set_xlabel("time, s")
         legend(figure, handles)
     return figure
 
@@ -257,7 +251,16 @@ def _draw_errors(panel: Axes, result: Result, kind: str, what: str, part: _Part)
     panel.set_ylabel(f"{what if part.times == 1 else what.split()[-1]}, {unit}")
     if part.times > 1:
         panel.set_title(f"the same, on 1/{part.times:.2g} of the range", loc="left")
-    panel.margins(x=0)
+
+
+def draw_coordinate(panel: Axes, result: Result, robots: Sequence[int], k: int) -> str:
+    """Actual and desired values of a coordinate of some robots; returns the unit in which they are drawn."""
+    unit, factor = display(result.units("x")[robots[0]][k])
+    for i, width in zip(robots, line_widths(len(robots)), strict=True):
+        actual, desired = factor * result.x[:, i, k], factor * result.x_desired[:, i, k]
+        panel.plot(result.t, actual, color=robot_color(i), linewidth=width, label="actual")
+        panel.plot(result.t, desired, "-.", color=DESIRED, linewidth=1.1, label="desired")
+    return unit
 
 
 def shade_disturbances(panel: Axes, result: Result) -> None:
@@ -276,12 +279,6 @@ def _read_limits(limits: tuple[float, float]) -> tuple[float, float]:
     if not low < high:
         raise InputError(f"expected the lower one first, found {low:g} and {high:g}", subject="limits")
     return float(low), float(high)
-
-
-def _check_robot(result: Result, robot: int) -> None:
-    last = len(result.names) - 1
-    if isinstance(robot, bool) or not isinstance(robot, (int, np.integer)) or not 0 <= robot <= last:
-        raise InputError(f"expected an index from 0 to {last}, found {robot!r}", subject="robot")
 
 
 def _needed(result: Result, kind: str, columns: Sequence[int] | None = None) -> tuple[float, float]:

@@ -1,19 +1,25 @@
-"""Figures that any run has: torques with their limits, paths over time, and estimates."""
+"""Figures that any run has, and all of them by name: torques, paths over time, estimates, and the gallery."""
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Sequence
+from html import escape
+from io import BytesIO
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError
+from ..checks import finite_number
+from ..errors import InputError, SynctrlError
 from ..simulation.result import Result
-from .legends import columns_that_fit, fitted, legend, legend_rows, line_widths, plain
+from ..simulation.views import FIGURES, find_figure
+from .legends import columns_that_fit, fitted, legend, legend_rows, plain
 from .panels import GAP, LEFT, LEGEND, RIGHT, TITLE, WIDTH, stacked_panels
-from .plots import columns_by_unit, shade_disturbances, style, titled
+from .plots import columns_by_unit, draw_coordinate, save, shade_disturbances, style, titled
 from .runs import check_run
-from .style import DESIRED, LINE_STYLES, PALETTE, LineStyle, display, robot_color
+from .style import DESIRED, PALETTE, line_style, robot_color
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -116,20 +122,10 @@ def paths(result: Result, *, width: float = WIDTH) -> Figure:
         figure, panels = stacked_panels([COORDINATE] * len(names), above, width)
         for k, panel in enumerate(panels):
             panel.set_title(titled(names[k], width), loc="left")
-            _draw_coordinate(panel, result, k)
-        panels[-1].set_xlabel("time, s")
+            panel.set_ylabel(draw_coordinate(panel, result, range(len(result.names)), k))
+            shade_disturbances(panel, result)
         legend(figure, handles)
     return figure
-
-
-def _draw_coordinate(panel: Axes, result: Result, k: int) -> None:
-    unit, factor = display(result.units("x")[0][k])
-    for i, width in enumerate(line_widths(len(result.names))):
-        panel.plot(result.t, factor * result.x[:, i, k], color=robot_color(i), linewidth=width)
-        panel.plot(result.t, factor * result.x_desired[:, i, k], "-.", color=DESIRED, linewidth=1.1)
-    shade_disturbances(panel, result)
-    panel.set_ylabel(unit)
-    panel.margins(x=0)
 
 
 def _figure(result: Result, curves: Sequence[Curves], width: float) -> Figure:
@@ -146,24 +142,17 @@ def _figure(result: Result, curves: Sequence[Curves], width: float) -> Figure:
             y = 1 + LEGEND * legend_rows(handles, room) / PANEL  # above the legend
             panel.set_title(titled(shown.title, width), loc="left", y=y)
             panel.set_ylabel(shown.label)
-            panel.margins(x=0)
-        panels[-1].set_xlabel("time, s")
     return figure
 
 
 def _draw(panel: Axes, result: Result, shown: Curves) -> list[Any]:
     lines = []
     for k, name in enumerate(shown.names):
-        color, look = _look(k)
+        color, look = robot_color(k), line_style(k // len(PALETTE))  # another line where colours repeat
         lines += panel.plot(result.t, shown.values[:, k], ls=look, color=color, label=plain(name))
         for level in shown.levels[k]:
             panel.axhline(level, ls=(0, (5, 3)), color=color, linewidth=0.9)
     return lines
-
-
-def _look(k: int) -> tuple[str, LineStyle]:
-    """Colour and line of a curve: the next kind of line where colours repeat."""
-    return PALETTE[k % len(PALETTE)], LINE_STYLES[k // len(PALETTE) % len(LINE_STYLES)]
 
 
 def _limited(name: str, limit: float | None) -> str:
@@ -181,3 +170,79 @@ def _near(tau: np.ndarray, limit: float | None) -> tuple[float, ...]:
     if limit is None or not limit > 0:
         return ()
     return tuple(sign * limit for sign in (1, -1) if (sign * tau).max() > NEAR * limit)
+
+
+#: the narrowest figure in which all words have their place, inches
+NARROWEST = 3.0
+
+
+class Gallery(dict[str, "Figure"]):
+    """Figures by name.
+
+    Attributes:
+        missing: what is not shown, by name, and why.
+    """
+
+    def __init__(self, title: str) -> None:
+        super().__init__()
+        self.title = title
+        self.missing: dict[str, str] = {}
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write every figure as `<name>.png` and `<name>.svg` into a folder, which is made.
+
+        Raises:
+            ResultError: a file cannot be written.
+        """
+        return [file for name, figure in self.items() for file in save(figure, Path(folder) / name)]
+
+    def _repr_html_(self) -> str:
+        """All figures for a notebook, and what is missing."""
+        pictures = "".join(
+            f'<img alt="{escape(name)}" style="max-width: 100%" src="data:image/png;base64,{_png(figure)}">'
+            for name, figure in self.items()
+        )
+        words = "".join(f"<p>{escape(line)}</p>" for line in self._missing_lines())
+        return f"<div>{pictures}{words}</div>"
+
+    def _missing_lines(self) -> list[str]:
+        return [f"Not shown: {name}: {reason}" for name, reason in self.missing.items()]
+
+    def __repr__(self) -> str:
+        return "\n".join([f"Figures of '{self.title}': {', '.join(self)}", *self._missing_lines()])
+
+
+def gallery(result: Result, *names: str, width: float = WIDTH) -> Gallery:
+    """The figures of a run.
+
+    Args:
+        result: the run.
+        names: which ones, see `FIGURES`; by default all. What a run does not have is then left out and named
+            in `missing`.
+        width: of all figures, inches.
+
+    Raises:
+        InputError: an unknown name, a figure that was asked for by name and cannot be drawn, none that can,
+            or a width below `NARROWEST`.
+    """
+    if not finite_number("width", width) >= NARROWEST:
+        raise InputError(f"expected at least {NARROWEST:g} inches, found {width:g}", subject="width")
+    found = Gallery(str(result.info["title"]))
+    for name in names or FIGURES:
+        try:
+            found[name] = find_figure(name)(result, width=width)
+        except SynctrlError as error:
+            if names or (len(found.missing) + 1 == len(FIGURES)):
+                raise
+            found.missing[name] = str(error)
+    unknown = [robot["name"] for robot in result.info["robots"] if "torque_limits" not in robot]
+    if "torque" in found and unknown:
+        found.missing["torque limits"] = f"the result does not say those of {', '.join(unknown)}"
+    return found
+
+
+def _png(figure: Figure) -> str:
+    pixels = BytesIO()
+    with style():
+        figure.savefig(pixels, format="png")
+    return base64.b64encode(pixels.getvalue()).decode()

@@ -42,6 +42,13 @@ def check_run(result: Result, *arrays: str) -> None:
             )
 
 
+def check_axes(result: Result, *axes: str) -> None:
+    """Refuse a run whose coordinates are not those of tips along these axes."""
+    if (found := result.info["axes"]) != [*axes]:
+        expected = f"{', '.join(axes[:-1])} and {axes[-1]}"
+        raise InputError(f"expected tips along {expected}, found {', '.join(found)}", subject="result")
+
+
 def shown_experiment(result: Result, experiment: Experiment | None) -> Experiment:
     """The experiment that made a run, given or still known.
 

@@ -15,13 +15,11 @@ from ..errors import InputError, RobotWarning, warn
 from ..files import write_whole
 from ..robots.model import joint_poses
 from . import shapes
-from .colors import ColorLike, hex_color, read_color, within_unit
-from .html import frame, page
+from .html import fit_camera, frame, page, view_commands, viewer_axes
 from .meshes import MeshLibrary
-from .nodes import Node, bounding_box, label, pack, paint, scene_commands
-from .rotations import TINY, continuous, towards, unit
+from .nodes import TINY, Node, bounding_box, continuous, label, pack, paint, scene_commands, towards, unit
 from .shapes import Shape
-from .view import fit_camera, view_commands, viewer_axes
+from .style import ColorLike, hex_color, read_color, within_unit
 
 if TYPE_CHECKING:
     import pinocchio as pin
@@ -178,10 +176,8 @@ class Scene:
 
     def camera(self, position: ArrayLike, target: ArrayLike) -> None:
         """Look from `position` to `target`, (3,) each in m; without this call everything is in view."""
-        eye, aim = (
-            finite_array("camera position", position, (3,)),
-            finite_array("camera target", target, (3,)),
-        )
+        eye = finite_array("camera position", position, (3,))
+        aim = finite_array("camera target", target, (3,))
         if np.linalg.norm(eye - aim) < TINY:
             raise InputError(f"camera: position and target are the same point {eye}; expected two points")
         self._camera = eye, aim

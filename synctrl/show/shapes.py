@@ -78,7 +78,8 @@ def tube(points: np.ndarray, radius: float, color: Color = GREY) -> Shape:
     points = _apart(points, radius / 2)
     if len(points) == 1:
         ball = ellipsoid(np.full(3, 2 * radius), color)
-        return Shape(ball.geometry, ball.bounds, _shift(points[0]) @ ball.matrix, color)
+        ball.matrix[:3, 3] = points[0]
+        return ball
     normals, binormals = _frames(points)
     angles = np.linspace(0, 2 * np.pi, TUBE_SIDES, endpoint=False)[:, None]
     rings = np.cos(angles) * normals[:, None] + np.sin(angles) * binormals[:, None]  # (k, sides, 3)
@@ -100,12 +101,6 @@ def _around(radius: float, half_length: float) -> np.ndarray:
 
 def _stretch(x: float, y: float, z: float) -> np.ndarray:
     return np.diag([float(x), float(y), float(z), 1.0])
-
-
-def _shift(position: np.ndarray) -> np.ndarray:
-    matrix = np.eye(4)
-    matrix[:3, 3] = position
-    return matrix
 
 
 _UPRIGHT = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # y of three.js -> our z

@@ -20,7 +20,7 @@ FIGURES = MappingProxyType(
     }
 )
 #: what makes all of them
-GALLERY = "synctrl.show.gallery", "gallery"
+GALLERY = "synctrl.show.run_figures", "gallery"
 
 
 def find_figure(name: str) -> Callable[..., Any]:
