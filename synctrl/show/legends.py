@@ -154,11 +154,10 @@ def shortened(text: str, room: float, size: float) -> str:
 
 @lru_cache(maxsize=4096)
 def text_width(text: str, size: float) -> float:
-    """How wide words are in a size, both in points."""
+    """How wide words are in a size, both in points; of signs that show nothing, 0."""
     from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import TextPath
+    from matplotlib.textpath import text_to_path
 
-    if not text.strip():
-        return 0.0
-    outline = TextPath((0, 0), text, size=size, prop=FontProperties(family="DejaVu Sans"))
-    return HINTED * float(outline.get_extents().x1)
+    outline, _ = text_to_path.get_text_path(FontProperties(family="DejaVu Sans"), text.replace(r"\$", "$"))
+    width = np.reshape(outline, (-1, 2))[:, 0].max(initial=0.0)
+    return HINTED * float(width) * size / text_to_path.FONT_SCALE
