@@ -139,14 +139,36 @@ def _add_bars(
     names, colors = row_names(result, "sync_error"), pair_colors(result)
     colors = colors if len(colors) > 1 else [ONE_PAIR]
     marks = zip(result.info["pairs"], colors, pair_symbols(result), names, strict=True)
+    lifts = _lifts(result.info["pairs"], tips[0], BALL * scale)
     for k, (robots, color, symbol, name) in enumerate(marks):
         calm = np.array(read_color(symbol, color)[:3])
         shade = calm + share[:, k, None] * (ALARM - calm)
         radius = scale * (THIN + share[:, k] * (THICK - THIN))
         for end in robots[1:] if len(robots) == 2 else robots:
             start = tips[:, robots[0]] if len(robots) == 2 else tips[:, robots].mean(axis=1)
-            scene.add_segment(f"{symbol}, to {result.names[end]}", start, tips[:, end], radius, shade)
+            up = np.array([0.0, 0.0, lifts[k]])
+            bar = f"{symbol}, to {result.names[end]}"
+            scene.add_segment(bar, start + up, tips[:, end] + up, radius, shade)
         scene.add_legend(f"{symbol}: {name.partition(': ')[2]}", color)
+
+
+def _lifts(pairs: Sequence[Sequence[int]], tips: np.ndarray, ball: float) -> list[float]:
+    """How far above the tips, (n, 3), each bar is drawn, m: one past another tip would hide what ends there.
+
+    The first of them touches the tops of the balls, of radius `ball`, and each more is that far above.
+    """
+    past = [len(robots) == 2 and _passes_a_tip(robots, tips, ball) for robots in pairs]
+    return [ball * sum(past[: k + 1]) if hidden else 0.0 for k, hidden in enumerate(past)]
+
+
+def _passes_a_tip(pair: Sequence[int], tips: np.ndarray, ball: float) -> bool:
+    """Whether the way between the tips of a pair leads through the ball of another tip."""
+    start, end = tips[list(pair)]
+    others = np.delete(tips, list(pair), axis=0)
+    along = end - start
+    share = (others - start) @ along / max(float(along @ along), ball**2)
+    off = np.linalg.norm(others - start - share[:, None] * along, axis=1)
+    return bool(((share > 0) & (share < 1) & (off < ball)).any())
 
 
 def _caption(robots: Sequence[Robot], result: Result, has_paths: bool) -> list[str]:
