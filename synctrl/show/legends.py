@@ -154,10 +154,13 @@ def shortened(text: str, room: float, size: float) -> str:
 
 @lru_cache(maxsize=4096)
 def text_width(text: str, size: float) -> float:
-    """How wide words are in a size, both in points; of signs that show nothing, 0."""
+    """How wide words are in a size, both in points."""
+    from matplotlib.cbook import is_math_text
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import text_to_path
 
-    outline, _ = text_to_path.get_text_path(FontProperties(family="DejaVu Sans"), text.replace(r"\$", "$"))
-    width = np.reshape(outline, (-1, 2))[:, 0].max(initial=0.0)
-    return HINTED * float(width) * size / text_to_path.FONT_SCALE
+    if not text.strip():
+        return 0.0
+    font = FontProperties(family="DejaVu Sans", size=size)
+    width, _, _ = text_to_path.get_text_width_height_descent(text, font, is_math_text(text))
+    return HINTED * float(width)
