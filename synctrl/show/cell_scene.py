@@ -177,5 +177,5 @@ def _caption(robots: Sequence[Robot], result: Result, has_paths: bool) -> list[s
         lines.append("Desired paths are not shown: the coordinates are not those of tips.")
     plain = [name for name, robot in zip(result.names, robots, strict=True) if not has_shapes(robot)]
     if plain:
-        lines.append(f"Without shapes in their descriptions, as plain links: {', '.join(plain)}.")
+        lines.append(f"Without shapes that can be shown, as plain links: {', '.join(plain)}.")
     return lines
