@@ -79,6 +79,22 @@ def test_bars_join_compared_tips_in_different_colours_and_turn_red(star):
     assert bars == pair_colors(star) and len({*bars}) == 3
 
 
+def test_a_bar_past_other_tips_goes_above_what_it_would_hide():
+    """Four arms in a row, all compared: three bars to the next one, and three past others."""
+    arm = load_robot("planar2r")
+    members = [Member(arm.placed((i, 0.0, 0.0)), Hold([0.3, 1.2])) for i in range(4)]
+    run = Experiment(Cell(members, Coupling.complete(4)), SMALL_GAINS, 0.02).simulate(dt=5e-3)
+    at = [member.robot.tip_position([0.3, 1.2]) for member in members]
+    scene = scene_of(run)
+    lifts = {}
+    for k, (i, j) in enumerate(run.info["pairs"]):
+        start, _ = ends(node(scene, f"segment ε{'₁₂₃₄₅₆'[k]}, to {run.names[j]}"))
+        lifts[i, j] = start[0, 2] - at[i][2]
+    past = [lift for (i, j), lift in lifts.items() if abs(i - j) > 1]
+    assert all(abs(lifts[pair]) < 1e-9 for pair in ((0, 1), (1, 2), (2, 3)))
+    assert len({*np.round(past, 6)}) == 3 and min(past) > 0.01
+
+
 def test_robots_without_shapes_are_drawn_as_plain_links_and_the_page_says_so(bare):
     scene = scene_of(bare)
     robot = node(scene, "robot robot 1")

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from refusals import refused
+from sliders import GANTRY, load, pair
 
 SCRIPTS = Path(__file__).resolve().parent.parent / "scripts"
 sys.path.insert(0, str(SCRIPTS))
@@ -131,6 +133,20 @@ def test_a_start_far_off_the_path_is_said_before_it_breaks_anything():
         Gains.suggest(Cell([near, near], Coupling.pair()), OMEGA)
     with pytest.warns(GainWarning, match=r"robot 2, joint \d: a start 0.5 rad off"):
         Gains.suggest(Cell([near, far], Coupling.pair()), OMEGA)
+
+
+def test_the_start_of_a_slide_is_told_in_metres_and_newtons(tmp_path):
+    slides = pair((load(tmp_path, "gantry", GANTRY, effort=100.0),) * 2).cell
+    far = [replace(member, q0=np.array([5.2, 0.2, 0.2])) for member in slides.members]
+    with pytest.warns(GainWarning, match=r"joint 1: a start 5 m off .* takes about \S+ N, .* of 100 N;"):
+        Gains.suggest(Cell(far, slides.coupling), OMEGA)
+
+
+def test_a_limit_that_gravity_alone_passes_is_not_blamed_on_the_start(tmp_path):
+    slides = pair((load(tmp_path, "weak", GANTRY, effort=10.0),) * 2).cell
+    on_path = [replace(member, q0=None) for member in slides.members]
+    with pytest.warns(GainWarning, match=r"joint 3: gravity at the start takes 19.6 N, .* of 10 N;"):
+        Gains.suggest(Cell(on_path, slides.coupling), OMEGA)
 
 
 @pytest.mark.parametrize(

@@ -185,3 +185,11 @@ def test_who_asked_for_friction_survives_copies_and_files(tmp_path):
 def test_another_word_is_refused(friction):
     with refused(InputError, "robot 1, friction"):
         cell(rubbing(), friction=friction)
+
+
+def test_estimates_that_leave_out_the_friction_are_told_what_is_adapted():
+    robot = rubbing()
+    with refused(InputError, "robot 1, theta_hat0", found=(20,)) as caught:
+        cell(robot, friction="urdf", theta_hat0=0.5 * robot.inertial_parameters)
+    names = FrictionParameters(robot, robot.urdf_friction).names
+    assert f"{names[0]} to {names[-1]}" in str(caught.value)

@@ -19,6 +19,7 @@ from ..errors import GainWarning, warn
 from ..robots.mechanism import joint_limits
 from ..robots.payload import Load, carrying
 from ..robots.robot import Robot
+from ..robots.units import unit_for
 from .excursion import Excursion, excursion
 from .learning_scale import learning_scale
 
@@ -189,19 +190,26 @@ def _warn_of_slow_modes(omega: float, rates: Rates, arms: list[Arm], K_r: list[n
 
 
 def _warn_of_first_torque(cell: Cell, rates: Rates, K_r: list[np.ndarray]) -> None:
-    """Say where K_r Lambda |e| at the start, beside gravity, is more than a joint has."""
+    """Say where gravity at the start, or K_r Lambda |e| beside it, is more than a joint has."""
     task = cell.task.measure(np.stack((cell.q0, cell.v0)), cell.references(np.zeros(1))[0].desired)
     still = np.zeros_like(task.e)
     ways = (cell.task.to_joints(task, xref_dot, still)[0] for xref_dot in (rates.Lambda * task.e, still))
     jump = np.abs(np.subtract(*ways))
     for i, (robot, K) in enumerate(zip(cell.robots, K_r, strict=True)):
-        torque = K * jump[i, : robot.nv] + np.abs(robot.gravity(cell.q0[i, : robot.nv]))
+        gravity = np.abs(robot.gravity(cell.q0[i, : robot.nv]))
         limit = joint_limits(robot).torque
+        torque = gravity + K * jump[i, : robot.nv]
         joint = int(np.argmax(torque / limit))
-        if torque[joint] > limit[joint]:
-            warn(
-                f"{cell.names[i]}, joint {joint + 1}: a start {jump[i].max() / rates.Lambda:.3g} rad off the "
-                f"path takes about {torque[joint]:.3g} N·m, found a limit of {limit[joint]:.3g} N·m; start "
-                "closer to the path, or take a smaller bandwidth",
-                GainWarning,
-            )
+        if torque[joint] <= limit[joint]:
+            continue
+        unit = robot.joint_units[joint]
+        cause = f"a start {jump[i, joint] / rates.Lambda:.3g} {unit} off the path takes about"
+        advice = "start closer to the path, or take a smaller bandwidth"
+        if gravity[joint] > limit[joint]:
+            torque, cause, advice = gravity, "gravity at the start takes", "no gains can hold the arm there"
+        force = unit_for("N·m", unit)
+        warn(
+            f"{cell.names[i]}, joint {joint + 1}: {cause} {torque[joint]:.3g} {force}, found a limit of "
+            f"{limit[joint]:.3g} {force}; {advice}",
+            GainWarning,
+        )

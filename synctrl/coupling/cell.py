@@ -27,6 +27,7 @@ from .member_checks import (
     check_labels,
     check_names,
     check_trajectory,
+    first_estimates,
     member_parameters,
     with_urdf_friction,
 )
@@ -252,9 +253,7 @@ class Cell:
             starts.append(source)
             q0.append(finite_array(f"{name}, q0", start, (nv,)))
             v0.append(finite_array(f"{name}, v0", np.zeros(nv) if member.v0 is None else member.v0, (nv,)))
-            size = len(parameters[-1].theta)
-            guess = np.zeros(size) if member.theta_hat0 is None else member.theta_hat0
-            theta_hat0.append(finite_array(f"{name}, theta_hat0", guess, (size,)))
+            theta_hat0.append(first_estimates(name, parameters[-1], member.theta_hat0))
         self.starts = tuple(starts)
         self.parameters, self.theta = tuple(parameters), padded([p.theta for p in parameters])
         self.q0, self.v0, self.theta_hat0 = padded(q0), padded(v0), padded(theta_hat0)

@@ -129,6 +129,24 @@ def member_parameters(name: str, robot: Robot, friction: Friction, given: Any) -
     return parameters
 
 
+def first_estimates(name: str, parameters: Parameters, given: Any) -> np.ndarray:
+    """Estimates at t = 0, (P,), of a robot; zeros where none are given.
+
+    Raises:
+        InputError: not one finite number for each of the parameters, whose names the message has.
+    """
+    size = len(parameters.theta)
+    estimates = finite_array(f"{name}, theta_hat0", np.zeros(size) if given is None else given)
+    if estimates.shape != (size,):
+        raise InputError(
+            f"expected shape ({size},), a number for each of what is adapted ({parameters.names[0]} to "
+            f"{parameters.names[-1]}, true values in Member.theta), found {estimates.shape}",
+            subject=f"{name}, theta_hat0",
+            found=estimates.shape,
+        )
+    return estimates
+
+
 def with_urdf_friction(robot: Robot, given: Any) -> Any:
     """Parameters with friction, and rotors if there are any, in the place of none or of a known name."""
     if not (given is None or (isinstance(given, str) and given in KINDS)):

@@ -142,11 +142,32 @@ def _add_bars(
     names, colors = row_names(result, "sync_error"), pair_colors(result)
     colors = colors if len(colors) > 1 else [ONE_PAIR]
     marks = zip(result.info["pairs"], colors, pair_symbols(result), names, strict=True)
+    lifts = _lifts(result.info["pairs"], tips[0], BALL * scale)
     for k, (robots, color, symbol, name) in enumerate(marks):
         calm = np.array(read_color(symbol, color)[:3])
         radius = scale * (THIN + share[:, k] * (THICK - THIN))
-        add_bars(scene, result, symbol, robots, tips, radius, error_color(share[:, k], calm))
+        lifted = tips + np.array([0.0, 0.0, lifts[k]])
+        add_bars(scene, result, symbol, robots, lifted, radius, error_color(share[:, k], calm))
         scene.add_legend(f"{symbol}: {name.partition(': ')[2]}", color)
+
+
+def _lifts(pairs: Sequence[Sequence[int]], tips: np.ndarray, ball: float) -> list[float]:
+    """How far above the tips, (n, 3), each bar is drawn, m: one past another tip would hide what ends there.
+
+    The first of them touches the tops of the balls, of radius `ball`, and each more is that far above.
+    """
+    past = [len(robots) == 2 and _passes_a_tip(robots, tips, ball) for robots in pairs]
+    return [ball * sum(past[: k + 1]) if hidden else 0.0 for k, hidden in enumerate(past)]
+
+
+def _passes_a_tip(pair: Sequence[int], tips: np.ndarray, ball: float) -> bool:
+    """Whether the way between the tips of a pair leads through the ball of another tip."""
+    start, end = tips[list(pair)]
+    others = np.delete(tips, list(pair), axis=0)
+    along = end - start
+    share = (others - start) @ along / max(float(along @ along), ball**2)
+    off = np.linalg.norm(others - start - share[:, None] * along, axis=1)
+    return bool(((share > 0) & (share < 1) & (off < ball)).any())
 
 
 def _caption(robots: Sequence[Robot], result: Result, has_paths: bool) -> list[str]:
@@ -155,5 +176,5 @@ def _caption(robots: Sequence[Robot], result: Result, has_paths: bool) -> list[s
         lines.append("Desired paths are not shown: the coordinates are not those of tips.")
     plain = [name for name, robot in zip(result.names, robots, strict=True) if not has_shapes(robot)]
     if plain:
-        lines.append(f"Without shapes in their descriptions, as plain links: {', '.join(plain)}.")
+        lines.append(f"Without shapes that can be shown, as plain links: {', '.join(plain)}.")
     return lines
