@@ -39,6 +39,7 @@ RENAMED = [
     ("synctrl.experiments.reproduction", "JOBS", "synctrl.paper.reproduction", "PLANNED"),
     ("synctrl.experiments.reproduction", "judge_jobs", "synctrl.paper.reproduction", "judge_runs"),
     ("synctrl.sweep.distributions", "Distribution", "synctrl.sweep.distributions", "Values"),
+    ("synctrl.compiled.engine", "Block", "synctrl.compiled.engine", "DesiredStretch"),
     ("synctrl.show.report", "Row", "synctrl.paper.report", "SideBySide"),
 ]
 #: what version 0.1 exported
