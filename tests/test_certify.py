@@ -25,6 +25,8 @@ from synctrl import (
 from synctrl.analysis import Certificate, certify
 from synctrl.analysis.convergence import convergence
 from synctrl.analysis.replay import replay
+from synctrl.control.adaptation import Gradient, Leakage
+from synctrl.control.laws import SunMills
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, planar_four
 from synctrl.robots.parameters import FrictionParameters
@@ -223,8 +225,34 @@ def test_a_compiled_run_from_rest_on_its_path_is_known_again_and_keeps_the_ident
     assert convergence(result).identity_holds
 
 
-def test_a_run_with_slightly_other_gains_is_another_one() -> None:
+@pytest.mark.parametrize("gain", ["Lambda", "beta", "K_r", "K_eps", "Gamma"])
+def test_a_run_with_slightly_other_gains_is_another_one(gain: str) -> None:
     run = experiment(coupling("pair", 2, 2))
-    other = replace(run, gains=replace(GAINS, Lambda=1.001 * GAINS.Lambda))
-    with refused(InputError, "experiment", found="v_error"):
+    other = replace(run, gains=GAINS.replace(**{gain: 1.001 * getattr(GAINS, gain)}))
+    with refused(InputError, "experiment", found="adaptation" if gain == "Gamma" else "gains"):
         replay(run.simulate(0.03, 1e-3), other)
+
+
+@pytest.mark.parametrize(
+    ("found", "options"),
+    [
+        ("law", {"law": SunMills("paper")}),
+        ("adaptation", {"adaptation": Gradient(0.2)}),
+        ("adaptation", {"adaptation": Leakage(0.3, 0.2)}),
+    ],
+)
+def test_a_run_with_another_part_is_another_one(found: str, options: dict) -> None:
+    with refused(InputError, "experiment", found=found):
+        replay(a460_pair(adaptation=Gradient(0.3)).simulate(0.01, 1e-3), a460_pair(**options))
+
+
+def test_gamma_among_the_gains_is_the_same_as_the_gradient_with_it() -> None:
+    made = experiment(coupling("pair", 2, 2))
+    same = replace(made, gains=GAINS.replace(Gamma=None), adaptation=Gradient(GAINS.Gamma))
+    assert replay(made.simulate(0.01, 1e-3), same).experiment is same
+
+
+def test_other_weights_show_in_the_velocity_errors() -> None:
+    made, other = experiment(coupling("pair", 2, 2)), experiment(coupling("pair", 2, 2, "moving"))
+    with refused(InputError, "experiment", found="v_error"):
+        replay(made.simulate(0.03, 1e-3), other)

@@ -43,7 +43,7 @@ from synctrl.show.animation import formation_scene, planar_scene
 from synctrl.show.layout import cell_layout
 from synctrl.show.lyapunov_plots import lyapunov_figure
 from synctrl.show.plots import common_limits, joint_trajectories, sync_errors, tracking_errors
-from synctrl.simulation.guard import Finding
+from synctrl.simulation.guard import Alarm
 from synctrl.simulation.guard import stopped as stopped_by
 from synctrl.sweep.description import describe_base
 from synctrl.sweep.factors import Setup
@@ -218,7 +218,7 @@ def stopped(name: str, folder: Path) -> None:
     for k in range(4):
         y = loop.initial_state()
         loop.split(y)[k][...] = np.nan
-        error = stopped_by(loop, 0.1, y, np.ones((loop.cell.n, loop.cell.nv)), Finding("state"))
+        error = stopped_by(loop, 0.1, y, np.ones((loop.cell.n, loop.cell.nv)), Alarm("state"))
         assert isinstance(error, NonFiniteError) and error.robot in range(loop.cell.n)
 
 

@@ -39,6 +39,8 @@ RENAMED = [
     ("synctrl.experiments.batch", "Job", "synctrl.paper.reproduction", "PlannedRun"),
     ("synctrl.experiments.reproduction", "JOBS", "synctrl.paper.reproduction", "PLANNED"),
     ("synctrl.experiments.reproduction", "judge_jobs", "synctrl.paper.reproduction", "judge_runs"),
+    ("synctrl.sweep.distributions", "Distribution", "synctrl.sweep.distributions", "Values"),
+    ("synctrl.compiled.engine", "Block", "synctrl.compiled.engine", "DesiredStretch"),
     ("synctrl.show.report", "Row", "synctrl.paper.report", "SideBySide"),
 ]
 #: what version 0.1 exported
@@ -67,6 +69,8 @@ EXPORTED = {
         "initial_positions initial_velocities load model_error trajectories "
         "true_parameters weights"
     ),
+    "synctrl.sweep.variations": "scaled_coupling",
+    "synctrl.sweep.evaluation": "kept_file",
     "synctrl.tune": "Tuned tune",
 }
 

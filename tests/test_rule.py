@@ -152,6 +152,35 @@ def test_two_last_joints_on_a_hand_without_mass_are_fingers_whatever_they_are_ca
     assert held(loaded(tmp_path, robot_text(ARM + last))) == {"jx", "jy"}
 
 
+def test_a_base_that_is_none_is_held_and_named(tmp_path):
+    """As planners have it: two slides and a turn without mass or shape, before the first body."""
+    virtual = (
+        link("x", None) + joint("jx", "base", "x", type="prismatic")
+        + link("y", None) + joint("jy", "x", "y", type="prismatic")
+        + link("turn", None) + joint("jturn", "y", "turn")
+    )  # fmt: skip
+    robot = loaded(tmp_path, robot_text(virtual, chain("a b", parent="turn")))
+    assert held(robot) == {"jx", "jy", "jturn"}
+    same_as_pinocchio(robot, tmp_path / "robot.urdf", jx=0.0, jy=0.0, jturn=0.0)
+
+
+def test_a_turning_first_link_without_mass_is_no_such_base(tmp_path):
+    text = robot_text(link("a", None), joint("ja", "base", "a"), chain("b c", parent="a"))
+    with refused(RobotError, "joint 'ja'"):
+        loaded(tmp_path, text)
+
+
+def test_fingers_of_a_last_link_that_weighs_nothing_without_them_are_held(tmp_path):
+    wrist = link("wrist", None) + joint("jwrist", "b", "wrist")
+    fingers = "".join(
+        link(name, 0.1) + joint(f"j{name}", "wrist", name, type="prismatic", lower=0, upper=0.04)
+        for name in ("finger_1", "finger_2")
+    )
+    robot = loaded(tmp_path, robot_text(chain("a b"), wrist, fingers))
+    assert held(robot) == {"jfinger_1", "jfinger_2"}
+    same_as_pinocchio(robot, tmp_path / "robot.urdf", jfinger_1=0.0, jfinger_2=0.0)
+
+
 @pytest.mark.parametrize("mass", [None, 0.0])
 def test_a_link_of_the_arm_without_mass_is_refused_with_both_ways_on(mass, tmp_path):
     for text in (ARM + link("d", mass) + joint("jd", "c", "d"), link("z", mass) + joint("jz", "base", "z")):

@@ -15,11 +15,12 @@ from ..errors import InputError
 from ..robots.forest import Forest, Selection, forests
 from ..simulation.clock import before
 from ..simulation.closed_loop import ClosedLoop
-from ..simulation.recorder import ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE, own_states
-from ..simulation.result import LAYOUT, Result
+from ..simulation.recorder import ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE
+from ..simulation.result import Result
 from ..simulation.schedules import DisturbanceSchedule
 from ..simulation.simulate import Experiment
 from .jumps import Piece, jumps_in, pieces, tolerance
+from .origin import another, check_numbers, check_settings, check_sizes
 
 #: instants whose references are evaluated together
 BLOCK = 256
@@ -29,8 +30,6 @@ MISMATCH = 1e-6
 AGREEMENT, STILL = 1e-9, 1e-12
 #: share of the model's torque from which something in Y theta counts as friction, and not as rounding
 KNOWN = 1e-9
-#: numbers beyond it are those of a run that went astray, and have no squares
-LARGEST = 1e100
 
 Bodies = Sequence[tuple[Selection, Forest]]
 """The robots of a cell as `forests` groups them."""
@@ -129,8 +128,9 @@ def replay(result: Result | Replay, experiment: Experiment | None = None) -> Rep
     instance("result", result, Result, "a Result")
     experiment = experiment_of(result, experiment)
     loop = experiment.closed_loop(result.info.get("plant", "pinocchio"))
-    _check_sizes(result, loop)
-    _check_numbers(result)
+    check_sizes(result, loop)
+    check_settings(result, loop)
+    check_numbers(result)
     schedule = DisturbanceSchedule(loop.cell, experiment.disturbances)
     jumps, crossed, events = jumps_in(result.t, loop, schedule, result.info.get("control_period"))
     rows = Moment(*map(np.array, zip(*_rows(result, loop, schedule, jumps), strict=True)))
@@ -252,31 +252,6 @@ def _friction(
 # -- checks -----------------------------------------------------------------------------------------------
 
 
-def _check_sizes(result: Result, loop: ClosedLoop) -> None:
-    """Compare shapes, also those of the states that adaptation, network and plant have for themselves."""
-    cell, own = loop.cell, own_states(loop)
-    errors = {"theta_hat": cell.theta.shape, "sync_error": (cell.coupling.pairs, cell.m)}
-    for name, shape in {"q": (cell.n, cell.nv), **errors, **own}.items():
-        array = result.outputs.get(name) if name in own else getattr(result, name)
-        found = None if array is None else array.shape[1:]
-        if found != shape:
-            raise _another(f"its {name} has the shape {shape} at an instant, the result's {found}", name)
-    if not len(result.t):
-        raise InputError("expected at least one logged instant, found none", subject="result")
-
-
-def _check_numbers(result: Result) -> None:
-    for name in LAYOUT:
-        large = np.argwhere(~(np.abs(getattr(result, name)) <= LARGEST))
-        if len(large):
-            found = getattr(result, name)[tuple(large[0])]
-            raise InputError(
-                f"expected numbers up to {LARGEST:g}, found {found:g} at "
-                f"t = {result.t[large[0][0]]:g} s; the run went astray, and nothing can be said of it",
-                subject=f"result, {name}",
-            )
-
-
 def _check_same(result: Result, rows: Moment) -> None:
     """Compare velocity errors; where robots are at rest and on their path, these are nothing but rounding."""
     difference = np.abs(rows.s_q - result.v_error).max(axis=(1, 2))
@@ -285,13 +260,8 @@ def _check_same(result: Result, rows: Moment) -> None:
     wrong = ~(difference <= MISMATCH * speed + rounding)
     if wrong.any():
         k = int(np.argmax(wrong))
-        raise _another(
+        raise another(
             f"at t = {result.t[k]:g} s it gives a velocity error of {rows.s_q[k].tolist()}, but the result "
             f"has {result.v_error[k].tolist()}",
             "v_error",
         )
-
-
-def _another(reason: str, part: str) -> InputError:
-    """The error about an experiment that is another one than that of the result, with what differs."""
-    return InputError(f"expected the one that made the result; {reason}", subject="experiment", found=part)

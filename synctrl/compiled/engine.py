@@ -11,10 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..coupling.cell import Cell
+from ..renamed import names_elsewhere
 from ..simulation.advance import up_to_a_failure
 from ..simulation.clock import Clock, Stretch
 from ..simulation.engines import Run, before_the_start, finish
-from ..simulation.guard import Finding, Progress, checks, limits_of, stopped, tell
+from ..simulation.guard import Alarm, Progress, checks, limits_of, stopped, tell
 from ..simulation.recorder import Recorder
 from ..simulation.result import Result
 from . import structs
@@ -31,20 +32,20 @@ BLOCK_STEPS = 1024
 AWAY = 0.05
 
 
-class Block(NamedTuple):
+class DesiredStretch(NamedTuple):
     """Consecutive steps with what is desired at their start, middle and end, by the names of quantities."""
 
     steps: Stretch
     desired: dict[str, np.ndarray]
 
 
-def blocks(program: Program, clock: Clock) -> Iterator[Block]:
+def blocks(program: Program, clock: Clock) -> Iterator[DesiredStretch]:
     """The steps of a run, in blocks that fit into memory; all before an instant whose references fail."""
     cell = program.loop.cell
 
-    def make(first: int, last: int) -> Block:
+    def make(first: int, last: int) -> DesiredStretch:
         stretch = clock.stretch(first, last)
-        return Block(stretch, _tables(cell, stretch.stages))
+        return DesiredStretch(stretch, _tables(cell, stretch.stages))
 
     length = min(BLOCK_STEPS, max(1, BLOCK_BYTES // _step_bytes(cell)))
     for first, last in clock.stretches(length):
@@ -64,9 +65,9 @@ class Tables:
     """
 
     def __init__(self) -> None:
-        self._kept: tuple[list[Any], tuple, list[Block]] = [], (), []
+        self._kept: tuple[list[Any], tuple, list[DesiredStretch]] = [], (), []
 
-    def blocks(self, program: Program, clock: Clock) -> Iterable[Block]:
+    def blocks(self, program: Program, clock: Clock) -> Iterable[DesiredStretch]:
         """The steps of a run, made anew if the run before had other motions, weights or instants."""
         cell = program.loop.cell
         if clock.steps * _step_bytes(cell) > BLOCK_BYTES:
@@ -78,7 +79,9 @@ class Tables:
             return kept
         return self._keep(parts, clock, blocks(program, clock))
 
-    def _keep(self, parts: list[Any], clock: Clock, fresh: Iterable[Block]) -> Iterator[Block]:
+    def _keep(
+        self, parts: list[Any], clock: Clock, fresh: Iterable[DesiredStretch]
+    ) -> Iterator[DesiredStretch]:
         """Fresh blocks, which are known from when the last of them has been made."""
         found = []
         for block in fresh:
@@ -165,11 +168,11 @@ class _Steps:
         buffers = (part.ctypes.data for part in self._before)
         work.step_error = structs.StepError(0, np.abs(v0).max(), 0, 0, 0, *buffers)
         self._steps = structs.Steps(holds=run.every is not None, period=run.info.get("control_period") or 0.0)
-        self._block: Block | None = None
+        self._block: DesiredStretch | None = None
         program.tell(self._steps, {"disturbance": run.schedule.torques, "pi": program.carried})
         ctypes.memset(work.side, 0, 8 * run.loop.cell.n)
 
-    def advance(self, block: Block, first: int, last: int) -> None:
+    def advance(self, block: DesiredStretch, first: int, last: int) -> None:
         """Make some steps of a block."""
         steps, part = block.steps, slice(first, last)
         joined = self._run.clock.joined(steps.first + first, steps.starts[part])
@@ -181,7 +184,7 @@ class _Steps:
         clock, every = self._run.clock, self._run.every
         end, yes, no = np.array([clock.end]), np.array([True]), np.array([False])
         nothing = Stretch(clock.steps, np.repeat(end, 2), yes, yes, np.array([clock.count]))
-        block = Block(nothing, _tables(self._run.loop.cell, np.array([end] * 3)))
+        block = DesiredStretch(nothing, _tables(self._run.loop.cell, np.array([end] * 3)))
         due = np.array([every is None or clock.sampled_at_end(every)])
         before = clock.stretch(clock.steps - 1, clock.steps).middles
         self._call(block, 0, nothing.times, _marks(yes, yes, due, no), before)
@@ -192,7 +195,7 @@ class _Steps:
             return np.ones(len(steps.starts[part]), dtype=bool)
         return steps.checked[part] & (steps.number[part] % self._run.every == 0)
 
-    def _look_at(self, block: Block) -> structs.Steps:
+    def _look_at(self, block: DesiredStretch) -> structs.Steps:
         """The steps of a block."""
         if block is not self._block:
             self._program.tell(self._steps, block.desired)
@@ -200,7 +203,7 @@ class _Steps:
         return self._steps
 
     def _call(
-        self, block: Block, first: int, times: np.ndarray, marks: np.ndarray, middles: np.ndarray
+        self, block: DesiredStretch, first: int, times: np.ndarray, marks: np.ndarray, middles: np.ndarray
     ) -> None:
         """Make steps between these times; what acts in the middle of one acts in all of it."""
         program, recorder, report = self._program, self._recorder, structs.Report()
@@ -219,7 +222,7 @@ class _Steps:
             self._run.step_error.note(worst.largest, worst.speed, worst.at, worst.time)
         if report.status:
             check = checks(limits_of(program.loop.cell.task))[report.status - 1]
-            found = Finding(check, report.robot, report.value)
+            found = Alarm(check, report.robot, report.value)
             t, v = float(times[report.step]), recorder.last("v")
             raise stopped(program.loop, t, recorder.state, v, found)
 
@@ -242,3 +245,6 @@ def _tables(cell: Cell, instants: np.ndarray) -> dict[str, np.ndarray]:
             desired[name][:, i] = part
     weights = cell.weights(flat[:1] if cell.coupling.is_constant else flat)
     return {**desired, "weights": one_after_another(weights)}
+
+
+__getattr__ = names_elsewhere(__name__, ".engine", Block="DesiredStretch")

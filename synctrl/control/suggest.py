@@ -17,9 +17,9 @@ from ..checks import instance, non_negative_number, positive_number
 from ..coupling.cell import Cell
 from ..errors import GainWarning, warn
 from ..robots.mechanism import joint_limits
+from ..robots.model import unit_for
 from ..robots.payload import Load, carrying
 from ..robots.robot import Robot
-from ..robots.units import unit_for
 from .excursion import Excursion, excursion
 from .learning_scale import learning_scale
 

@@ -199,7 +199,7 @@ class Engine(Protocol):
         """
 
 
-class Reference:
+class ReferenceEngine:
     """The equations as they are written, on Pinocchio's algorithms."""
 
     def refuses(self, run: Run) -> str | None:
@@ -211,7 +211,7 @@ class Reference:
 
 #: the engines that have a name: their module and class, which is imported when it is asked for
 ENGINES = {
-    "pinocchio": ("synctrl.simulation.engines", "Reference"),
+    "pinocchio": ("synctrl.simulation.engines", "ReferenceEngine"),
     "compiled": ("synctrl.compiled.engine", "Compiled"),
 }
 

@@ -33,7 +33,7 @@ LIBRARIES = frozenset({"synctrl", "numpy", "scipy", "pinocchio", "mujoco", "casa
 PARTS = ("position", "velocity", "parameter estimate", "integral of the synchronization error")
 
 
-class Finding(NamedTuple):
+class Alarm(NamedTuple):
     """What made a guard stop a run.
 
     Attributes:
@@ -78,29 +78,29 @@ class Guard:
             raise stopped(self._loop, sample.t, sample.y, self._v, found)
         self._v[...] = sample.y[self._v.size : 2 * self._v.size].reshape(self._v.shape)
 
-    def _look(self, sample: Sample) -> Finding | None:
+    def _look(self, sample: Sample) -> Alarm | None:
         """The first check that fails, in the order of `checks`."""
         if not isfinite(np.add.reduce(sample.y)) and not np.isfinite(sample.y).all():
-            return Finding("state")
+            return Alarm("state")
         task, tau = sample.signals.task, sample.signals.tau
         if (beyond := first_beyond(self._space, task)) is not None:
-            return Finding(beyond.name, beyond.robot, beyond.value)
+            return Alarm(beyond.name, beyond.robot, beyond.value)
         if (found := self._crossed(task)) is not None:
             return found
         if not isfinite(np.add.reduce(tau, axis=None)) and (rows := _non_finite_rows(tau)).size:
-            return Finding("torque", int(rows[0]))
+            return Alarm("torque", int(rows[0]))
         return None
 
-    def _crossed(self, task: Measurement) -> Finding | None:
+    def _crossed(self, task: Measurement) -> Alarm | None:
         """The first robot on the other side of a singular configuration than at the instant before."""
         if not self._has_sides:
             return None
         before, self._sides = self._sides, np.sign(self._space.sides(task))
         crossed = before * self._sides < 0
-        return Finding("side", int(crossed.argmax())) if crossed.any() else None
+        return Alarm("side", int(crossed.argmax())) if crossed.any() else None
 
 
-def stopped(loop: ClosedLoop, t: float, y: np.ndarray, v: np.ndarray, found: Finding) -> SimulationError:
+def stopped(loop: ClosedLoop, t: float, y: np.ndarray, v: np.ndarray, found: Alarm) -> SimulationError:
     """The error of a run that was stopped, in the words of all engines; why it came to that is not in it.
 
     Args:

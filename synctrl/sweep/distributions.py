@@ -14,6 +14,7 @@ import numpy as np
 from ..checks import finite_number, positive_number
 from ..control.controller import settings_of
 from ..errors import InputError
+from ..renamed import names_elsewhere
 
 Value = float | str
 #: how many listed values are shown one by one, and of how many letters each
@@ -225,3 +226,6 @@ def _plain(name: str, value: Any) -> Value:
     if not is_text(value):
         raise InputError(f"expected a word that can be written to a file, found {value!a}", subject=name)
     return str(value)
+
+
+__getattr__ = names_elsewhere(__name__, ".distributions", Distribution="Values")

@@ -98,16 +98,21 @@ def with_disturbance_from(experiment: Experiment, value: float, disturbance: int
 
 def with_scaled_weights(experiment: Experiment, value: float, robot: int | None = None) -> Experiment:
     """Weights c_i of the coupling times a number."""
-    cell, old = experiment.cell, experiment.cell.coupling
+    cell = experiment.cell
     scale = np.ones((cell.n, 1, 1))
     scale[_index("robot", robot, cell.n)] = value
+    coupling = scaled_coupling(cell.coupling, cell.m, scale)
+    return replace(experiment, cell=Cell(cell.members, coupling, cell.space, cell.name))
+
+
+def scaled_coupling(coupling: Coupling, m: int, scale: np.ndarray) -> Coupling:
+    """A coupling with its weights times a number for each robot, (n, 1, 1); in space of dimension m."""
 
     def at(t: float) -> tuple[Any, ...]:
-        return tuple(scale * part[0] for part in old.weights(np.array([t]), cell.m)[:3])
+        return tuple(scale * part[0] for part in coupling.weights(np.array([t]), m)[:3])
 
-    c = at(0.0)[0] if old.is_constant else at
-    coupling = Coupling(old.robots, old.edges, old.signs, c, old.name, old.unit)
-    return replace(experiment, cell=Cell(cell.members, coupling, cell.space, cell.name))
+    c = at(0.0)[0] if coupling.is_constant else at
+    return Coupling(coupling.robots, coupling.edges, coupling.signs, c, coupling.name, coupling.unit)
 
 
 def same_parameters(parameters: Parameters, robot: Robot) -> Parameters:

@@ -92,11 +92,7 @@ class MetricGradient:
 
     def __init__(self, cell: Cell, metric: Metric):
         self.metric, self.theta_hat0 = metric, cell.theta_hat0
-
-    @property
-    def Gamma(self) -> np.ndarray:  # noqa: N802
-        """Gamma of the robots, (n, P), or (n, P, P) if it is not diagonal."""
-        return self.metric.Gamma
+        self.Gamma = metric.Gamma  # (n, P), or (n, P, P) if it is not diagonal
 
     def start(self) -> np.ndarray:
         return self.theta_hat0.copy()
@@ -123,6 +119,9 @@ class MetricGradient:
 
 class BoundGradient(MetricGradient):
     """(14) with a diagonal Gamma, as the paper has it; generated code has a place for it."""
+
+    def rate(self, z: np.ndarray, seen: Seen) -> np.ndarray:
+        return self.Gamma * seen.gradient
 
 
 def metric_of(Gamma: Any, cell: Cell) -> Metric:

@@ -155,7 +155,7 @@ def settle_locks(
     """
     document, held = lock_joints(document, asked), {name: float(q) for name, q in asked.items()}
     steps = (partial(_leaders, tip=tip), partial(_followers, held=held), partial(_beside, tip=tip))
-    for find in (*steps, partial(_massless, tip=tip)):
+    for find in (*steps, _virtual, _gripped, partial(_massless, tip=tip)):
         document = _hold_found(document, find(document), held, notes)
     document = _without_range(document, notes)
     return _hold_found(document, _narrow(document), held, notes), held
@@ -234,6 +234,34 @@ def _massless(document: Document, tip: str | None) -> Found:
         if (name not in arm or (joint.type == "prismatic" and tip is None))
         and not any(parameters[carried][0] for carried in branches.carried_by(name))
     }
+
+
+def _virtual(document: Document) -> Found:
+    """Joints of a base that is none, as planners need it: sliding bodies without mass or shape."""
+    branches, parameters = Branches(document), body_parameters(document)
+    carrier = carriers(document)
+    seen = {carrier[link.name][0] for link in document.links if link.visuals or link.collisions}
+    chain: list[str] = []
+    on = [name for name, above in branches.chains.items() if len(above) == 1]
+    while len(on) == 1 and not parameters[on[0]][0] and on[0] not in seen:
+        chain, on = [*chain, on[0]], branches.next[on[0]]
+    slides = any(branches.moving[name].type == "prismatic" for name in chain)
+    if len(chain) < 2 or not slides or not on:
+        return {}
+    return {name: (_rest(branches.moving[name]), "it moves a base without mass or shape") for name in chain}
+
+
+def _gripped(document: Document) -> Found:
+    """Fingers of a last link that weighs nothing without them: what the arm carries is they."""
+    branches, parameters = Branches(document), body_parameters(document)
+    found: Found = {}
+    for name, joint in branches.moving.items():
+        on = set(branches.next[name])
+        if name not in branches.fingers and on and on <= branches.fingers and not parameters[name][0]:
+            reason = f"it is a finger of link {quoted(joint.child)}, which has no mass of its own"
+            fingers = branches.carried_by(name) - {name}
+            found |= {finger: (_rest(branches.moving[finger]), reason) for finger in fingers}
+    return found
 
 
 # -- ranges of no length -----------------------------------------------------------------------------------
