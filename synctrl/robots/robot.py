@@ -41,8 +41,7 @@ class Robot:
 
     Raises:
         FrameNotFound: `tip` is not a frame of the model.
-        RobotError: a floating base or another joint with several velocities, or joints that are not
-            numbered branch after branch.
+        RobotError: joints with several velocities, as a floating base has, or not numbered branch by branch.
     """
 
     def __init__(
@@ -86,8 +85,7 @@ class Robot:
             rpy: rotation about the fixed world axes x, y, z in that order, (3,), rad.
             name: name of the new robot.
         """
-        shift = finite_array("xyz", xyz, (3,))
-        angles = finite_array("rpy", rpy, (3,))
+        shift, angles = finite_array("xyz", xyz, (3,)), finite_array("rpy", rpy, (3,))
         base = pin.SE3(pin.rpy.rpyToMatrix(*angles), np.array(shift))
         model = pin.Model(self.model)
         for joint in range(1, model.njoints):
@@ -237,9 +235,8 @@ class Robot:
 
     def jacobian(self, q: ArrayLike) -> np.ndarray:
         """Jacobian of the tip, (6, nv): linear velocity of the tip, then angular, in world axes."""
-        model, data = self.model, self._data.own
-        J = pin.computeFrameJacobian(model, data, self.configuration(q), self.tip_id, pin.LOCAL_WORLD_ALIGNED)
-        return J.reshape(6, self.nv).copy()
+        place = self.configuration(q), self.tip_id, _WORLD_AXES
+        return pin.computeFrameJacobian(self.model, self._data.own, *place).reshape(6, self.nv).copy()
 
     def jacobian_dot(self, q: ArrayLike, v: ArrayLike) -> np.ndarray:
         """Time derivative of `jacobian` along v, (6, nv)."""
