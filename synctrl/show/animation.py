@@ -44,7 +44,10 @@ def planar_scene(
     """
     check_run(result, *DRAWN)
     if result.info["axes"] != ["x", "y"]:
-        raise InputError(f"result: expected tips along x and y, found {', '.join(result.info['axes'])}")
+        found = result.info["axes"]
+        raise InputError(
+            f"expected tips along x and y, found {', '.join(found)}", subject="result", found=found
+        )
     share, limit = _share(result, limit)
     caption = (
         f"Bars between compared tips: synchronization error, thick and red from {_shown(result, limit)}. "
@@ -85,8 +88,9 @@ def payload_pair_scene(
     check_run(result, *DRAWN)
     if result.x.shape[1] != 2 or result.info["task_unit"] != "rad":
         raise InputError(
-            "result: expected two robots in joint space, found "
-            f"{result.x.shape[1]} with coordinates in {result.info['task_unit']}"
+            "expected two robots in joint space, found "
+            f"{result.x.shape[1]} with coordinates in {result.info['task_unit']}",
+            subject="result",
         )
     share, limit = _share(result, limit)
     caption = (

@@ -281,7 +281,7 @@ def _read_limits(limits: tuple[float, float]) -> tuple[float, float]:
 def _check_robot(result: Result, robot: int) -> None:
     last = len(result.names) - 1
     if isinstance(robot, bool) or not isinstance(robot, (int, np.integer)) or not 0 <= robot <= last:
-        raise InputError(f"expected an index from 0 to {last}, found {robot!r}", subject="robot")
+        raise InputError(f"expected an index from 0 to {last}, found {robot!r}", subject="robot", found=robot)
 
 
 def _needed(result: Result, kind: str, columns: Sequence[int] | None = None) -> tuple[float, float]:
