@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from synctrl import Cell, Coupling, Experiment, Gains, Hold, Member, load_robot
 from synctrl.errors import InputError
@@ -139,15 +140,15 @@ def test_every_robot_stands_with_its_desired_path(planar, pair):
 
 
 def test_runs_that_cannot_be_shown_are_refused(planar, pair):
-    with pytest.raises(InputError, match="expected tips along x and y, found joint1"):
+    with refused(InputError, "result", found=["joint1", "joint2", "joint3"]):
         planar_scene(pair)
-    with pytest.raises(InputError, match="expected two robots in joint space"):
+    with refused(InputError, "result"):
         payload_pair_scene(planar)
     with pytest.raises(InputError, match="expected the one that made this result"):
         planar_scene(replace(planar, experiment=None))
-    with pytest.raises(InputError, match="fps"):
+    with refused(InputError, "fps"):
         planar_scene(planar, fps=0)
-    with pytest.raises(InputError, match="limit"):
+    with refused(InputError, "limit"):
         payload_pair_scene(pair, limit=-1.0)
 
 

@@ -10,6 +10,7 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex, to_rgb
+from refusals import refused
 
 from synctrl.errors import InputError, ResultError
 from synctrl.experiments import a460_pair, planar_four
@@ -80,7 +81,7 @@ def test_angles_are_in_degrees_with_actual_solid_and_desired_dash_dot(pair):
 
 @pytest.mark.parametrize("robot", [-1, 2, True, "robot 1"])
 def test_a_robot_that_is_not_there_is_refused(pair, robot):
-    with pytest.raises(InputError, match="robot: expected an index from 0 to 1"):
+    with refused(InputError, "robot", found=robot):
         joint_trajectories(pair, robot)
 
 

@@ -91,8 +91,9 @@ def payload_pair_scene(
     check_run(result, *DRAWN)
     if result.x.shape[1] != 2 or result.info["task_unit"] != "rad":
         raise InputError(
-            "result: expected two robots in joint space, found "
-            f"{result.x.shape[1]} with coordinates in {result.info['task_unit']}"
+            "expected two robots in joint space, found "
+            f"{result.x.shape[1]} with coordinates in {result.info['task_unit']}",
+            subject="result",
         )
     share, limit = error_share(result, limit)
     caption = (
