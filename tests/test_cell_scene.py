@@ -161,7 +161,19 @@ def test_meshes_beside_a_file_of_ones_own_are_found_again_from_elsewhere(tmp_pat
     monkeypatch.chdir(tmp_path / "other")
     loaded = reloaded(run, tmp_path)
     assert loaded.info["robots"][0]["file"] == str(tmp_path / "boxes.urdf")
-    assert scene_of(loaded).page() == scene_of(run).page()
+    assert scene_of(loaded, package_dirs=[tmp_path]).page() == scene_of(run).page()
     (tmp_path / "box.stl").unlink()
     with pytest.warns(RobotWarning, match=r"box\.stl"):
-        assert "Not shown of robot 1: box.stl" in scene_of(loaded).page()
+        assert "Not shown of robot 1: box.stl" in scene_of(loaded, package_dirs=tmp_path).page()
+
+
+def test_a_result_does_not_choose_the_folder_from_which_meshes_are_read(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.box((0.3, 0.1, 0.1)).export(tmp_path / "box.stl")
+    text = urdf("boxes", SCARA).replace('<box size="0.3 0.06 0.06"/>', '<mesh filename="box.stl"/>')
+    (tmp_path / "boxes.urdf").write_text(text, encoding="utf-8")
+    robot = load_robot(tmp_path / "boxes.urdf")
+    loaded = reloaded(pair((robot, robot)).simulate(0.02, dt=2e-3), tmp_path)
+    for folders in ((), [tmp_path / "other"]):
+        with pytest.warns(RobotWarning, match=r"box\.stl"):
+            assert "Not shown of robot 1: box.stl" in scene_of(loaded, package_dirs=folders).page()

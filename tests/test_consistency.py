@@ -65,3 +65,15 @@ def test_a_loaded_result_needs_the_experiment(plain, tmp_path):
 def test_parameters_that_are_not_those_of_bodies_are_refused_by_name():
     with refused(InputError, "robot 1, parameters", found="LinearParameters"):
         physical_consistency(planar_four().simulate(0.01))
+
+
+def test_a_certificate_says_whether_estimates_are_physical_and_when_the_law_converges(plain):
+    from synctrl.analysis.certify import certify
+
+    certificate = certify(plain)
+    assert certificate.consistency.as_dict() == physical_consistency(plain).as_dict()
+    assert "none that can exist from" in str(certificate)
+    assert certificate.as_dict()["statement"] in str(certificate)
+    of_a_map = certify(planar_four().simulate(0.02))
+    assert of_a_map.consistency is None
+    assert of_a_map.as_dict()["consistency"] is None

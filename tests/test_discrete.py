@@ -105,10 +105,9 @@ CELLS: dict[str, Callable[[], Experiment]] = {
 }
 #: what the compiled engine refuses by name
 INTERPRETED = {
-    "two A460 that post messages": "network .*BoundPosted",
-    "two A460, bounded estimates": "BoundBounded.* settle that does more",
-    "two six-joint A460": "plant .*HeldJointsPlant",
-    "moving weights": "robot 'random .* one joint on the base",
+    "two A460 that post messages": ("network", "BoundPosted"),
+    "two six-joint A460": ("plant", "HeldJointsPlant"),
+    "moving weights": ("robot", "random"),
 }
 
 
@@ -162,8 +161,10 @@ def test_the_compiled_engine_agrees_or_refuses_the_part_by_name(name, period):
     pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
     experiment, options = CELLS[name](), {"duration": 0.04, "control_period": period}
     if name in INTERPRETED:
-        with pytest.raises(SynctrlError, match=INTERPRETED[name]):
+        with pytest.raises(SynctrlError) as caught:
             experiment.simulate(engine="compiled", **options)
+        part, word = INTERPRETED[name]
+        assert part in caught.value.subject and word in f"{caught.value.subject} {caught.value.found}"
         return
     runs = [experiment.simulate(engine=engine, **options) for engine in ("pinocchio", "compiled")]
     for array in LAYOUT:

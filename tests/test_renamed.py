@@ -19,6 +19,7 @@ from synctrl.renamed import names_elsewhere
 MOVED = {
     "synctrl.control.controller": ("synctrl.control.laws.sun_mills", ["REFERENCE_ACCELERATIONS"]),
     "synctrl.show.lyapunov_plots": ("synctrl.analysis.lyapunov", ["ENERGIES", "POWERS", "THEOREM"]),
+    "synctrl.robots.robot": ("synctrl.robots.catalog", ["load_robot"]),
     "synctrl.show.plots": ("synctrl.show.legends", ["WIDE", "NARROW"]),
     "synctrl.simulation.simulate": ("synctrl.simulation.engines", ["run_reference"]),
     "synctrl.coupling.weights": ("synctrl.coupling.desired", ["check_weights"]),

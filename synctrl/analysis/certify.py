@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
+from ..errors import InputError
 from ..simulation.plant import Plant
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
+from .consistency import Consistency, physical_consistency
 from .convergence import Convergence, convergence
 from .gain_condition import GainCondition, gain_condition
 from .lyapunov import Growth, Lyapunov, first_growth, lyapunov, outside
@@ -35,6 +38,9 @@ class Certificate:
         lyapunov: V and V' with their terms.
         gain_condition: where the gain condition is tightest; it matters only if `gain_condition.needed`.
         convergence: errors at the end.
+        consistency: whether the estimates are those of bodies that can exist, which the theorem does not
+            need; None where what is adapted are not the parameters of bodies.
+        statement: when the law converges, in words; None if it does not say.
         every: steps of the run per logged instant. With more than one the log is thinned: what V did between
             two instants, and whether its balance closes, cannot be seen.
     """
@@ -48,6 +54,8 @@ class Certificate:
     gain_condition: GainCondition
     convergence: Convergence
     every: int = 1
+    consistency: Consistency | None = None
+    statement: str | None = None
 
     @property
     def certified(self) -> bool:
@@ -76,6 +84,8 @@ class Certificate:
             "steps_per_instant": self.every,
             "gain_condition": {**condition, "holds": self.gain_condition.holds},
             "convergence": asdict(self.convergence),
+            "consistency": None if self.consistency is None else self.consistency.as_dict(),
+            "statement": self.statement,
         }
 
     def __str__(self) -> str:
@@ -93,8 +103,11 @@ class Certificate:
             f"  balance: {_balance(self)}",
             f"  gain condition: {_state(self.gain_condition)}",
             f"  at the end: {final}",
+            f"  estimates: {self.consistency or 'of parameters that are not those of bodies'}",
             f"  w = N e* + S+ epsilon: off by {errors.identity:.1g}",
         ]
+        if self.statement is not None:
+            lines.append(f"  law: {self.statement}")
         if self.growth is not None:
             lines.append(f"  V first grows at t = {self.growth.time:g} s, by the term '{self.growth.term}'")
         return "\n".join(lines)
@@ -118,7 +131,17 @@ def certify(result: Result, experiment: Experiment | None = None) -> Certificate
     doubts = tuple(_doubts(run, record, errors, None if found else growth, bool(unproven)))
     verdict = VERDICTS[2] if doubts else VERDICTS[1] if found else VERDICTS[0]
     title = str(result.info["title"])
-    return Certificate(title, verdict, found, doubts, growth, record, condition, errors, _every(result))
+    return Certificate(
+        title, verdict, found, doubts, growth, record, condition, errors, _every(result),
+        _consistency(run), getattr(run.loop.controller.law, "statement", None),
+    )  # fmt: skip
+
+
+def _consistency(run: Replay) -> Consistency | None:
+    """Whether estimates are those of bodies, or None if they are not meant to be."""
+    with suppress(InputError):
+        return physical_consistency(run.result, run.experiment)
+    return None
 
 
 def _every(result: Result) -> int:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance, per_joint
 from ..errors import FrameNotFound, InputError
+from ..renamed import names_elsewhere
 from .friction import Friction
 from .model_checks import check_inertia, check_joints, check_numbering
 from .per_thread import PerThread
@@ -297,3 +298,6 @@ def _moved(visual: pin.GeometryModel | None, base: pin.SE3) -> pin.GeometryModel
         if shape.parentJoint == 0:
             shape.placement = base * shape.placement
     return moved
+
+
+__getattr__ = names_elsewhere(__name__, ".catalog", "load_robot")

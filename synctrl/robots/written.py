@@ -12,7 +12,7 @@ from ..checks import LONGEST_LABEL, unprintable
 from ..errors import RobotError
 from .robot import Robot
 from .urdf.description import describe, urdf_folder
-from .urdf.packages import data_folder
+from .urdf.packages import data_folder, named_folders
 from .urdf.reader import read_text
 from .urdf.writer import to_xml
 
@@ -25,7 +25,7 @@ _WRITTEN: WeakKeyDictionary[Robot, dict[str, str]] = WeakKeyDictionary()
 def write_robot(robot: Robot) -> dict[str, str]:
     """What it takes to make a robot again: its "urdf", placed and with its joints locked, and its "tip".
 
-    "file" is where it was read from, beside which its meshes are, unless that comes with this package or with
+    "file" is where it was read from, beside which its meshes are, unless it comes with this package or with
     example-robot-data. A robot that no document describes, or too long a one, gives nothing.
     """
     if robot not in _WRITTEN:
@@ -56,27 +56,37 @@ def _stock(file: Path) -> bool:
     return any(file.is_relative_to(folder) for folder in (urdf_folder(), data_folder()) if folder)
 
 
+def _trusted(file: str | None, folders: Iterable[Path]) -> Path:
+    """Where a description says that it was, if that is in a folder that the user named; else among ours."""
+    if file is not None:
+        resolved = Path(file).resolve()
+        if any(resolved.is_relative_to(folder.resolve()) for folder in folders):
+            return resolved
+    return urdf_folder() / "loaded.urdf"
+
+
 def read_robot(
     about: Mapping[str, Any], name: str, joints: Iterable[str], package_dirs: Iterable[str | Path] = ()
 ) -> Robot:
     """The robot that `write_robot` wrote.
 
-    Its text is read as strictly as any file; meshes are looked for beside the file that it came from.
+    Its text is read as strictly as any file. Meshes beside the file that it came from are looked for only if
+    that lies in a folder that the user names: what was written does not choose what is read.
 
     Args:
         about: what was written.
         name: what to call the robot.
         joints: names of the joints that it has to have.
-        package_dirs: folders in which packages with its meshes are looked for.
+        package_dirs: folders in which its meshes and packages may be looked for.
 
     Raises:
         RobotError: nothing was written, or it makes no such robot.
     """
     if "urdf" not in about:
         raise RobotError("its description was not kept", subject=f"robot '{name}'")
-    file = Path(about["file"]) if "file" in about else None
-    document = read_text(file or Path(f"{name}.urdf"), about["urdf"].encode())
-    found = describe(replace(document, file=file), package_dirs)
+    folders = named_folders(package_dirs)
+    document = read_text(_trusted(about.get("file"), folders), about["urdf"].encode())
+    found = describe(document, folders)
     robot = Robot(
         found.model, about.get("tip", found.tip), visual=found.visual, name=name, document=found.document
     )

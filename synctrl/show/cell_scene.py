@@ -55,7 +55,7 @@ def scene_of(
         experiment: what made it, for results whose robots cannot be made again.
         limit: synchronization error that is fully red, in its unit; by default the largest of the run.
         fps: frames per second.
-        package_dirs: folders in which packages with meshes of loaded results are looked for.
+        package_dirs: where else than in installed packages meshes of loaded results may be looked for.
 
     Raises:
         InputError: nothing to show, or a robot that cannot be made again, by name.
@@ -83,10 +83,10 @@ def _robots(
     """The robots of a run: those of its experiment, or made again."""
     if experiment is not None or result.experiment is not None:
         return shown_experiment(result, experiment).cell.robots
-    robots, folders = [], tuple(package_dirs)
+    robots = []
     for about in result.info["robots"]:
         try:
-            robots.append(read_robot(about, about["name"], about["joints"], folders))
+            robots.append(read_robot(about, about["name"], about["joints"], package_dirs))
         except SynctrlError as error:
             raise InputError(
                 f"expected the one that made this result: {about['name']} ('{about.get('model', '?')}') "

@@ -155,10 +155,12 @@ def shortened(text: str, room: float, size: float) -> str:
 @lru_cache(maxsize=4096)
 def text_width(text: str, size: float) -> float:
     """How wide words are in a size, both in points."""
+    from matplotlib.cbook import is_math_text
     from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import TextPath
+    from matplotlib.textpath import text_to_path
 
     if not text.strip():
         return 0.0
-    outline = TextPath((0, 0), text, size=size, prop=FontProperties(family="DejaVu Sans"))
-    return HINTED * float(outline.get_extents().x1)
+    font = FontProperties(family="DejaVu Sans", size=size)
+    width, _, _ = text_to_path.get_text_width_height_descent(text, font, is_math_text(text))
+    return HINTED * float(width)

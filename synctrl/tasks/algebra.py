@@ -59,8 +59,12 @@ def _smallest(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.where(found, values[..., :1], np.nan), np.where(found, vectors[..., 0], np.nan)
 
 
+def _determinant(A: np.ndarray) -> np.ndarray:
+    return np.linalg.det(A)[..., None]
+
+
 #: of numbers
-LAPACK = Algebra(_inverse, lambda A: np.linalg.det(A)[..., None], _smallest)
+LAPACK = Algebra(_inverse, _determinant, _smallest)
 
 
 def padded(rows: Sequence[np.ndarray]) -> np.ndarray:

@@ -89,7 +89,10 @@ def reach(robot: Robot, target: np.ndarray, q: np.ndarray, space: Missing | None
     found = inverse_kinematics(robot, target, q, space)
     if found is None:
         place = ", ".join(f"{value:.4g}" for value in target)
-        raise UnreachableError(f"'{robot.name}' cannot reach ({place}); expected a place in reach of its tip")
+        failure = UnreachableError(
+            f"'{robot.name}' cannot reach ({place}); expected a place in reach of its tip"
+        )
+        raise failure.about("target", found=tuple(map(float, target)))
     return found
 
 

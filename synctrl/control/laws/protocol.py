@@ -157,7 +157,10 @@ class Proof(NamedTuple):
 
 
 class BoundLaw(Protocol):
-    """A law for the robots of one cell. It may also have a method `proof`, from `Along` to `Proof`."""
+    """A law for the robots of one cell.
+
+    It may also have a method `proof`, from `Along` to `Proof`, and a `statement`, when it converges.
+    """
 
     def command(self, errors: Errors) -> Asked:
         """What the law asks for.

@@ -33,6 +33,10 @@ class SunMills:
         InputError: an unknown word.
     """
 
+    statement = (
+        "e and epsilon go to zero, parameters known or not; with xref'' of (13) under the gain condition"
+    )
+
     def __init__(self, reference_acceleration: str = "exact", k_r_space: str = "joint"):
         self.reference_acceleration = choice(
             "reference_acceleration", reference_acceleration, REFERENCE_ACCELERATIONS
@@ -60,6 +64,8 @@ class SunMills:
 
 class BoundSunMills:
     """`SunMills` with gains, (m,)."""
+
+    statement = SunMills.statement
 
     def __init__(self, Lambda: np.ndarray, beta: np.ndarray, K_eps: np.ndarray, reference_acceleration: str):
         self.Lambda, self.beta, self.K_eps = Lambda, beta, K_eps
