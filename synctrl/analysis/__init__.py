@@ -1,5 +1,6 @@
-"""How well: metrics, the Lyapunov proof, certificates."""
+"""How well: metrics, the Lyapunov proof, certificates, laws side by side."""
 
 from .certify import Certificate, certify
+from .comparison import Comparison, compare
 
-__all__ = ["Certificate", "certify"]
+__all__ = ["Certificate", "Comparison", "certify", "compare"]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
+from ..analysis.free_gain import LARGEST_FACTOR, factor_for
 from ..analysis.metrics import metrics
 from ..checks import instance, positive_number
 from ..control.gains import Gains
@@ -19,12 +20,6 @@ from ..simulation.simulate import Experiment
 
 #: gains that an independent controller has
 SCALABLE = ("Lambda", "K_r", "Gamma")
-#: largest factor tried on the gains
-LARGEST_FACTOR = 64.0
-#: relative accuracy of the factor
-TOLERANCE = 3e-4
-#: relative excess of torque that counts as any larger one: runs about to diverge tell the search nothing
-MUCH = 10.0
 
 
 @dataclass(frozen=True)
@@ -143,8 +138,7 @@ class Match:
 def match_peak_torque(bench: Bench, target: float, scaled: Sequence[str] = ("Lambda",)) -> Match:
     """The independent controller with a given peak torque: one factor on some gains, found as a root.
 
-    The factor is looked for upwards from 1, in steps of 2, and only if there is none, downwards: where
-    several factors give the same peak torque, the baseline gets the one next above the gains it was given.
+    Where several factors give the same peak torque, it is the first that `factor_for` finds.
 
     Args:
         bench: the task under the synchronized controller.
@@ -154,37 +148,18 @@ def match_peak_torque(bench: Bench, target: float, scaled: Sequence[str] = ("Lam
     Raises:
         InputError: a gain that cannot be scaled, or no factor between 1/64 and 64 gives this peak torque.
     """
-    from scipy.optimize import brentq
-
     target = positive_number("target", target)
     if not scaled or set(scaled) - set(SCALABLE):
         raise InputError(f"expected some of {', '.join(SCALABLE)}, found {list(scaled)!r}", subject="scaled")
     base, before = bench.experiment.gains.independent(), bench.runs
 
-    def gains(logarithm: float) -> Gains:
-        return base.replace(**{name: np.exp(logarithm) * getattr(base, name) for name in scaled})
+    def gains(factor: float) -> Gains:
+        return base.replace(**{name: factor * getattr(base, name) for name in scaled})
 
-    def excess(logarithm: float) -> float:
-        return min(bench.peak_torque(gains(logarithm)) / target - 1, MUCH)
-
-    low, high = _bracket(excess)
-    root = low if low == high else float(brentq(excess, low, high, xtol=TOLERANCE))
-    peak = bench.peak_torque(gains(root))
-    return Match(gains(root), float(np.exp(root)), tuple(scaled), target, peak, bench.runs - before)
-
-
-def _bracket(excess: Callable[[float], float]) -> tuple[float, float]:
-    """Two logarithms of the factor between which the peak torque passes the target."""
-    if excess(0.0) == 0.0:
-        return 0.0, 0.0
-    step = float(np.log(2.0))
-    for direction in (1, -1):
-        near = 0.0
-        while abs(near) < np.log(LARGEST_FACTOR) - 1e-9:
-            far = near + direction * step
-            if excess(near) * excess(far) <= 0:
-                return min(near, far), max(near, far)
-            near = far
+    factor = factor_for(lambda factor: bench.peak_torque(gains(factor)) / target - 1)
+    if factor is not None:
+        peak = bench.peak_torque(gains(factor))
+        return Match(gains(factor), factor, tuple(scaled), target, peak, bench.runs - before)
     raise InputError(
         f"expected that a factor between 1/{LARGEST_FACTOR:g} and {LARGEST_FACTOR:g} on them gives "
         "the peak torque of the synchronized controller, found none",

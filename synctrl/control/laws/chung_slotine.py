@@ -32,6 +32,7 @@ class ChungSlotine:
         InputError: not numbers, not finite, or below 0.
     """
 
+    free_gain = "K_2"
     statement = (
         "e goes to zero, parameters known or not: V' = -s_q^T K_r s_q - rho^T K_2 rho; velocity errors of "
         "neighbours are damped, differences between position errors are not pulled together"
@@ -41,6 +42,10 @@ class ChungSlotine:
         self.K_2 = finite_array("K_2", K_2)
         if self.K_2.size and self.K_2.min() < 0:
             raise InputError(f"expected entries of at least 0, found {self.K_2.min():g}", subject="K_2")
+
+    def scaled(self, factor: float) -> ChungSlotine:
+        """This law with K_2 multiplied."""
+        return ChungSlotine(factor * self.K_2)
 
     def bind(self, cell: Cell, gains: Gains) -> BoundChungSlotine:
         """This law for a cell.

@@ -106,10 +106,16 @@ class PDGravity:
         "e goes to zero for a target that stands still, with exact gravity; moving targets are followed late"
     )
 
+    free_gain = "K_p"
+
     def __init__(self, K_p: ArrayLike):
         self.K_p = finite_array("K_p", K_p)
         if not self.K_p.size or not self.K_p.min() > 0:
             raise InputError(f"expected entries above 0, found {self.K_p.tolist()}", subject="K_p")
+
+    def scaled(self, factor: float) -> PDGravity:
+        """This law with K_p multiplied."""
+        return PDGravity(factor * self.K_p)
 
     def bind(self, cell: Cell, gains: Gains) -> BoundPDGravity:
         alone(self, gains, cell.m)
