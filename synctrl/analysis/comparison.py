@@ -25,7 +25,7 @@ from ..control.laws import Law, SunMills
 from ..coupling.cell import Cell
 from ..errors import InputError, SimulationError, StepWarning
 from ..robots.friction import Friction
-from ..robots.friction_parameters import FrictionParameters
+from ..robots.parameters import FrictionParameters
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .free_gain import LARGEST_FACTOR, factor_for, free_gain, scaled, under, with_pole
