@@ -9,6 +9,7 @@ import pytest
 from refusals import refused
 
 from synctrl import Result
+from synctrl.analysis.certify import certify
 from synctrl.analysis.consistency import physical_consistency
 from synctrl.control.adaptation import Natural
 from synctrl.errors import InputError
@@ -65,3 +66,22 @@ def test_a_loaded_result_needs_the_experiment(plain, tmp_path):
 def test_parameters_that_are_not_those_of_bodies_are_refused_by_name():
     with refused(InputError, "robot 1, parameters", found="LinearParameters"):
         physical_consistency(planar_four().simulate(0.01))
+
+
+def test_a_certificate_says_which_estimated_bodies_cannot_exist(plain):
+    certificate = certify(plain)
+    found = physical_consistency(plain)
+    assert certificate.as_dict()["physical"] == found.as_dict()
+    assert str(found) in str(certificate)
+
+
+def test_a_certificate_says_nothing_of_bodies_that_are_not_estimated():
+    certificate = certify(planar_four().simulate(0.02))
+    assert certificate.physical is certificate.as_dict()["physical"] is None
+    assert "not those of bodies" in str(certificate)
+
+
+def test_estimates_that_leave_the_bodies_do_not_change_the_verdict():
+    certificate = certify(a460_pair(friction=False).simulate(1.0, dt=1e-3))
+    assert not certificate.physical.holds
+    assert certificate.certified

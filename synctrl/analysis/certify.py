@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ..robots.friction_parameters import describes_bodies
 from ..simulation.plant import Plant
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
+from .consistency import Consistency, physical_consistency
 from .convergence import Convergence, convergence
 from .gain_condition import GainCondition, gain_condition
 from .lyapunov import Growth, Lyapunov, first_growth, lyapunov, outside
@@ -37,6 +39,9 @@ class Certificate:
         convergence: errors at the end.
         every: steps of the run per logged instant. With more than one the log is thinned: what V did between
             two instants, and whether its balance closes, cannot be seen.
+        physical: whether the estimates are those of bodies that can exist, or None where the parameters are
+            not those of bodies. The theorem does not need it, and the verdict does not depend on it.
+        statement: when the law converges, in its own words; empty if it does not say.
     """
 
     title: str
@@ -48,6 +53,8 @@ class Certificate:
     gain_condition: GainCondition
     convergence: Convergence
     every: int = 1
+    physical: Consistency | None = None
+    statement: str = ""
 
     @property
     def certified(self) -> bool:
@@ -76,6 +83,8 @@ class Certificate:
             "steps_per_instant": self.every,
             "gain_condition": {**condition, "holds": self.gain_condition.holds},
             "convergence": asdict(self.convergence),
+            "physical": None if self.physical is None else self.physical.as_dict(),
+            "statement": self.statement,
         }
 
     def __str__(self) -> str:
@@ -85,6 +94,7 @@ class Certificate:
         final = ", ".join(f"{name} {value:.3g}" for name, value in errors.final.items())
         lines = [
             f"{self.title}: {self.verdict}",
+            *([f"  the law: {self.statement}"] if self.statement else []),
             *(f"  outside: {text}" for text in self.outside),
             *(f"  doubt: {text}" for text in self.doubts),
             f"  V goes from {record.V[0]:.5g} to {record.V[-1]:.5g}",
@@ -94,6 +104,7 @@ class Certificate:
             f"  gain condition: {_state(self.gain_condition)}",
             f"  at the end: {final}",
             f"  w = N e* + S+ epsilon: off by {errors.identity:.1g}",
+            f"  estimated bodies: {self.physical or 'the parameters are not those of bodies'}",
         ]
         if self.growth is not None:
             lines.append(f"  V first grows at t = {self.growth.time:g} s, by the term '{self.growth.term}'")
@@ -118,7 +129,17 @@ def certify(result: Result, experiment: Experiment | None = None) -> Certificate
     doubts = tuple(_doubts(run, record, errors, None if found else growth, bool(unproven)))
     verdict = VERDICTS[2] if doubts else VERDICTS[1] if found else VERDICTS[0]
     title = str(result.info["title"])
-    return Certificate(title, verdict, found, doubts, growth, record, condition, errors, _every(result))
+    return Certificate(
+        title, verdict, found, doubts, growth, record, condition, errors, _every(result),
+        _physical(run, experiment), run.loop.controller.statement,
+    )  # fmt: skip
+
+
+def _physical(run: Replay, experiment: Experiment | None) -> Consistency | None:
+    """Whether the estimates are those of bodies that can exist; None if they are not those of bodies."""
+    if not all(map(describes_bodies, run.loop.cell.parameters)):
+        return None
+    return physical_consistency(run.result, experiment)
 
 
 def _every(result: Result) -> int:

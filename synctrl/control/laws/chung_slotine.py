@@ -32,6 +32,8 @@ class ChungSlotine:
         InputError: not numbers, not finite, or below 0.
     """
 
+    statement = "e goes to zero, with unknown parameters too: V' = -s_q^T K_r s_q - sum_k rho_k^T K_2 rho_k"
+
     def __init__(self, K_2: ArrayLike):
         self.K_2 = finite_array("K_2", K_2)
         if self.K_2.size and self.K_2.min() < 0:

@@ -168,7 +168,10 @@ class BoundLaw(Protocol):
 
 
 class Law(Protocol):
-    """A law, before it knows the cell."""
+    """A law, before it knows the cell.
+
+    It may also have a `statement`, one sentence of when it converges, which certificates repeat.
+    """
 
     def bind(self, cell: Cell, gains: Gains) -> BoundLaw:
         """This law for a cell.

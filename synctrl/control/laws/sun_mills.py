@@ -33,6 +33,11 @@ class SunMills:
         InputError: an unknown word.
     """
 
+    statement = (
+        "e and epsilon go to zero, with unknown parameters too; with the reference acceleration as printed "
+        "only under the gain condition"
+    )
+
     def __init__(self, reference_acceleration: str = "exact", k_r_space: str = "joint"):
         self.reference_acceleration = choice(
             "reference_acceleration", reference_acceleration, REFERENCE_ACCELERATIONS
