@@ -194,4 +194,4 @@ def test_a_certificate_says_when_the_law_converges(law):
     certificate = certify(under(law, planar_four()).simulate(0.01))
     assert law.statement
     assert certificate.as_dict()["statement"] == law.statement
-    assert f"the law: {law.statement}" in str(certificate)
+    assert f"law: {law.statement}" in str(certificate)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from ..robots.friction_parameters import describes_bodies
+from ..errors import InputError
 from ..simulation.plant import Plant
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
@@ -37,11 +38,11 @@ class Certificate:
         lyapunov: V and V' with their terms.
         gain_condition: where the gain condition is tightest; it matters only if `gain_condition.needed`.
         convergence: errors at the end.
+        consistency: whether the estimates are those of bodies that can exist, which the theorem does not
+            need; None where what is adapted are not the parameters of bodies.
+        statement: when the law converges, in words; None if it does not say.
         every: steps of the run per logged instant. With more than one the log is thinned: what V did between
             two instants, and whether its balance closes, cannot be seen.
-        physical: whether the estimates are those of bodies that can exist, or None where the parameters are
-            not those of bodies. The theorem does not need it, and the verdict does not depend on it.
-        statement: when the law converges, in its own words; empty if it does not say.
     """
 
     title: str
@@ -53,8 +54,8 @@ class Certificate:
     gain_condition: GainCondition
     convergence: Convergence
     every: int = 1
-    physical: Consistency | None = None
-    statement: str = ""
+    consistency: Consistency | None = None
+    statement: str | None = None
 
     @property
     def certified(self) -> bool:
@@ -83,7 +84,7 @@ class Certificate:
             "steps_per_instant": self.every,
             "gain_condition": {**condition, "holds": self.gain_condition.holds},
             "convergence": asdict(self.convergence),
-            "physical": None if self.physical is None else self.physical.as_dict(),
+            "consistency": None if self.consistency is None else self.consistency.as_dict(),
             "statement": self.statement,
         }
 
@@ -94,7 +95,6 @@ class Certificate:
         final = ", ".join(f"{name} {value:.3g}" for name, value in errors.final.items())
         lines = [
             f"{self.title}: {self.verdict}",
-            *([f"  the law: {self.statement}"] if self.statement else []),
             *(f"  outside: {text}" for text in self.outside),
             *(f"  doubt: {text}" for text in self.doubts),
             f"  V goes from {record.V[0]:.5g} to {record.V[-1]:.5g}",
@@ -103,9 +103,11 @@ class Certificate:
             f"  balance: {_balance(self)}",
             f"  gain condition: {_state(self.gain_condition)}",
             f"  at the end: {final}",
+            f"  estimates: {self.consistency or 'of parameters that are not those of bodies'}",
             f"  w = N e* + S+ epsilon: off by {errors.identity:.1g}",
-            f"  estimated bodies: {self.physical or 'the parameters are not those of bodies'}",
         ]
+        if self.statement is not None:
+            lines.append(f"  law: {self.statement}")
         if self.growth is not None:
             lines.append(f"  V first grows at t = {self.growth.time:g} s, by the term '{self.growth.term}'")
         return "\n".join(lines)
@@ -131,15 +133,15 @@ def certify(result: Result, experiment: Experiment | None = None) -> Certificate
     title = str(result.info["title"])
     return Certificate(
         title, verdict, found, doubts, growth, record, condition, errors, _every(result),
-        _physical(run, experiment), run.loop.controller.statement,
+        _consistency(run), getattr(run.loop.controller.law, "statement", None),
     )  # fmt: skip
 
 
-def _physical(run: Replay, experiment: Experiment | None) -> Consistency | None:
-    """Whether the estimates are those of bodies that can exist; None if they are not those of bodies."""
-    if not all(map(describes_bodies, run.loop.cell.parameters)):
-        return None
-    return physical_consistency(run.result, experiment)
+def _consistency(run: Replay) -> Consistency | None:
+    """Whether estimates are those of bodies, or None if they are not meant to be."""
+    with suppress(InputError):
+        return physical_consistency(run.result, run.experiment)
+    return None
 
 
 def _every(result: Result) -> int:

@@ -135,7 +135,6 @@ class Controller:
         learning = chosen(gains.Gamma, adaptation)
         self.adaptation, self.adaptation_settings = learning.bind(cell), settings_of(learning)
         self.law, self.law_settings = options.law.bind(cell, gains), settings_of(options.law)
-        self.statement: str = getattr(options.law, "statement", "")  # when the law converges
         connection = Ideal() if network is None else network
         offers("network", connection, ("bind",), "a network, for example Ideal()")
         self.network, self.network_settings = connection.bind(cell), settings_of(connection)

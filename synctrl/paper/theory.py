@@ -145,7 +145,7 @@ def _verdicts(certificates: Mapping[str, Certificate]) -> Table:
 
 def _bodies(c: Certificate) -> str:
     """Whether the estimated bodies can exist, in words."""
-    return "not estimated" if c.physical is None else str(c.physical)
+    return "not estimated" if c.consistency is None else str(c.consistency)
 
 
 def _trials(c: Comparison, trials: Sequence[Trial], caption: str) -> Table:

@@ -145,11 +145,6 @@ def _unknown() -> InputError:
     )
 
 
-def describes_bodies(parameters: Parameters) -> bool:
-    """Whether parameters have all ten numbers of every body, beside those of friction if there are any."""
-    return type(_rigid(parameters)) is FullParameters
-
-
 def count_bodies(subject: str, parameters: Parameters) -> int:
     """How many bodies parameters describe, all ten numbers of each.
 
@@ -160,7 +155,7 @@ def count_bodies(subject: str, parameters: Parameters) -> int:
     Raises:
         InputError: they are not those of bodies.
     """
-    base = _rigid(parameters)
+    base = parameters.base if type(parameters) is FrictionParameters else parameters
     if type(base) is not FullParameters:
         raise InputError(
             "expected all inertial parameters of the bodies (parameters='full'), found "
@@ -169,8 +164,3 @@ def count_bodies(subject: str, parameters: Parameters) -> int:
             found=type(base).__name__,
         )
     return base.robot.body_count
-
-
-def _rigid(parameters: Parameters) -> Parameters:
-    """Parameters without those of friction."""
-    return parameters.base if type(parameters) is FrictionParameters else parameters

@@ -32,7 +32,10 @@ class ChungSlotine:
         InputError: not numbers, not finite, or below 0.
     """
 
-    statement = "e goes to zero, with unknown parameters too: V' = -s_q^T K_r s_q - sum_k rho_k^T K_2 rho_k"
+    statement = (
+        "e goes to zero, parameters known or not: V' = -s_q^T K_r s_q - rho^T K_2 rho; velocity errors of "
+        "neighbours are damped, differences between position errors are not pulled together"
+    )
 
     def __init__(self, K_2: ArrayLike):
         self.K_2 = finite_array("K_2", K_2)
@@ -55,6 +58,8 @@ class ChungSlotine:
 
 class BoundChungSlotine:
     """`ChungSlotine` with gains, (m,), and the coupling that compares r."""
+
+    statement = ChungSlotine.statement
 
     def __init__(self, Lambda: np.ndarray, K_2: np.ndarray, coupling: Coupling):
         none = np.zeros_like(Lambda)

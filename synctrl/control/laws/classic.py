@@ -37,6 +37,8 @@ class SlotineLi:
 class BoundSlotineLi:
     """`SlotineLi` with its gain, (m,)."""
 
+    statement = SlotineLi.statement
+
     def __init__(self, Lambda: np.ndarray):
         self.Lambda = Lambda
 
@@ -73,6 +75,8 @@ class ComputedTorque:
 
 class BoundComputedTorque:
     """`ComputedTorque` with its gain, (m,)."""
+
+    statement = ComputedTorque.statement
 
     def __init__(self, Lambda: np.ndarray):
         self.Lambda = Lambda
@@ -117,6 +121,8 @@ class PDGravity:
 
 class BoundPDGravity:
     """`PDGravity` with its stiffness, (m,)."""
+
+    statement = PDGravity.statement
 
     def __init__(self, K_p: np.ndarray):
         self.K_p = K_p

@@ -55,6 +55,8 @@ class MasterSlave:
 class BoundMasterSlave:
     """`MasterSlave` with its gain, (m,), and n, (n, 1), without the master's entry."""
 
+    statement = MasterSlave.statement
+
     def __init__(self, Lambda: np.ndarray, common: np.ndarray, master: int):
         self.Lambda, self._common, self._master = Lambda, common, master
 

@@ -157,7 +157,10 @@ class Proof(NamedTuple):
 
 
 class BoundLaw(Protocol):
-    """A law for the robots of one cell. It may also have a method `proof`, from `Along` to `Proof`."""
+    """A law for the robots of one cell.
+
+    It may also have a method `proof`, from `Along` to `Proof`, and a `statement`, when it converges.
+    """
 
     def command(self, errors: Errors) -> Asked:
         """What the law asks for.
@@ -168,10 +171,7 @@ class BoundLaw(Protocol):
 
 
 class Law(Protocol):
-    """A law, before it knows the cell.
-
-    It may also have a `statement`, one sentence of when it converges, which certificates repeat.
-    """
+    """A law, before it knows the cell."""
 
     def bind(self, cell: Cell, gains: Gains) -> BoundLaw:
         """This law for a cell.

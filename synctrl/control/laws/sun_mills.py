@@ -34,8 +34,7 @@ class SunMills:
     """
 
     statement = (
-        "e and epsilon go to zero, with unknown parameters too; with the reference acceleration as printed "
-        "only under the gain condition"
+        "e and epsilon go to zero, parameters known or not; with xref'' of (13) under the gain condition"
     )
 
     def __init__(self, reference_acceleration: str = "exact", k_r_space: str = "joint"):
@@ -65,6 +64,8 @@ class SunMills:
 
 class BoundSunMills:
     """`SunMills` with gains, (m,)."""
+
+    statement = SunMills.statement
 
     def __init__(self, Lambda: np.ndarray, beta: np.ndarray, K_eps: np.ndarray, reference_acceleration: str):
         self.Lambda, self.beta, self.K_eps = Lambda, beta, K_eps
