@@ -13,7 +13,7 @@ from refusals import refused
 from synctrl import Cell, Controller, Coupling, Experiment
 from synctrl.analysis.certify import certify
 from synctrl.analysis.lyapunov import lyapunov
-from synctrl.control.laws import ComputedTorque, MasterSlave, PDGravity, SlotineLi, SunMills
+from synctrl.control.laws import ChungSlotine, ComputedTorque, MasterSlave, PDGravity, SlotineLi, SunMills
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, panda_four, planar_four
 from synctrl.simulation.result import LAYOUT
@@ -184,3 +184,14 @@ def test_the_compiled_engine_refuses_robots_that_follow_another_by_name():
     pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
     with pytest.raises(InputError, match="MasterSlave"):
         under(MasterSlave(), planar_four()).simulate(0.01, engine="compiled")
+
+
+EVERY = [SunMills(), ChungSlotine(0.3), *LAWS.values()]
+
+
+@pytest.mark.parametrize("law", EVERY, ids=lambda law: type(law).__name__)
+def test_a_certificate_says_when_the_law_converges(law):
+    certificate = certify(under(law, planar_four()).simulate(0.01))
+    assert law.statement
+    assert certificate.as_dict()["statement"] == law.statement
+    assert f"law: {law.statement}" in str(certificate)

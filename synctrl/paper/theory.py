@@ -133,13 +133,19 @@ def _words(name: str) -> str:
 
 
 def _verdicts(certificates: Mapping[str, Certificate]) -> Table:
-    head = ("run", "verdict", "largest V'", "rounding of V'", "balance off by", "explained by the step")
+    numbers = "largest V'", "rounding of V'", "balance off by", "explained by the step"
+    head = ("run", "verdict", *numbers, "bodies")
     rows = []
     for name, c in certificates.items():
         found = c.lyapunov
         values = found.V_dot.max(), found.rounding.max(), found.largest_drift, found.drift_bound
-        rows.append((_words(name), c.verdict, *(number(float(v), 2) for v in values)))
+        rows.append((_words(name), c.verdict, *(number(float(v), 2) for v in values), _bodies(c)))
     return Table(head, tuple(rows))
+
+
+def _bodies(c: Certificate) -> str:
+    """Whether the estimated bodies can exist, in words."""
+    return "not estimated" if c.consistency is None else str(c.consistency)
 
 
 def _trials(c: Comparison, trials: Sequence[Trial], caption: str) -> Table:
