@@ -105,9 +105,8 @@ def payload_pair_scene(
     robots = shown_experiment(result, experiment).cell.robots
     scene = arms_scene(result, robots, frames, fps, caption)
     wrists, desired = (tip_positions(robots, q[frames]) for q in (result.q, result.x_desired))
-    color = error_color(share[frames].max(axis=1))
-    middle, along = wrists.mean(axis=1), wrists[:, 1] - wrists[:, 0]
-    scene.add_box("payload", PAYLOAD, middle, color, quaternion=towards(along, axis=(1, 0, 0)))
+    color, along = error_color(share[frames].max(axis=1)), wrists[:, 1] - wrists[:, 0]
+    scene.add_box("payload", PAYLOAD, wrists.mean(axis=1), color, quaternion=towards(along, axis=(1, 0, 0)))
     _add_tracking(scene, result, desired, wrists, PAIR_TIMES)
     add_disturbances(scene, result, robots, frames)
     return scene
