@@ -106,7 +106,8 @@ def index(name: str, value: object, count: int) -> int:
     """`value` as the index of one of so many things, counted from 0."""
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not whole or not 0 <= value < count:  # type: ignore[operator]
-        raise InputError(f"expected an index from 0 to {count - 1}, found {value!r}", subject=name)
+        expected = f"expected an index from 0 to {count - 1}"
+        raise InputError(f"{expected}, found {value!r}", subject=name, found=value)
     return int(value)  # type: ignore[call-overload]
 
 

@@ -46,7 +46,9 @@ def check_axes(result: Result, *axes: str) -> None:
     """Refuse a run whose coordinates are not those of tips along these axes."""
     if (found := result.info["axes"]) != [*axes]:
         expected = f"{', '.join(axes[:-1])} and {axes[-1]}"
-        raise InputError(f"expected tips along {expected}, found {', '.join(found)}", subject="result")
+        raise InputError(
+            f"expected tips along {expected}, found {', '.join(found)}", subject="result", found=found
+        )
 
 
 def shown_experiment(result: Result, experiment: Experiment | None) -> Experiment:
