@@ -35,7 +35,7 @@ REFUSALS = {
     "not above zero": (checks.positive_number, ("dt", -0.5), -0.5),
     "below zero": (checks.non_negative_number, ("dt", -0.5), -0.5),
     "too few": (checks.count, ("dt", 2, 3), 2),
-    "no index": (checks.index, ("dt", 2, 2), None),
+    "no index": (checks.index, ("dt", 2, 2), 2),
     "no later end": (checks.window, ("dt", 0.2, 0.1), None),
     "no truth value": (checks.boolean, ("dt", 1), None),
     "another type": (checks.instance, ("dt", 1, str, "a text"), None),
