@@ -14,6 +14,7 @@ from synctrl import Experiment, load_robot
 from synctrl.analysis.certify import certify
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.control.adaptation import Ball, Box, EModification, Gradient, Leakage, Seen, Switching
+from synctrl.control.adaptation.metric import make_metric
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, mixed_four, planar_four
 from synctrl.robots.pseudo_inertia import inertial_parameters, inverse_hessian, pseudo_inertia
@@ -200,6 +201,28 @@ def test_robots_of_different_kinds_have_matrices_of_their_own():
     rows = [1e-3 * (1 + np.abs(p.theta)) for p in cell.parameters]
     result, same = experiment.simulate(0.01), with_adaptation(mixed_four(), Gradient(rows)).simulate(0.01)
     np.testing.assert_allclose(result.theta_hat, same.theta_hat, rtol=1e-10, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", ["planar2r", "a460", "ur5", "panda", "so100"])
+def test_all_that_a_gradient_in_the_metric_of_bodies_can_learn_is_in_v(name):
+    """Its entries differ by 13 orders of magnitude on a Panda; none of them is singular."""
+    robot = load_robot(name)
+    metric = make_metric(Gradient.pullback(robot, 0.1).Gamma, [10 * robot.body_count])
+    size = np.sqrt(np.diagonal(metric.Gamma[0]))
+    error = size * np.random.default_rng(0).standard_normal((1, len(size)))
+    np.testing.assert_allclose(metric.frozen(error) / size, 0, atol=1e-12)
+    np.testing.assert_allclose(metric.raised(metric.lowered(error)) / size, error / size, atol=1e-6)
+
+
+@given(SEEDS)
+def test_what_a_singular_gamma_cannot_learn_does_not_depend_on_units(seed):
+    rng = np.random.default_rng(seed)
+    rows = rng.standard_normal((6, 4))
+    units = 10.0 ** rng.integers(-4, 5, 6)
+    one, other = (make_metric((rows_u @ rows_u.T,), [6]) for rows_u in (rows, units[:, None] * rows))
+    error = rng.standard_normal((1, 6))
+    np.testing.assert_allclose(other.frozen(units * error), units * one.frozen(error), rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(units * other.lowered(units * error), one.lowered(error), rtol=1e-5, atol=1e-7)
 
 
 # -- the metric of bodies ---------------------------------------------------------------------------------

@@ -2,8 +2,8 @@
 
 Gamma is symmetric and positive semidefinite. In the unit of an entry it is [theta_a theta_b]/(N·m), so a
 single number for kg, kg·m and kg·m^2 alike changes its meaning with the unit of length. With Gamma^+ its
-pseudo-inverse, tilde^T Gamma^+ tilde measures the part of an error that can be learned, and
-(1 - Gamma Gamma^+) tilde is the part that stays.
+inverse (of a singular Gamma the generalized one that scales with the units), tilde^T Gamma^+ tilde measures
+the part of an error that can be learned, and (1 - Gamma Gamma^+) tilde is the part that stays.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from ...errors import InputError
 from ...tasks.algebra import limited
 from ..gains import RaggedGain, read_gain, spread_rows
 
-#: share of the largest eigenvalue below which one counts as zero, and above which asymmetry is refused
+#: share of the largest eigenvalue below which one counts as zero, and above which asymmetry is refused, with
+#: ones on the diagonal
 ROUNDING = 1e-12
 
 
@@ -56,15 +57,20 @@ class DiagonalMetric:
 
 
 class FullMetric:
-    """Gamma as matrices, (n, P, P), which may be singular."""
+    """Gamma as matrices, (n, P, P), which may be singular.
+
+    Inverted is D^-1 Gamma D^-1 with ones on its diagonal: which directions count as singular, and how they
+    are measured, does not depend on the units of the entries of theta.
+    """
 
     def __init__(self, Gamma: np.ndarray):
-        values, vectors = np.linalg.eigh(Gamma)
+        D = _scale(Gamma)
+        values, vectors = np.linalg.eigh(Gamma / (D[..., None] * D[..., None, :]))
         kept = values > ROUNDING * values[..., -1:]
         inverse = np.divide(1.0, values, out=np.zeros_like(values), where=kept)
         self.Gamma = Gamma
-        self._inverse = (vectors * inverse[..., None, :]) @ vectors.mT
-        self._frozen = (vectors * ~kept[..., None, :]) @ vectors.mT
+        self._inverse = (vectors * inverse[..., None, :]) @ vectors.mT / (D[..., None] * D[..., None, :])
+        self._frozen = (vectors * ~kept[..., None, :]) @ vectors.mT * D[..., None] / D[..., None, :]
 
     def raised(self, gradient: np.ndarray) -> np.ndarray:
         return np.matvec(self.Gamma, gradient)
@@ -147,10 +153,21 @@ def _read_matrix(name: str, matrix: ArrayLike) -> np.ndarray:
         raise InputError(
             f"expected a square matrix, found shape {Gamma.shape}", subject=name, found=Gamma.shape
         )
-    size = np.abs(Gamma).max()
-    if np.abs(Gamma - Gamma.T).max() > ROUNDING * size:
+    if np.diagonal(Gamma).min() < 0:
+        lowest = float(np.diagonal(Gamma).min())
+        raise InputError(f"expected a diagonal of at least 0, found {lowest:g}", subject=name, found=lowest)
+    D = _scale(Gamma)
+    scaled = Gamma / np.outer(D, D)
+    if np.abs(scaled - scaled.T).max() > ROUNDING:
         raise InputError("expected a symmetric matrix, found one that is not", subject=name)
-    lowest = float(np.linalg.eigvalsh(Gamma)[0])
-    if lowest < -ROUNDING * len(Gamma) * size:
-        raise InputError(f"expected no eigenvalue below 0, found {lowest:g}", subject=name, found=lowest)
+    lowest = float(np.linalg.eigvalsh(scaled)[0])
+    if lowest < -ROUNDING * len(Gamma):
+        expected = "expected no eigenvalue below 0 once the diagonal is scaled to ones"
+        raise InputError(f"{expected}, found {lowest:g}", subject=name, found=lowest)
     return (Gamma + Gamma.T) / 2
+
+
+def _scale(Gamma: np.ndarray) -> np.ndarray:
+    """Roots of the diagonal, (..., P), and 1 for entries that are not adapted."""
+    diagonal = np.diagonal(Gamma, axis1=-2, axis2=-1)
+    return np.where(diagonal > 0, np.sqrt(np.maximum(diagonal, 0.0)), 1.0)
