@@ -106,7 +106,7 @@ class Gains:
         unknown = set(changes) - set(_SIGNS)
         if unknown:
             known, found = ", ".join(_SIGNS), ", ".join(sorted(unknown))
-            raise InputError(f"expected some of {known}, found {found}", subject="gains")
+            raise InputError(f"expected some of {known}, found {found}", subject="gains", found=found)
         return replace(self, **changes)
 
     def as_dict(self) -> dict[str, Any]:
