@@ -88,8 +88,8 @@ class Gains:
             UnreachableError: a path that a robot cannot reach.
 
         Warns:
-            GainWarning: a mode that stays slower than the bandwidth, or a start so far off the path that the
-                first torque is beyond the limits.
+            GainWarning: a mode that stays slower than the bandwidth, damping that was cut below what bears
+                the payload, or a start so far off the path that the first torque is beyond the limits.
         """
         return cls(**suggested(cell, bandwidth, period, payload, dt, duration))
 
