@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from weakref import WeakKeyDictionary
 
 from ..checks import LONGEST_LABEL, unprintable
 from ..errors import RobotError
@@ -18,8 +17,6 @@ from .urdf.writer import to_xml
 
 #: characters; longer descriptions are not kept
 LONGEST = 100_000
-#: what was written for each robot that still exists: a robot does not change
-_WRITTEN: WeakKeyDictionary[Robot, dict[str, str]] = WeakKeyDictionary()
 
 
 def write_robot(robot: Robot) -> dict[str, str]:
@@ -28,9 +25,9 @@ def write_robot(robot: Robot) -> dict[str, str]:
     "file" is where it was read from, beside which its meshes are, unless it comes with this package or with
     example-robot-data. A robot that no document describes, or too long a one, gives nothing.
     """
-    if robot not in _WRITTEN:
-        _WRITTEN[robot] = _write(robot)
-    return dict(_WRITTEN[robot])
+    if "written" not in robot.kept:
+        robot.kept["written"] = _write(robot)
+    return dict(robot.kept["written"])
 
 
 def _write(robot: Robot) -> dict[str, str]:
