@@ -54,12 +54,12 @@ def _stock(file: Path) -> bool:
 
 
 def _trusted(file: str | None, folders: Iterable[Path]) -> Path:
-    """Where a description says that it was, if that is in a folder that the user named; else among ours."""
+    """Where a description says that it was, if that is in a folder that the user named; else beside ours."""
     if file is not None:
         resolved = Path(file).resolve()
         if any(resolved.is_relative_to(folder.resolve()) for folder in folders):
             return resolved
-    return urdf_folder() / "loaded.urdf"
+    return urdf_folder() / "none.urdf"
 
 
 def read_robot(
@@ -82,7 +82,8 @@ def read_robot(
     if "urdf" not in about:
         raise RobotError("its description was not kept", subject=f"robot '{name}'")
     folders = named_folders(package_dirs)
-    document = read_text(_trusted(about.get("file"), folders), about["urdf"].encode())
+    called = f"the result's robot '{name}'"
+    document = read_text(_trusted(about.get("file"), folders), about["urdf"].encode(), called=called)
     found = describe(document, folders)
     robot = Robot(
         found.model, about.get("tip", found.tip), visual=found.visual, name=name, document=found.document
