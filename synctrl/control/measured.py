@@ -156,7 +156,10 @@ def read_state(path: str | Path, like: Mapping[str, np.ndarray]) -> dict[str, np
 def _arrays(archive: zipfile.ZipFile, like: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     expected, found = sorted(f"{name}.npy" for name in like), sorted(archive.namelist())
     if found != expected:
-        raise ResultError(f"expected the arrays {', '.join(expected)}, found {', '.join(found) or 'none'}")
+        raise ResultError(
+            f"expected the arrays {', '.join(expected)}, found {', '.join(found) or 'none'}",
+            found=tuple(found),
+        )
     return {name: _array(archive, name, array) for name, array in like.items()}
 
 
@@ -165,7 +168,9 @@ def _array(archive: zipfile.ZipFile, name: str, like: np.ndarray) -> np.ndarray:
     entry = archive.getinfo(f"{name}.npy")
     size = len(header) + like.nbytes
     if entry.compress_type != zipfile.ZIP_STORED or entry.file_size != size:
-        raise ResultError(f"{name}: expected {size} bytes as they are, found {entry.file_size}")
+        raise ResultError(
+            f"{name}: expected {size} bytes as they are, found {entry.file_size}", found=entry.file_size
+        )
     data = archive.read(entry)
     if not data.startswith(header):
         raise ResultError(f"{name}: expected an array of floats of shape {like.shape}")

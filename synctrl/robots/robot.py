@@ -60,6 +60,7 @@ class Robot:
         self.visual = visual
         self.document = document
         self.report = report
+        self.kept: dict[str, Any] = {}  #: what was computed from it once, by name: a robot does not change
         check_joints(self.name, model)
         check_numbering(self.name, model)
         self.tip, self.tip_id = tip, frame_id(self.name, model, tip)
@@ -131,7 +132,9 @@ class Robot:
         """
         values = per_joint("armature", armature, self.nv)
         if values.min() < 0:
-            raise InputError(f"expected at least 0 kg·m^2, found {values.min():g}", subject="armature")
+            raise InputError(
+                f"expected at least 0 kg·m^2, found {values.min():g}", subject="armature", found=values.min()
+            )
         model = pin.Model(self.model)
         model.armature = values.copy()
         return self._with(model)

@@ -58,6 +58,7 @@ def vehicle_animation(result: Result, wheel_radius: float, track: float, fps: fl
             f"expected two wheels with one angle each, found {result.x.shape[1]} robots with "
             f"{result.x.shape[2]} coordinates",
             subject="result",
+            found=(result.x.shape[1], result.x.shape[2]),
         )
     times = frame_times(result, fps)
     frames = np.searchsorted(0.5 * (result.t[1:] + result.t[:-1]), times)  # the nearest logged instants

@@ -141,7 +141,7 @@ class Circle:
         self.dimension = m = self.center.size
         if m < 2:
             raise TrajectoryError(
-                f"a circle needs a task of at least 2 dimensions, found {m}", subject="center"
+                f"a circle needs a task of at least 2 dimensions, found {m}", subject="center", found=m
             )
         self.radius = positive_number("radius", radius)
         self.speed = finite_number("speed", speed)
@@ -151,7 +151,9 @@ class Circle:
         axes = np.array([self.first, self.second])
         if not np.allclose(axes @ axes.T, np.eye(2), atol=1e-9):
             raise TrajectoryError(
-                f"expected orthonormal axes, found {self.first} and {self.second}", subject="first, second"
+                f"expected orthonormal axes, found {self.first} and {self.second}",
+                subject="first, second",
+                found=(self.first, self.second),
             )
 
     def __call__(self, t: ArrayLike) -> Motion:
