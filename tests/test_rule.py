@@ -164,6 +164,38 @@ def test_a_base_that_is_none_is_held_and_named(tmp_path):
     same_as_pinocchio(robot, tmp_path / "robot.urdf", jx=0.0, jy=0.0, jturn=0.0)
 
 
+def test_a_base_that_turns_without_mass_and_then_drives_is_held_and_named(tmp_path):
+    text = robot_text(
+        link("turned", None), joint("jturn", "base", "turned"),
+        chain("driven", parent="turned", type="prismatic", lower=0.3), chain("a b", parent="driven"),
+    )  # fmt: skip
+    robot = loaded(tmp_path, text)
+    assert held(robot) == {"jturn", "jdriven"}
+    for q in np.random.default_rng(5).uniform(-2, 2, (5, robot.nv)):
+        assert np.linalg.eigvalsh(robot.mass_matrix(q))[0] > 0
+    same_as_pinocchio(robot, tmp_path / "robot.urdf", jturn=0.0, jdriven=0.3)
+
+
+SEEN = '<visual><geometry><sphere radius="0.1"/></geometry></visual></link>'
+
+
+@pytest.mark.parametrize(
+    "turned, behind",
+    [
+        (link("turned", None), chain("x a b", parent="turned")),
+        (link("turned", None), chain("x", parent="turned", type="prismatic")),
+        (
+            link("turned", None).replace("</link>", SEEN),
+            chain("x", parent="turned", type="prismatic") + chain("a", "x"),
+        ),
+    ],
+    ids=["a turn behind it", "a slide with nothing on it", "a link that is seen"],
+)
+def test_what_turns_without_mass_is_else_no_such_base(turned, behind, tmp_path):
+    with refused(RobotError, "joint 'jturn'"):
+        loaded(tmp_path, robot_text(turned, joint("jturn", "base", "turned"), behind))
+
+
 def test_a_turning_first_link_without_mass_is_no_such_base(tmp_path):
     text = robot_text(link("a", None), joint("ja", "base", "a"), chain("b c", parent="a"))
     with refused(RobotError, "joint 'ja'"):
