@@ -33,7 +33,7 @@ _LONGEST_NAME = 900
 _MISSPELT = 0.75
 MECHANISM = (
     *("inertial", "mass", "inertia", "origin", "parent", "child", "axis", "mimic", "value", "link", "joint"),
-    *("xyz", "rpy", "multiplier", "offset"),
+    *("xyz", "rpy", "quat_xyzw", "multiplier", "offset"),
 )
 """Elements and attributes without which a file would mean another mechanism, or one that stands elsewhere."""
 
@@ -166,12 +166,12 @@ class Element:
         return value
 
     def bound(self, attribute: str) -> float | None:
-        """An attribute that bounds something: a number, infinite where it is beyond measure, or None."""
+        """An attribute that bounds something: infinite if it is beyond measure, NaN if no number, or None."""
         if attribute not in self.attributes:
             return None
         word = self.attributes[attribute].strip()
         if not _INFINITE.fullmatch(word) and not _NUMBER.fullmatch(word):
-            self.refuse(f"{attribute} of 1 number", quoted(word))
+            return math.nan
         value = float(word)
         return value if abs(value) <= MAX_NUMBER else math.copysign(math.inf, value)
 
