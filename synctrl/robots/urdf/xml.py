@@ -18,6 +18,7 @@ from xml.parsers import expat
 
 from ...checks import unprintable
 from ...errors import RobotError
+from .encodings import as_utf8
 from .packages import Unusable, read_regular
 from .report import Notes
 
@@ -206,27 +207,13 @@ def parse_xml(file: str, data: bytes, notes: Notes | None = None) -> Element:
 
     Args:
         file: what messages call it.
-        data: the document, in UTF-8.
+        data: the document, in an encoding of `ENCODINGS`, or UTF-16 with a mark.
         notes: where its elements take their notes.
 
     Raises:
-        RobotError: not UTF-8, not well-formed, a document type declaration, or nested or filled without end.
+        RobotError: another encoding, not well-formed, a document type, or nested or filled without end.
     """
-    return _Reader(file, notes or Notes(file)).read(_utf8(file, data))
-
-
-def _utf8(file: str, data: bytes) -> bytes:
-    if b"\0" in data:
-        line = data.count(b"\n", 0, data.index(b"\0")) + 1
-        found = "a zero character, as in UTF-16"
-        raise RobotError(f"expected text in UTF-8, found {found}", file=file, line=line)
-    try:
-        data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        found = f"byte {data[error.start]:#04x}"
-        raise RobotError(f"expected text in UTF-8, found {found}", file=file, line=line) from error
-    return data
+    return _Reader(file, notes or Notes(file)).read(as_utf8(file, data))
 
 
 class _Reader:
@@ -242,7 +229,6 @@ class _Reader:
         self.parser.EndElementHandler = lambda tag: self.open.pop()
         self.parser.CharacterDataHandler = self._text
         self.parser.StartDoctypeDeclHandler = self._doctype
-        self.parser.XmlDeclHandler = self._declaration
 
     def read(self, data: bytes) -> Element:
         try:
@@ -275,10 +261,6 @@ class _Reader:
 
     def _doctype(self, *_: Any) -> None:
         self._refuse("a document without <!DOCTYPE> and entities", "<!DOCTYPE>")
-
-    def _declaration(self, _version: str, encoding: str | None, _standalone: int) -> None:
-        if encoding is not None and encoding.lower() not in ("utf-8", "utf8", "us-ascii", "ascii"):
-            self._refuse("text in UTF-8", f"a declaration of {quoted(encoding)}")
 
     def _refuse(self, expected: str, found: str, line: int = 0) -> NoReturn:
         line = line or self.parser.CurrentLineNumber
