@@ -10,10 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...errors import near
+from ...renamed import tell
 from .document import INERTIA, MOVING_TYPES, NO_INERTIA, Document, Inertial, Joint, Link, Mimic, Vector
 from .parts import Material, read_limit, read_materials, read_origin, read_shapes
 from .report import Notes
-from .xml import Element, parse_xml, quoted, shown_tag
+from .xml import Element, parse_xml, quoted, read_bytes, shown_tag
 
 JOINT_TYPES = (*MOVING_TYPES, "fixed")
 JOINT_PARTS = (
@@ -48,6 +49,12 @@ def read_text(file: Path, data: bytes, notes: Notes | None = None) -> Document:
         joints=tuple(_joint(element) for element in root.all("joint")),
         file=file,
     )
+
+
+def read_document(file: Path) -> Document:
+    """A URDF file as a document, as in version 0.1; `load_robot` and `read_urdf` take its place."""
+    tell(f"{__name__}.read_document", f"{__name__}.read_text(file, file.read_bytes())")
+    return read_text(file, read_bytes(file))
 
 
 def _robot_name(root: Element, file: Path) -> str:
