@@ -98,6 +98,11 @@ def same_as_pinocchio(robot: Robot, file: Path, **positions: float) -> None:
         np.testing.assert_allclose(Y @ robot.inertial_parameters, torque, rtol=1e-10, atol=1e-10)
 
 
+def test_a_moment_that_is_negative_by_rounding_is_said(tmp_path):
+    text = robot_text(ARM).replace('ixx="0.01"', 'ixx="-1e-35"', 1)
+    assert [note.kind for note in loaded(tmp_path, text).report] == ["suspicious"]
+
+
 # -- held joints -------------------------------------------------------------------------------------------
 
 
