@@ -191,7 +191,7 @@ def existing_file(path: str | Path) -> Path:
     try:
         if file.is_file():
             return file
-        kind = "a folder" if file.is_dir() else "no such file"
+        kind = "a folder" if file.is_dir() else "no regular file" if file.exists() else "no such file"
         beside = sorted(f.name for f in file.parent.glob("*.urdf"))
     except (OSError, ValueError) as error:
         raise RobotError(f"{expected}, found: {error}", file=shown) from error
