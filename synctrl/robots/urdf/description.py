@@ -221,7 +221,7 @@ def read_source(
         MissingDependencyError: xacro or MuJoCo is needed, and not installed.
     """
     if file.suffix.lower() == XACRO_SUFFIX:
-        return read_text(file, expand(file, xacro_args, packages).encode(), notes)
+        return read_text(file, expand(file, xacro_args, packages, notes).encode(), notes)
     if xacro_args is not None:
         raise InputError(f"expected none for a file that is no xacro file: {file}", subject="xacro_args")
     data = read_bytes(file)
