@@ -293,7 +293,10 @@ def test_an_arm_is_not_cut_behind_its_tip(tmp_path):
     assert robot.nv == 3 and not robot.report
 
 
-@pytest.mark.parametrize(("tip", "words"), [("base", "no joint moves it"), ("f1", "on a finger")])
+@pytest.mark.parametrize(
+    ("tip", "words"),
+    [("base", "no joint moves it"), ("universe", "no joint moves it"), ("f1", "on a finger")],
+)
 def test_a_tip_on_the_base_or_on_a_finger_is_suspicious(tip, words, tmp_path):
     robot = loaded(tmp_path, robot_text(HAND), tip=tip)
     assert any(words in note.text for note in robot.report.of_kind("suspicious"))
