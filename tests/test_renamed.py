@@ -43,6 +43,9 @@ RENAMED = [
     ("synctrl.sweep.distributions", "Distribution", "synctrl.sweep.distributions", "Values"),
     ("synctrl.compiled.engine", "Block", "synctrl.compiled.engine", "DesiredStretch"),
     ("synctrl.show.report", "Row", "synctrl.paper.report", "SideBySide"),
+    ("synctrl.show.shapes", "Shape", "synctrl.show.shapes", "Solid"),
+    ("synctrl.robots.mechanism", "Joint", "synctrl.robots.mechanism", "MechanismJoint"),
+    ("synctrl.simulation.recorder", "describe", "synctrl.simulation.recorder", "describe_run"),
 ]
 #: what version 0.1 exported
 EXPORTED = {
