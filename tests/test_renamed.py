@@ -103,7 +103,9 @@ def test_a_name_that_is_another_one_now_is_the_same_thing_and_says_which(old, na
 
 @pytest.mark.parametrize("old", MOVED)
 def test_other_names_are_as_unknown_as_before(old):
-    with pytest.raises(AttributeError, match=f"module '{old}' has no attribute 'nothing'"):
+    with pytest.raises(
+        AttributeError, match=f"module '{old}' has no attribute 'nothing'"
+    ):  # as Python says it
         import_module(old).nothing  # noqa: B018
 
 
@@ -166,7 +168,7 @@ def test_the_warning_has_the_line_of_whoever_asks():
 def test_an_argument_under_both_of_its_names_is_refused(seen):
     controller, asked = seen
     z = controller.adaptation.start()
-    with pytest.raises(TypeError, match="under two names, 'theta_hat' and 'z'"):
+    with pytest.raises(TypeError, match="under two names, 'theta_hat' and 'z'"):  # a TypeError has no data
         controller.evaluate(z=z, theta_hat=z, **asked)
 
 
