@@ -166,6 +166,21 @@ def test_estimates_stay_where_they_may_be_through_a_run_and_are_held_there(name)
     assert np.abs(free.theta_hat - result.theta_hat).max() > 1e-3
 
 
+@pytest.mark.parametrize("name", ["box", "ball"])
+def test_a_step_is_of_second_order_where_estimates_are_held_and_of_fourth_where_they_are_not(name):
+    held, free = (slopes(adaptation) for adaptation in (TIGHT[name], Gradient(0.3)))
+    assert held > 1.5
+    assert free > 3.5
+
+
+def slopes(adaptation) -> float:
+    """The order of the error at the end of a run, over three halvings of the step."""
+    experiment = with_adaptation(a460_pair(friction=False), adaptation)
+    *ends, exact = (experiment.simulate(0.1, dt=dt).theta_hat[-1] for dt in (4e-3, 2e-3, 1e-3, 1.25e-4))
+    errors = [np.abs(end - exact).max() for end in ends]
+    return float(np.log2(errors[0] / errors[-1]) / 2)
+
+
 # -- runs -------------------------------------------------------------------------------------------------
 
 
