@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..analysis.comparison import RULES, Comparison
+from ..analysis.trial_rows import AS_GIVEN
 from .plots import new_figure, style
 from .style import display
 
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: how a row is drawn, by its rule
-MARKERS = dict(zip(("as given", *RULES), ("*", "o", "s", "^"), strict=True))
+MARKERS = dict(zip((AS_GIVEN, *RULES), ("*", "o", "s", "^"), strict=True))
 #: laws are numbered in the panels, for their names would cover each other
 _SIZE = {"*": 150, "o": 60, "s": 52, "^": 62}
 
