@@ -178,8 +178,8 @@ def honesty_section(findings: Sequence[Claim]) -> Section:
 _UNSAID = Text(
     "Without synchronization the paper sets β = K_ε = 0 and leaves all other gains as they are. That takes "
     "gain away, so part of what synchronization seems to achieve is achieved by more gain. Of the gains that "
-    "synchronization adds, β does the work. Two things more were found: what the adaptation does to the "
-    "estimates, and that under the push another law does better."
+    "synchronization adds, β does the work. Checked as well: whether estimates stay those of bodies, and "
+    "whether a law of others does better under the push."
 )
 
 

@@ -47,6 +47,8 @@ def comparison_figure(comparison: Comparison) -> Figure:
 
 
 def _panel(panel: Axes, comparison: Comparison, situation: str, numbers: dict[str, int], norm: Any) -> Any:
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     (e_unit, e), (s_unit, s) = (display(unit) for unit in comparison.units[:2])
     for row in comparison.rows:
         sizes = getattr(row, situation)
@@ -62,7 +64,9 @@ def _panel(panel: Axes, comparison: Comparison, situation: str, numbers: dict[st
     if panel.get_subplotspec().is_first_col():  # type: ignore[union-attr]
         panel.set_ylabel(f"RMS ε, {s_unit}")
     for axis in (panel.xaxis, panel.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
         axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
     return dots
 
 
