@@ -99,13 +99,13 @@ for name, run in runs.items():
 # %%
 with style():
     figure, axes = new_figure(3.0, 1, 2, sharey=True)
-for i, panel in enumerate(axes[0]):
-    for name, run in runs.items():
-        panel.plot(run.t, run.theta_hat[:, i, -10] - known[-10], label=name)
-    panel.plot(run.t, np.where(run.t < PICKED_UP, 0.0, LOADS[i]), "k--", lw=0.9)
-    panel.set(title=f"robot {i + 1}", xlabel="t, s")
-axes[0, 0].set_ylabel("mass at the hand, kg")
-axes[0, 0].legend()
+    for i, panel in enumerate(axes[0]):
+        for name, run in runs.items():
+            panel.plot(run.t, run.theta_hat[:, i, -10] - known[-10], label=name)
+        panel.plot(run.t, np.where(run.t < PICKED_UP, 0.0, LOADS[i]), "k--", lw=0.9)
+        panel.set(title=f"robot {i + 1}", xlabel="t, s")
+    axes[0, 0].set_ylabel("mass at the hand, kg")
+    axes[0, 1].legend(loc="upper left")
 display(figure)
 
 # %% [markdown]
