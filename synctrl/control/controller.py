@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from ..checks import finite_array, instance, offers, shaped
 from ..coupling.cell import Cell, Reference
 from ..errors import InputError, SynctrlError
 from ..renamed import argument, names_elsewhere, tell
+from ..robots.momentum import momentum_of_all
 from ..robots.regressors import Regressors, make_regressors
 from ..tasks.spaces import Measurement
 from . import law, laws
@@ -213,7 +214,8 @@ class Controller:
         Y = self._compute_regressors(q, v, v_ref, a_ref)
         theta_hat = self.adaptation.estimate(z)
         tau = np.matvec(Y, theta_hat) + feedback  # (13), (32)
-        seen = Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Y)
+        momentum = partial(momentum_of_all, self.cell.robots, self.cell.parameters, q, v)
+        seen = Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Y, momentum)
         z_dot = self.adaptation.rate(z, seen)
         return Signals(
             reference, task, received, errors, asked, v_ref, a_ref, s_q, Y, tau, theta_hat, z_dot, seen

@@ -10,7 +10,7 @@ that returns an object with the methods of `BoundAdaptation`; nothing else has t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -29,6 +29,8 @@ class Seen:
         s_q: v_ref - v, (n, nv).
         gradient: Y^T s_q, (n, P).
         regressor: Y, (n, nv, P); not in generated code.
+        momentum: gives Y_p and Y_h, (n, nv, P) each, of p = M v = Y_p theta and p' = tau - Y_h theta, see
+            `momentum_of_all`; a function, because they take time and few ask for them.
     """
 
     q: np.ndarray
@@ -38,6 +40,7 @@ class Seen:
     s_q: np.ndarray
     gradient: np.ndarray
     regressor: Any
+    momentum: Callable[[], tuple[np.ndarray, np.ndarray]] | None = None
 
 
 class BoundAdaptation(Protocol):
