@@ -17,6 +17,14 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...coupling.cell import Cell
+from ...errors import InputError
+
+Momentum = tuple[np.ndarray, np.ndarray]
+"""Y_p and Y_h, (n, nv, P) each, of p = M v = Y_p theta and p' = tau - Y_h theta, see `momentum_of_all`."""
+
+
+def _unknown() -> Momentum:
+    raise InputError("expected the regressors of momentum, found none", subject="momentum")
 
 
 @dataclass(slots=True)
@@ -29,8 +37,9 @@ class Seen:
         s_q: v_ref - v, (n, nv).
         gradient: Y^T s_q, (n, P).
         regressor: Y, (n, nv, P); not in generated code.
-        momentum: gives Y_p and Y_h, (n, nv, P) each, of p = M v = Y_p theta and p' = tau - Y_h theta, see
-            `momentum_of_all`; a function, because they take time and few ask for them.
+        tau: torque that the controller asks for, (n, nv), N·m.
+        applied: what the limits that it knows leave of it, (n, nv), N·m.
+        momentum: gives the regressors of momentum; a function, because they take time and few ask for them.
     """
 
     q: np.ndarray
@@ -40,7 +49,9 @@ class Seen:
     s_q: np.ndarray
     gradient: np.ndarray
     regressor: Any
-    momentum: Callable[[], tuple[np.ndarray, np.ndarray]] | None = None
+    tau: np.ndarray
+    applied: np.ndarray
+    momentum: Callable[[], Momentum] = _unknown
 
 
 class BoundAdaptation(Protocol):
