@@ -120,7 +120,7 @@ class BoundComposite:
         return z[:, : self._shapes[0][1]]
 
     def rate(self, z: np.ndarray, seen: Seen) -> np.ndarray:
-        x, (Y_p, Y_h) = self._split(z), seen.momentum()
+        x, (Y_p, Y_h) = self.parts(z), seen.momentum()
         W, missed = self._predicted(x, Y_p)
         gradient = seen.gradient + self._R * np.matvec(W.mT, missed) + self._pull(x)
         return State(
@@ -135,7 +135,7 @@ class BoundComposite:
 
     def leap(self, z: np.ndarray, z_dot: np.ndarray, h: float) -> np.ndarray:
         """What is filtered, and what fades, exactly as it does while the rest of its rate is held."""
-        x, rate = self._split(z), self._split(z_dot)
+        x, rate = self.parts(z), self.parts(z_dot)
         steps = h, _held(self._w, h), _held(self._w, h), _held(self._memory.fade, h)
         return State(*(a + step * b for a, step, b in zip(x, steps, rate, strict=True))).joined()
 
@@ -149,13 +149,19 @@ class BoundComposite:
     def powers(self, z: np.ndarray, theta: np.ndarray, seen: Seen) -> Mapping[str, float]:
         tilde = theta - self.estimate(z)
         frozen = self.metric.frozen(tilde)
-        x = self._split(z)
+        x = self.parts(z)
         W, missed = self._predicted(x, seen.momentum()[0])
         return {
             "model error": float(np.sum(seen.s_q * np.matvec(seen.regressor, frozen))),
             "prediction": float(-self._R * np.sum(np.matvec(W, tilde - frozen) * missed)),
             "memory": float(-np.sum((tilde - frozen) * self._pull(x))),
         }
+
+    def parts(self, z: np.ndarray) -> State:
+        """z by its parts; of one instant, or of a `rate`."""
+        ends = np.cumsum([np.prod(shape[1:], dtype=int) for shape in self._shapes])[:-1]
+        parts = np.split(z, ends, axis=1)
+        return State(*(part.reshape(shape) for part, shape in zip(parts, self._shapes, strict=True)))
 
     # -- internals ----------------------------------------------------------------------------------------
 
@@ -166,11 +172,6 @@ class BoundComposite:
 
     def _pull(self, x: State) -> np.ndarray:
         return self._memory.pull(x.memory, x.theta_hat)
-
-    def _split(self, z: np.ndarray) -> State:
-        ends = np.cumsum([np.prod(shape[1:], dtype=int) for shape in self._shapes])[:-1]
-        parts = np.split(z, ends, axis=1)
-        return State(*(part.reshape(shape) for part, shape in zip(parts, self._shapes, strict=True)))
 
 
 def _held(rate: float, h: float) -> float:

@@ -20,9 +20,9 @@ class Symmetric:
         self._index = np.zeros((P, P), dtype=int)
         self._index[self._rows, self._columns] = self._index[self._columns, self._rows] = range(self.size)
 
-    def pack(self, matrices: np.ndarray) -> np.ndarray:
-        """(n, P, P) -> (n, size)."""
-        return matrices[:, self._rows, self._columns]
+    def gram(self, W: np.ndarray) -> np.ndarray:
+        """W^T W of matrices, (n, k, P) -> (n, size)."""
+        return (W[..., self._rows] * W[..., self._columns]).sum(axis=1)
 
     def unpack(self, rows: np.ndarray) -> np.ndarray:
         """(n, size) -> (n, P, P)."""
@@ -61,7 +61,7 @@ class Memory:
         return self._kappa * (b - np.matvec(Q, theta_hat))
 
     def rate(self, state: np.ndarray, W: np.ndarray, y: np.ndarray) -> np.ndarray:
-        gained = self._form.pack(W.mT @ W), np.matvec(W.mT, y)
+        gained = self._form.gram(W), np.matvec(W.mT, y)
         return self._R * np.concatenate(gained, axis=1) - self.fade * state
 
     def _split(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
