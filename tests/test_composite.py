@@ -32,6 +32,7 @@ KINDS = {
     "of some entries": Composite(np.where(np.arange(P) % 3, 0.4, 0.0), 2.0, 20.0, memory=1.0),
     "of a singular matrix": Composite([SINGULAR], 2.0, 20.0, memory=1.0),
 }
+FORGETTING = Composite(0.02, 5.0, 20.0, memory=1.0, forgetting=3.0)
 
 
 def with_adaptation(experiment: Experiment, adaptation) -> Experiment:
@@ -87,6 +88,29 @@ def test_the_storage_changes_by_minus_s_y_tilde_and_the_named_powers(name, seed)
     powers = bound.powers(z, theta, now)
     scale = abs(model) + sum(map(abs, powers.values()))
     assert found == pytest.approx(-model + sum(powers.values()), abs=1e-8 * scale)
+
+
+@given(seed=SEEDS)
+def test_with_forgetting_predictions_take_what_v_owes_them_and_the_rest_is_named(seed):
+    """V_th' = -s^T Y tilde - R/2 |W tilde|^2 - kappa tilde^T Q tilde - lambda V_th where y = W theta."""
+    rng = np.random.default_rng(seed)
+    cell = arms(FORGETTING).cell
+    bound, theta = FORGETTING.bind(cell), cell.theta
+    q, v, v_ref, a_ref, s_q, tau = rng.standard_normal((6, 2, 2))
+    Y, *momentum = rng.standard_normal((3, 2, 2, 3))
+    now = Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Y, tau, tau, lambda: tuple(momentum))
+    z = bound.start()
+    x = bound.parts(z * (1 + 0.1 * rng.standard_normal(z.shape)))
+    W = 20.0 * momentum[0] + x.Z
+    z = x._replace(y=np.matvec(W, theta)).joined()
+    powers = bound.powers(z, theta, now)
+    model = float(np.sum(now.gradient * (theta - x.theta_hat)))
+    found = bound.storage_rate(z, bound.rate(z, now), theta)
+    scale = abs(model) + sum(map(abs, powers.values()))
+    assert found == pytest.approx(-model + sum(powers.values()), abs=1e-9 * scale)
+    missed = np.matvec(W, theta - x.theta_hat)
+    assert powers["prediction"] == pytest.approx(-2.5 * np.sum(missed**2), rel=1e-9)
+    assert powers["forgetting"] <= 0
 
 
 @pytest.mark.parametrize(
@@ -164,6 +188,23 @@ def test_with_a_memory_estimates_converge_exponentially_at_rest_where_the_gradie
     np.testing.assert_allclose(end / middle, middle / start, rtol=0.5)
 
 
+def test_forgotten_gamma_shrinks_where_something_is_learned_and_grows_back_to_its_bound():
+    result = (experiment := arms(FORGETTING)).simulate(dt=1e-3)
+    bound = FORGETTING.bind(experiment.cell)
+    grown = []
+    for z in result.outputs["adaptation_state"][::50]:
+        Gamma = bound.metric(z).Gamma / 0.02
+        assert (np.linalg.eigvalsh(Gamma) > 0).all()
+        grown.append(np.trace(Gamma, axis1=1, axis2=2) / 3)
+    at, largest = result.t[::50], 2.0
+    assert np.max(grown) <= largest
+    assert np.min(grown) < 0.7
+    assert (np.array(grown)[-1] > 1.2).all() and at[np.argmin(np.max(grown, axis=1))] <= 0.6
+    record = lyapunov(result)
+    assert record.closes
+    assert (record.power["forgetting"] <= record.rounding).all() and record.power["forgetting"].min() < 0
+
+
 def test_without_weight_of_predictions_it_is_the_gradient_bit_for_bit():
     one, other = (arms(law).simulate(0.1) for law in (Composite(0.02, 0.0, 20.0), Gradient(0.02)))
     for name in LAYOUT:
@@ -173,10 +214,11 @@ def test_without_weight_of_predictions_it_is_the_gradient_bit_for_bit():
 # -- engines and samples ----------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("adaptation", [Composite(0.02, 5.0, 20.0), FORGETTING], ids=["plain", "forgetting"])
 @pytest.mark.parametrize("control", [{}, {"control_period": 2e-3}], ids=["continuous", "sampled"])
-def test_both_engines_learn_alike(control):
+def test_both_engines_learn_alike(control, adaptation):
     pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
-    experiment = arms(Composite(0.02, 5.0, 20.0, memory=1.0))
+    experiment = arms(adaptation)
     one, other = (experiment.simulate(0.2, engine=engine, **control) for engine in ("pinocchio", "compiled"))
     assert np.abs(one.theta_hat - one.theta_hat[0]).max() > 1e-3
     for array in LAYOUT:
@@ -208,6 +250,11 @@ def test_a_sample_filters_held_torque_exactly_whatever_the_period(seed, h):
         (lambda: Composite(0.3, 1.0, 0.0), "bandwidth"),
         (lambda: Composite(0.3, 1.0, 20.0, memory=np.nan), "memory"),
         (lambda: Composite(0.3, 1.0, 20.0, fade=-0.1), "fade"),
+        (lambda: Composite(0.3, 1.0, 20.0, forgetting=-1.0), "forgetting"),
+        (lambda: Composite(0.3, 0.0, 20.0, forgetting=1.0), "prediction"),
+        (lambda: Composite(0.3, 1.0, 20.0, forgetting=1.0, growth=1.0), "growth"),
+        (lambda: Composite(0.3, 1.0, 20.0, forgetting=1.0).bind(CELL), "robot 1, adaptation"),
+        (lambda: arms(Composite([0.1, 0.1, 0.0], 1.0, 20.0, forgetting=1.0)), "Gamma"),
         (lambda: Composite(np.ones(3), 1.0, 20.0).bind(CELL), "Gamma"),
         (lambda: KINDS["plain"].bind(CELL).rate(KINDS["plain"].bind(CELL).start(), unknowing()), "momentum"),
     ],

@@ -20,6 +20,10 @@ class Symmetric:
         self._index = np.zeros((P, P), dtype=int)
         self._index[self._rows, self._columns] = self._index[self._columns, self._rows] = range(self.size)
 
+    def pack(self, matrices: np.ndarray) -> np.ndarray:
+        """(n, P, P) -> (n, size)."""
+        return matrices[:, self._rows, self._columns]
+
     def gram(self, W: np.ndarray) -> np.ndarray:
         """W^T W of matrices, (n, k, P) -> (n, size)."""
         return (W[..., self._rows] * W[..., self._columns]).sum(axis=1)
