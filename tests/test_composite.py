@@ -238,6 +238,17 @@ def test_a_sample_filters_held_torque_exactly_whatever_the_period(seed, h):
     np.testing.assert_allclose(bound.parts(z).y, (1 - np.exp(-20.0 * 3 * h)) * now.applied, atol=1e-12)
 
 
+def test_with_sampled_control_what_is_predicted_errs_in_proportion_to_the_period():
+    experiment, found = arms(Composite(0.02, 5.0, 20.0)), []
+    for period in (2e-3, 1e-3):
+        result = experiment.simulate(0.3, dt=5e-4, control_period=period)
+        y, predicted = filtered(experiment, result)
+        sampled = slice(None, None, round(period / 5e-4))
+        found.append(np.abs(y - predicted)[sampled].max() / np.abs(y).max())
+    assert found[0] < 0.05
+    assert found[0] / found[1] == pytest.approx(2, rel=0.2)
+
+
 # -- refusals ---------------------------------------------------------------------------------------------
 
 
