@@ -15,7 +15,7 @@ from synctrl.analysis.certify import certify
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.control.adaptation import Composite, Gradient, Seen
 from synctrl.errors import InputError
-from synctrl.experiments import a460_pair
+from synctrl.experiments import a460_pair, mixed_four
 from synctrl.robots.momentum import momentum_of_all
 from synctrl.robots.parameters import planar_two_link_parameters
 from synctrl.simulation.result import LAYOUT
@@ -132,6 +132,15 @@ def test_what_is_predicted_is_the_filtered_torque_and_takes_from_v(make):
     for name in ("prediction", "memory"):
         assert (record.power[name] <= record.rounding).all()
     assert record.power["prediction"].min() < -1e-3
+
+
+def test_robots_of_different_sizes_predict_their_torque_each():
+    experiment = with_adaptation(mixed_four(), Composite(1e-3, 2.0, 20.0, memory=1.0))
+    result = experiment.simulate(0.02, dt=5e-4)
+    y, predicted = filtered(experiment, result)
+    moved = np.abs(result.theta_hat - result.theta_hat[0]).max(axis=(0, 2))
+    assert (moved > 0).all()
+    np.testing.assert_allclose(predicted, y, rtol=0, atol=1e-6 * np.abs(y).max())
 
 
 @pytest.mark.filterwarnings("ignore::synctrl.errors.SaturationWarning")  # torque is meant to be cut
