@@ -21,6 +21,7 @@ from synctrl.control.adaptation import (
     Adaptation,
     Ball,
     Box,
+    Composite,
     EModification,
     Gradient,
     Leakage,
@@ -47,6 +48,8 @@ from synctrl.paper.report import Section, Text, write_page
 PLANAR = 3.0
 #: of leakage, 1/s or 1/rad, and of adaptations that know bodies, 1/(N·m)
 RATE, SHARE = 0.5, 0.1
+#: R of composite adaptation, without and with a memory, 1/(N·m·s), and the bandwidth of its filters, 1/s
+PREDICTIONS, BANDWIDTH = (2.0, 0.3), 20
 PUSHED = "Disturbed: the paper's push of 1 N·m on robot 1."
 RUBBED = "Disturbed: friction in the plant that the controller does not know."
 
@@ -136,6 +139,7 @@ def of_numbers(cell: Cell, Gamma: float) -> dict[str, Adaptation]:
     """Adaptations of any parameters, with bounds that hold the true ones."""
     theta, theta_hat0 = cell.theta, cell.theta_hat0
     far = float(np.sqrt(((theta - theta_hat0) ** 2).sum(axis=1).max() / Gamma))
+    R = PREDICTIONS
     width = 0.5 * np.abs(theta) + np.maximum(0.05, 1.2 * np.abs(theta - theta_hat0))
     return {
         "none": Gradient(0.0),
@@ -145,6 +149,8 @@ def of_numbers(cell: Cell, Gamma: float) -> dict[str, Adaptation]:
         f"Leakage({Gamma}, EModification({RATE}))": Leakage(Gamma, EModification(RATE)),
         f"Box({Gamma}, around theta)": Box(Gamma, theta - width, theta + width),
         f"Ball({Gamma}, {1.2 * far:.3g})": Ball(Gamma, 1.2 * far),
+        f"Composite({Gamma}, {R[0]}, {BANDWIDTH})": Composite(Gamma, R[0], BANDWIDTH),
+        f"Composite({Gamma}, {R[1]}, {BANDWIDTH}, memory=1)": Composite(Gamma, R[1], BANDWIDTH, memory=1),
     }
 
 

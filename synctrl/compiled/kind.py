@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from ..tasks.algebra import Algebra
 from ..tasks.measurement import Kinematics
 from ..tasks.redundancy import Posture
 from ..tasks.spaces import BoundJointSpace, BoundTipSpace, JointSpace, TipSpace
+from .momentum import momentum_function
 from .plugged import Learning, trace_law, trace_learning
 
 
@@ -152,19 +154,23 @@ def classify(controller: Controller) -> Classified:
     for name, (_, base) in zip(names, found, strict=True):
         rotations.setdefault(name, set()).add((base.rotation + 0.0).tobytes())  # -0 counts as 0
     kinds: dict[str, Kind] = {}
-    index, plugged = [], [*zip(trace_learning(controller), trace_law(controller), strict=True)]
-    for i, (name, (fixed, base)) in enumerate(zip(names, found, strict=True)):
-        same = len(rotations[name]) == 1
-        kind = _kind(controller, i, fixed, base.rotation if same else None, *plugged[i])
+    bare = [
+        _kind(controller, i, fixed, base.rotation if len(rotations[name]) == 1 else None)
+        for i, (name, (fixed, base)) in enumerate(zip(names, found, strict=True))
+    ]
+    momentum = [
+        partial(momentum_function, kind, base.rotation) for kind, (_, base) in zip(bare, found, strict=True)
+    ]
+    index, plugged = [], zip(trace_learning(controller, momentum), trace_law(controller), strict=True)
+    for plain, (learning, law) in zip(bare, plugged, strict=True):
+        kind = replace(plain, learning=learning, law=law)
         key = repr(kind.key())
         kinds.setdefault(key, kind)
         index.append(list(kinds).index(key))
     return Classified(list(kinds.values()), index, [base for _, base in found])
 
 
-def _kind(
-    controller: Controller, i: int, fixed: Mechanism, rotation: np.ndarray | None, *plugged: Any
-) -> Kind:
+def _kind(controller: Controller, i: int, fixed: Mechanism, rotation: np.ndarray | None) -> Kind:
     cell, parameters = controller.cell, controller.cell.parameters[i]
     rigid: Any = parameters.base if isinstance(parameters, FrictionParameters) else parameters
     return Kind(
@@ -178,5 +184,4 @@ def _kind(
         getattr(parameters, "smoothing", None),
         getattr(parameters, "armature", False),
         tuple(type(part).__qualname__ for part in (cell.space, parameters, rigid)),
-        *plugged,
     )

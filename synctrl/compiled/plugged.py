@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,7 +27,8 @@ from ..control.laws.protocol import ROWS, WEIGHTS
 from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.cell import Cell
 from ..errors import InputError
-from .algebra import column_of, symbols
+from ..robots.momentum import momentum_of_all
+from .algebra import array_of, column_of, symbols
 
 #: what a rate is a function of, beside z and the gradient
 MOTION = ("q", "v", "v_ref", "a_ref", "s_q", "tau", "applied")
@@ -68,8 +70,12 @@ def trace_law(controller: Controller) -> list[Any]:
         return [_function("command", i, inputs, asked) for i in range(n)]
 
 
-def trace_learning(controller: Controller) -> list[Learning | None]:
+def trace_learning(controller: Controller, momentum: Sequence[Callable[[], Any]]) -> list[Learning | None]:
     """How every robot of a cell learns; None for (14), which has code of its own.
+
+    Args:
+        controller: of the cell.
+        momentum: per robot, makes the CasADi function q, v -> Y_p, Y_h.
 
     Raises:
         InputError: an adaptation that does not take symbols, or mixes robots.
@@ -84,7 +90,8 @@ def trace_learning(controller: Controller) -> list[Learning | None]:
         gradient = _padded("gradient", counts, cell.theta.shape[1])
         motion = {name: _padded(name, joints, cell.nv) for name in MOTION}
         estimates, settled = adaptation.estimate(z), adaptation.settle(z)
-        rates = adaptation.rate(z, Seen(**motion, gradient=gradient, regressor=None))
+        known = partial(_momentum, momentum, motion["q"], motion["v"], cell.theta.shape[1])
+        rates = adaptation.rate(z, Seen(**motion, gradient=gradient, regressor=None, momentum=known))
         z_dot, h = symbols("z_dot", *z.shape), np.tile(symbols("h", 1), (cell.n, 1))
         leapt = adaptation.leap(z, z_dot, h[:1, 0]) if hasattr(adaptation, "leap") else None
         return [
@@ -183,7 +190,9 @@ class ChosenAdaptation:
         for name, rows in found.items():
             value = getattr(seen, name)[row]
             rows[self._robots[row], : len(value)] = value
-        return Seen(**found, regressor=None)
+        cell = self._cell
+        momentum = partial(momentum_of_all, cell.robots, cell.parameters, found["q"], found["v"])
+        return Seen(**found, regressor=None, momentum=momentum)
 
 
 # -- internals --------------------------------------------------------------------------------------------
@@ -210,6 +219,19 @@ def _function(name: str, robot: int, inputs: Sequence[np.ndarray], outputs: Sequ
 
     given, found = ([column_of(part[robot]) for part in parts] for parts in (inputs, outputs))
     return ca.Function(name, given, found)
+
+
+def _momentum(
+    makers: Sequence[Callable[[], Any]], q: np.ndarray, v: np.ndarray, P: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Y_p and Y_h of rows of symbols, (n, nv, P) each, padded with zeros."""
+    found = np.zeros((2, *q.shape, P), dtype=object)
+    for i, make in enumerate(makers):
+        function = make()
+        nv, columns = function.size_out(0)
+        regressors = function(*(column_of(part[i, :nv]) for part in (q, v)))
+        found[:, i, :nv, :columns] = [array_of(part) for part in regressors]
+    return found[0], found[1]
 
 
 def _padded(name: str, lengths: Sequence[int], longest: int) -> np.ndarray:

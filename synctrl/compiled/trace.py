@@ -18,7 +18,6 @@ from ..control.laws import Asked, Errors
 from ..control.laws.protocol import ROWS
 from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.weights import Weights
-from ..robots.parameters import friction_diagonals
 from ..robots.symbolic import Symbols
 from ..tasks.algebra import limited
 from ..tasks.measurement import Poses, Positions
@@ -26,6 +25,7 @@ from ..tasks.redundancy import Inversion, velocity_lost
 from ..tasks.spaces import Measurement
 from .algebra import SYMBOLS, array_of, column_of
 from .kind import Kind
+from .momentum import model_torque
 from .plugged import Learning
 from .quantities import DESIRED, FUNCTIONS, HEARD, QUANTITIES, columns
 
@@ -179,15 +179,8 @@ class Trace:
 
     def _model(self, theta_hat: Any, v_ref: Any, a_ref: Any, s_q: Any) -> tuple[Any, Any]:
         """Y theta_hat, and Y^T s_q as the derivative of s_q^T Y theta_hat with respect to theta_hat."""
-        kind = self.kind
-        rigid = theta_hat[: kind.rigid_parameters]
-        pi = rigid if kind.matrix is None else self.ca.mtimes(self.ca.SX(kind.matrix), rigid)
-        torque = self._recursion().torque(pi, self.v, v_ref, a_ref, self._gravity())
-        if kind.smoothing is not None:
-            rubbing = array_of(theta_hat[kind.rigid_parameters :], -1, kind.nv)
-            v, v_ref, a_ref = (array_of(part, -1) for part in (self.v, v_ref, a_ref))
-            diagonals = friction_diagonals(v, v_ref, a_ref, kind.smoothing, kind.rotors)
-            torque += column_of(sum(rubbing * np.stack(diagonals)))
+        recursion, gravity = self._recursion(), self._gravity()
+        torque = model_torque(self.kind, recursion, theta_hat, self.v, v_ref, a_ref, gravity)
         return torque, self.ca.jtimes(torque, theta_hat, s_q, True)
 
     # -- the plant ----------------------------------------------------------------------------------------

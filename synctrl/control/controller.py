@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from ..checks import finite_array, instance, limits, offers, shaped
 from ..coupling.cell import Cell, Reference
 from ..errors import InputError, SynctrlError
 from ..renamed import argument, names_elsewhere, tell
+from ..robots.momentum import momentum_of_all
 from ..robots.regressors import Regressors, make_regressors
 from ..tasks.algebra import limited
 from ..tasks.spaces import Measurement
@@ -208,8 +209,8 @@ class Controller:
         `space` is the task space bound to the robots, `cell.task`; `task` is what it measures at this
         instant. z is what the adaptation remembers, and `integral` what the network does.
         """
-        q, v = motion
-        space, weights = self.cell.task, reference.weights
+        (q, v), cell = motion, self.cell
+        space, weights = cell.task, reference.weights
         task = space.measure(motion, reference.desired)
         w = law.compute_weighted_errors(weights, task.error)
         received = self.network.exchange(reference.t, w, integral)
@@ -222,7 +223,8 @@ class Controller:
         theta_hat = self.adaptation.estimate(z)
         tau = np.matvec(Y, theta_hat) + feedback  # (13), (32)
         applied = limited(tau, -self.torque_limits, self.torque_limits) if self._cuts else tau
-        seen = Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Y, tau, applied)
+        momentum = partial(momentum_of_all, cell.robots, cell.parameters, q, v)
+        seen = Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Y, tau, applied, momentum)
         z_dot = self.adaptation.rate(z, seen)
         return Signals(
             reference, task, received, errors, asked, v_ref, a_ref, s_q, Y, tau, theta_hat, z_dot, seen

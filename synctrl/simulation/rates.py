@@ -19,6 +19,7 @@ spring late: what counts then is the largest eigenvalue of (D + F)^-1 Y Gamma Y^
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +28,7 @@ from ..control.adaptation import Seen
 from ..control.laws import no_errors
 from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.cell import Reference
+from ..robots.momentum import momentum_of_all
 from ..robots.regressors import make_regressors
 from ..tasks.measurement import Measurement
 from .closed_loop import ClosedLoop
@@ -186,11 +188,12 @@ def _learned(loop: ClosedLoop, i: int, Y: np.ndarray) -> np.ndarray:
     """The spring that adaptation is, (nv, nv): Y theta_hat' per velocity error, Y Gamma Y^T with (14)."""
     cell, adaptation = loop.cell, loop.controller.adaptation
     z, still = adaptation.start(), np.zeros((cell.n, cell.nv))
+    known = partial(momentum_of_all, cell.robots, cell.parameters, still, still)
 
     def rate(gradient: np.ndarray) -> np.ndarray:
         rows = np.zeros(cell.theta.shape)
         rows[i] = gradient
-        return adaptation.rate(z, Seen(still, still, still, still, still, rows, None, still, still))
+        return adaptation.rate(z, Seen(still, still, still, still, still, rows, None, still, still, known))
 
     rest = rate(np.zeros(Y.shape[1]))
     changes = [np.clip(np.nan_to_num(rate(row) - rest), -HUGE, HUGE) for row in Y]

@@ -1,5 +1,6 @@
 """Ways to learn: from velocity errors to estimates of the robots' parameters."""
 
+from .composite import Composite
 from .gradient import Gradient, chosen
 from .leakage import EModification, Leakage, Sigma, Switching
 from .natural import Natural
@@ -11,6 +12,7 @@ __all__ = [
     "Ball",
     "BoundAdaptation",
     "Box",
+    "Composite",
     "EModification",
     "Gradient",
     "Leakage",

@@ -10,13 +10,21 @@ that returns an object with the methods of `BoundAdaptation`; nothing else has t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
 from ...coupling.cell import Cell
+from ...errors import InputError
+
+Momentum = tuple[np.ndarray, np.ndarray]
+"""Y_p and Y_h, (n, nv, P) each, of p = M v = Y_p theta and p' = tau - Y_h theta, see `momentum_of_all`."""
+
+
+def _unknown() -> Momentum:
+    raise InputError("expected the regressors of momentum, found none", subject="momentum")
 
 
 @dataclass(slots=True)
@@ -31,6 +39,7 @@ class Seen:
         regressor: Y, (n, nv, P); not in generated code.
         tau: torque that the controller asks for, (n, nv), N·m.
         applied: what the limits that it knows leave of it, (n, nv), N·m.
+        momentum: gives the regressors of momentum; a function, because they take time and few ask for them.
     """
 
     q: np.ndarray
@@ -42,6 +51,7 @@ class Seen:
     regressor: Any
     tau: np.ndarray
     applied: np.ndarray
+    momentum: Callable[[], Momentum] = _unknown
 
 
 class BoundAdaptation(Protocol):
