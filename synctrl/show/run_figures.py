@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from io import BytesIO
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..checks import finite_number
+from ..checks import choice, finite_number
 from ..errors import InputError, SynctrlError
 from ..simulation.result import Result
-from ..simulation.views import FIGURES, find_figure
 from .legends import columns_that_fit, fitted, legend, legend_rows, plain
 from .panels import GAP, LEFT, LEGEND, RIGHT, TITLE, WIDTH, stacked_panels
-from .plots import columns_by_unit, draw_coordinate, save, shade_disturbances, style, titled
+from .plots import (
+    columns_by_unit,
+    draw_coordinate,
+    save,
+    shade_disturbances,
+    style,
+    sync_errors,
+    titled,
+    tracking_errors,
+)
 from .runs import check_run
 from .style import DESIRED, PALETTE, line_style, robot_color
 
@@ -172,6 +181,16 @@ def _near(tau: np.ndarray, limit: float | None) -> tuple[float, ...]:
     return tuple(sign * limit for sign in (1, -1) if (sign * tau).max() > NEAR * limit)
 
 
+#: the figures that have a name, in the order in which they are shown
+FIGURES: Mapping[str, Callable[..., Figure]] = MappingProxyType(
+    {
+        "tracking_error": tracking_errors,
+        "sync_error": sync_errors,
+        "torque": torques,
+        "path": paths,
+        "estimates": estimates,
+    }
+)
 #: the narrowest figure in which all words have their place, inches
 NARROWEST = 3.0
 
@@ -230,7 +249,7 @@ def gallery(result: Result, *names: str, width: float = WIDTH) -> Gallery:
     found = Gallery(str(result.info["title"]))
     for name in names or FIGURES:
         try:
-            found[name] = find_figure(name)(result, width=width)
+            found[name] = FIGURES[choice("figure", name, tuple(FIGURES))](result, width=width)
         except SynctrlError as error:
             if names or (len(found.missing) + 1 == len(FIGURES)):
                 raise

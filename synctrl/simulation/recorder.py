@@ -25,8 +25,7 @@ from .closed_loop import ClosedLoop, State
 from .limits import APPLIED, DampingLog, applied_output, limit_report, saturation_report
 from .memory import check_fits
 from .plant import Output
-from .result import LAYOUT, Result
-from .result_units import array_unit
+from .result import LAYOUT, Result, array_unit
 
 
 class Account(NamedTuple):
