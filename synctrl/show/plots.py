@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,6 +22,7 @@ from ..files import whole_file
 from ..renamed import names_elsewhere
 from ..simulation.result import Result
 from .legends import (
+    SIZE,
     axis_handles,
     disturbance_handles,
     disturbance_windows,
@@ -43,34 +45,7 @@ if TYPE_CHECKING:
 
 #: of titles and of labels of axes, points
 TITLE_SIZE, LABEL_SIZE = 10, 9
-_STYLE: Any = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9,
-    "axes.titlesize": TITLE_SIZE,
-    "axes.titley": 1.0,
-    "axes.formatter.limits": (-3, 5),
-    "axes.formatter.useoffset": False,
-    "axes.labelsize": LABEL_SIZE,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": "#e3e6ea",
-    "grid.linewidth": 0.7,
-    "axes.edgecolor": "#8a929c",
-    "xtick.color": "#4a525c",
-    "ytick.color": "#4a525c",
-    "lines.linewidth": 1.4,
-    "lines.solid_capstyle": "round",
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "figure.facecolor": "white",
-    "svg.hashsalt": "synctrl",
-    "svg.fonttype": "path",
-    "path.simplify": True,
-    "path.simplify_threshold": 0.2,
-}
-
+_SIZES: Any = {"axes.titlesize": TITLE_SIZE, "axes.labelsize": LABEL_SIZE, "legend.fontsize": SIZE}
 #: the next levels take twice the time and more for files that are a few kB smaller
 _PNG = {"compress_level": 2}
 
@@ -85,11 +60,19 @@ def style() -> Iterator[None]:
 
     Threads draw one after another, for what matplotlib looks up holds for the whole process.
     """
-    from matplotlib import rc_context, rcParamsDefault
+    from matplotlib import rc_context
 
-    default: Any = {k: v for k, v in rcParamsDefault.items() if k != "backend"}
-    with _drawing, rc_context({**default, **_STYLE}):
+    with _drawing, rc_context({**_look(), **_SIZES}):
         yield
+
+
+@cache
+def _look() -> Any:
+    """The package's own settings, and matplotlib's own for all else."""
+    from matplotlib import rc_params_from_file, rcParamsDefault
+
+    ours = rc_params_from_file(Path(__file__).with_name("figures.mplstyle"), use_default_template=False)
+    return {**{k: v for k, v in rcParamsDefault.items() if k != "backend"}, **ours}
 
 
 def new_figure(
