@@ -21,20 +21,8 @@ from ..errors import InputError, ResultError
 from ..files import whole_file
 from ..renamed import names_elsewhere
 from ..simulation.result import Result
-from .legends import (
-    SIZE,
-    axis_handles,
-    disturbance_handles,
-    disturbance_windows,
-    legend,
-    legend_rows,
-    line_widths,
-    plain,
-    row_color,
-    row_handles,
-    shortened,
-    text_width,
-)
+from . import legends
+from .legends import plain
 from .panels import DPI, GAP, LEFT, LEGEND, RIGHT, TITLE, WIDTH, stacked_panels
 from .runs import check_run
 from .style import ACCENT, DESIRED, display, line_style, robot_color
@@ -45,7 +33,7 @@ if TYPE_CHECKING:
 
 #: of titles and of labels of axes, points
 TITLE_SIZE, LABEL_SIZE = 10, 9
-_SIZES: Any = {"axes.titlesize": TITLE_SIZE, "axes.labelsize": LABEL_SIZE, "legend.fontsize": SIZE}
+_SIZES: Any = {"axes.titlesize": TITLE_SIZE, "axes.labelsize": LABEL_SIZE, "legend.fontsize": legends.SIZE}
 #: the next levels take twice the time and more for files that are a few kB smaller
 _PNG = {"compress_level": 2}
 
@@ -131,10 +119,10 @@ def joint_trajectories(result: Result, robot: int, *, width: float = WIDTH) -> F
         figure, panels = stacked_panels([COORDINATE] * len(names), above, width)
         for k, panel in enumerate(panels):
             unit = draw_coordinate(panel, result, [robot], k)
-            room = 72 * COORDINATE - text_width(f", {unit}", LABEL_SIZE)
-            panel.set_ylabel(f"{shortened(plain(names[k]), room, LABEL_SIZE)}, {unit}")
+            room = 72 * COORDINATE - legends.text_width(f", {unit}", LABEL_SIZE)
+            panel.set_ylabel(f"{legends.shortened(plain(names[k]), room, LABEL_SIZE)}, {unit}")
         panels[0].set_title(titled(result.names[robot], width), loc="left")
-        legend(figure, panels[0].get_lines())
+        legends.legend(figure, panels[0].get_lines())
     return figure
 
 
@@ -191,15 +179,16 @@ class _Part(NamedTuple):
 
 def _errors(result: Result, kind: str, what: str, limits: tuple[float, float] | None, width: float) -> Figure:
     parts = _parts(result, kind, limits)
-    handles = [*row_handles(result, kind), *axis_handles(result), *disturbance_handles(result)]
+    handles = [*legends.row_handles(result, kind), *legends.axis_handles(result)]
+    handles += legends.disturbance_handles(result)
     with style():
         room = [GAP if part.times == 1 else TITLE for part in parts]
-        above = [LEGEND * legend_rows(handles, width) + GAP, *room[1:]]
+        above = [LEGEND * legends.legend_rows(handles, width) + GAP, *room[1:]]
         heights = [PANEL if part.times == 1 else MAGNIFIED for part in parts]
         figure, panels = stacked_panels(heights, above, width)
         for panel, part in zip(panels, parts, strict=True):
             _draw_errors(panel, result, kind, what, part)
-        legend(figure, handles)
+        legends.legend(figure, handles)
     return figure
 
 
@@ -226,8 +215,8 @@ def _draw_errors(panel: Axes, result: Result, kind: str, what: str, part: _Part)
     e = factor * getattr(result, kind)
     panel.axhline(0.0, color="#8a929c", linewidth=0.7, zorder=1)
     for a in part.columns:
-        for k, width in enumerate(line_widths(e.shape[1])):
-            color = row_color(result, kind, k)
+        for k, width in enumerate(legends.line_widths(e.shape[1])):
+            color = legends.row_color(result, kind, k)
             panel.plot(result.t, e[:, k, a], ls=line_style(a), color=color, linewidth=width, zorder=2 + k)
     shade_disturbances(panel, result)
     panel.set_ylim(factor * part.low, factor * part.high)
@@ -239,7 +228,7 @@ def _draw_errors(panel: Axes, result: Result, kind: str, what: str, part: _Part)
 def draw_coordinate(panel: Axes, result: Result, robots: Sequence[int], k: int) -> str:
     """Actual and desired values of a coordinate of some robots; returns the unit in which they are drawn."""
     unit, factor = display(result.units("x")[robots[0]][k])
-    for i, width in zip(robots, line_widths(len(robots)), strict=True):
+    for i, width in zip(robots, legends.line_widths(len(robots)), strict=True):
         actual, desired = factor * result.x[:, i, k], factor * result.x_desired[:, i, k]
         panel.plot(result.t, actual, color=robot_color(i), linewidth=width, label="actual")
         panel.plot(result.t, desired, "-.", color=DESIRED, linewidth=1.1, label="desired")
@@ -248,13 +237,13 @@ def draw_coordinate(panel: Axes, result: Result, robots: Sequence[int], k: int) 
 
 def shade_disturbances(panel: Axes, result: Result) -> None:
     """Shade the windows in which torques act from outside."""
-    for window in disturbance_windows(result):
+    for window in legends.disturbance_windows(result):
         panel.axvspan(window["start"], window["stop"], color=ACCENT, alpha=0.12, linewidth=0)
 
 
 def titled(name: str, width: float) -> str:
     """A name as the title of the panels of a figure, `width` inches wide."""
-    return shortened(plain(name), 72 * (width - LEFT - RIGHT), TITLE_SIZE)
+    return legends.shortened(plain(name), 72 * (width - LEFT - RIGHT), TITLE_SIZE)
 
 
 def _read_limits(limits: tuple[float, float]) -> tuple[float, float]:
