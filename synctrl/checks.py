@@ -41,7 +41,7 @@ def numbers(name: str, value: ArrayLike, shape: tuple[int | None, ...] | None = 
             raise TypeError
         array = np.array(value, dtype=float)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"expected numbers, found {value!r}", subject=name) from error
+        raise InputError(f"expected numbers, found {value!r}", subject=name, found=value) from error
     if shape is not None and not _fits(array.shape, shape):
         expected, found = _show(shape), _show(array.shape)
         raise InputError(f"expected shape {expected}, found {found}", subject=name, found=array.shape)
@@ -65,14 +65,14 @@ def symmetric_matrix(name: str, value: ArrayLike, size: int) -> np.ndarray:
     """`value` as a read-only symmetric float array, (size, size)."""
     array = finite_array(name, value, (size, size))
     if not np.allclose(array, array.T, rtol=1e-12, atol=0):
-        raise InputError(f"expected a symmetric matrix, found {array.tolist()}", subject=name)
+        raise InputError(f"expected a symmetric matrix, found {array.tolist()}", subject=name, found=array)
     return array
 
 
 def finite_number(name: str, value: object) -> float:
     """`value` as a finite float."""
     if isinstance(value, (bool, np.bool_)):
-        raise InputError(f"expected a number, found {value!r}", subject=name)
+        raise InputError(f"expected a number, found {value!r}", subject=name, found=value)
     return float(finite_array(name, value, ()))  # type: ignore[arg-type]
 
 
@@ -116,14 +116,15 @@ def window(name: str, start: object, stop: object) -> tuple[float, float]:
     first = finite_number(f"{name}, start", start)
     last = np.inf if stop is None else finite_number(f"{name}, stop", stop)
     if not 0 <= first < last:
-        raise InputError(f"expected 0 <= start < stop, found {first:g} and {last:g} s", subject=name)
+        words = f"expected 0 <= start < stop, found {first:g} and {last:g} s"
+        raise InputError(words, subject=name, found=(first, last))
     return first, last
 
 
 def boolean(name: str, value: object) -> bool:
     """`value` if it is True or False."""
     if not isinstance(value, (bool, np.bool_)):
-        raise InputError(f"expected True or False, found {value!r}", subject=name)
+        raise InputError(f"expected True or False, found {value!r}", subject=name, found=value)
     return bool(value)
 
 
@@ -134,7 +135,8 @@ def instance(name: str, value: object, kind: type | tuple[type, ...], expected: 
         InputError: `value` is no instance of `kind`.
     """
     if not isinstance(value, kind):
-        raise InputError(f"expected {expected}, found {type(value).__name__}", subject=name)
+        found = type(value).__name__
+        raise InputError(f"expected {expected}, found {found}", subject=name, found=found)
 
 
 def offers(name: str, value: Any, parts: tuple[str, ...], expected: str) -> None:
@@ -144,7 +146,7 @@ def offers(name: str, value: Any, parts: tuple[str, ...], expected: str) -> None
         InputError: `value` is a class, or lacks one.
     """
     if isinstance(value, type) or not all(hasattr(value, part) for part in parts):
-        raise InputError(f"expected {expected}, found {value!r}", subject=name)
+        raise InputError(f"expected {expected}, found {value!r}", subject=name, found=value)
 
 
 def shaped(name: str, value: Any, shape: tuple[int, ...]) -> None:
@@ -161,7 +163,8 @@ def shaped(name: str, value: Any, shape: tuple[int, ...]) -> None:
 def choice(name: str, value: object, known: tuple[str, ...]) -> str:
     """`value` if it is one of the known words."""
     if not isinstance(value, str) or value not in known:
-        raise InputError(f"expected one of {', '.join(map(repr, known))}, found {value!r}", subject=name)
+        expected = f"expected one of {', '.join(map(repr, known))}"
+        raise InputError(f"{expected}, found {value!r}", subject=name, found=value)
     return str(value)
 
 
@@ -170,9 +173,8 @@ def label(name: str, value: object) -> str:
     instance(name, value, str, "a text")
     line = str(value)
     if len(line) > LONGEST_LABEL or unprintable(line):
-        raise InputError(
-            f"expected a text of one line, up to {LONGEST_LABEL} characters, found {line!a:.80}", subject=name
-        )
+        expected = f"expected a text of one line, up to {LONGEST_LABEL} characters"
+        raise InputError(f"{expected}, found {line!a:.80}", subject=name, found=line)
     return line
 
 

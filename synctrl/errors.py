@@ -15,6 +15,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Self
 
+import numpy as np
+
 
 class Portable(BaseException):
     """An exception that can be copied and sent to another process, with its message and all its attributes.
@@ -37,7 +39,8 @@ class SynctrlError(Portable, Exception):
     Attributes:
         subject: the argument or part at fault, spelled and counted as in the API, for example "dt", "Lambda"
             or "robot 2, trajectory"; None if the error is not about one part alone.
-        found: what was found in its place, if that is a plain value; else None.
+        found: what was found in its place, as plain data: a number, a text, or a tuple of them; of anything
+            else the name of its type. None if that is not said.
         file: the file or folder concerned, or None.
         line: of that file, counted from 1, or None.
         result: a `Result` with what a run had computed until then; None if the error did not stop a run.
@@ -61,14 +64,15 @@ class SynctrlError(Portable, Exception):
         line: int | None = None,
     ):
         file = None if file is None else str(file)
-        data = {"subject": subject, "found": found, "file": file, "line": line or None}
+        data = {"subject": subject, "found": plain(found), "file": file, "line": line or None}
         vars(self).update({name: value for name, value in data.items() if value is not None})
         self.problem = message
         super().__init__(self._whole(message))
 
     def about(self, subject: str | None = None, **data: Any) -> Self:
         """This error with more data, for one whose message says in words of its own what it is about."""
-        vars(self).update(subject=subject, **data)
+        found = plain(data.pop("found", self.found))
+        vars(self).update(subject=subject, found=found, **data)
         return self
 
     def _whole(self, message: str) -> str:
@@ -248,7 +252,7 @@ def failed(what: str, t: float, error: Exception, robot: int | None = None) -> S
         robot: index of the robot concerned, counted from 0, or None.
     """
     message = f"{what} failed at t = {t:g} s with {type(error).__name__}: {error}"
-    return SimulationError(message, time=t, robot=robot).about(what)
+    return SimulationError(message, time=t, robot=robot).about(what, found=type(error).__name__)
 
 
 def _remade(kind: type[BaseException], args: tuple) -> BaseException:
@@ -257,6 +261,18 @@ def _remade(kind: type[BaseException], args: tuple) -> BaseException:
     builtin = next(base for base in kind.__mro__ if base.__module__ == "builtins")
     builtin.__init__(error, *args)  # type: ignore[misc]
     return error
+
+
+def plain(value: Any, depth: int = 8) -> Any:
+    """`value` as data that hold nothing of the caller's: a number, a text, None, or a tuple of them.
+
+    Arrays and lists become tuples. Of anything else, and below this depth, only the name of its type is left.
+    """
+    if isinstance(value, (np.generic, np.ndarray)):
+        value = value.tolist()
+    if isinstance(value, (list, tuple)) and depth:
+        return tuple(plain(each, depth - 1) for each in value)
+    return value if value is None or isinstance(value, (int, float, complex, str)) else type(value).__name__
 
 
 def near(name: str, known: Iterable[str]) -> str:

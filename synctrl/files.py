@@ -81,7 +81,8 @@ def reported(doing: str, path: str | Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise ResultError(f"cannot {doing} '{path}': {error.strerror or error}", file=path) from error
+        reason = error.strerror or str(error)
+        raise ResultError(f"cannot {doing} '{path}': {reason}", file=path, found=reason) from error
 
 
 def _target(path: str | Path) -> Path:

@@ -140,11 +140,11 @@ def test_every_robot_stands_with_its_desired_path(planar, pair):
 
 
 def test_runs_that_cannot_be_shown_are_refused(planar, pair):
-    with refused(InputError, "result", found=["joint1", "joint2", "joint3"]):
+    with refused(InputError, "result", found=("joint1", "joint2", "joint3")):
         planar_scene(pair)
-    with refused(InputError, "result"):
+    with refused(InputError, "result", found=(4, "m")):
         payload_pair_scene(planar)
-    with pytest.raises(InputError, match="expected the one that made this result"):
+    with refused(InputError, "experiment", found="no experiment"):
         planar_scene(replace(planar, experiment=None))
     with refused(InputError, "fps"):
         planar_scene(planar, fps=0)

@@ -225,5 +225,5 @@ def test_a_member_may_name_what_it_adapts() -> None:
     members = [replace(m, parameters="base", theta_hat0=None) for m in experiment.cell.members]
     cell = Cell(members, experiment.cell.coupling)
     np.testing.assert_array_equal(cell.theta[0], BaseParameters(members[0].robot).theta)
-    with pytest.raises(InputError, match="'full', 'base'"):
+    with refused(InputError, "robot 1, parameters", found="bases"):
         Cell([replace(m, parameters="bases") for m in members], experiment.cell.coupling)

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 from cells import SMALL_GAINS, small_cell
 from machines import random_robot
+from refusals import refused
 from seams.degrees import Degrees
 from sliders import SCARA, load, pair, urdf
 from test_animation import ends, node
@@ -143,9 +144,8 @@ def test_a_robot_that_cannot_be_made_again_is_named_and_its_experiment_taken(tmp
     members = [Member(robot, Hold([0.1, 1.0])) for robot in robots]
     experiment = Experiment(Cell(members, Coupling.pair(), JointSpace()), SMALL_GAINS, 0.02)
     loaded = reloaded(experiment.simulate(), tmp_path)
-    with pytest.raises(InputError, match=r"robot 1 \('mine 0'\)") as caught:
+    with refused(InputError, "experiment", found="robot 1"):
         scene_of(loaded)
-    assert caught.value.subject == "experiment"
     assert scene_of(loaded, experiment).nodes
 
 
@@ -153,9 +153,8 @@ def test_a_description_of_another_robot_or_no_description_is_refused_by_name(sta
     robots = [{**robot, "joints": ["a", "b"]} for robot in star.info["robots"]]
     for wrong in (robots, [{**robot, "urdf": "<robot"} for robot in robots]):
         run = replace(star, info={**star.info, "robots": wrong}, experiment=None)
-        with pytest.raises(InputError, match="cannot be made again") as caught:
+        with refused(InputError, "experiment", found="robot 1"):
             scene_of(run)
-        assert caught.value.subject == "experiment"
 
 
 def test_a_notebook_shows_the_scene_or_says_that_it_is_too_large(star, monkeypatch):

@@ -207,3 +207,17 @@ def test_a_subclass_with_an_evaluate_of_its_own_is_the_one_that_runs() -> None:
     loop = ClosedLoop(Limp(cell, SMALL_GAINS), Plant(cell))
     found = loop.evaluate(cell.references(np.zeros(1))[0], loop.initial_state(), np.zeros((2, 2)))[1]
     assert (found.tau == 0).all()
+
+
+def test_gains_of_many_parameters_are_shown_in_one_short_line_with_all_their_names():
+    long, ragged = np.arange(1.0, 601.0), [np.arange(1.0, 601.0), np.arange(1.0, 301.0)]
+    for Gamma in (long, np.tile(long, (9, 1)), ragged):
+        text = repr(Gains(**GAINS, K_r=2.0, Gamma=Gamma))
+        assert len(text) < 400 and "\n" not in text
+        assert all(f"{name}=" in text for name in ("Lambda", "beta", "K_r", "K_eps", "Gamma"))
+        assert "1., " in text and ", 600." in text and "..." in text
+
+
+def test_few_gains_are_shown_whole():
+    assert "K_r=[1., 2., 3.]" in repr(Gains(**GAINS, K_r=(1, 2, 3)))
+    assert "Gamma=None" in repr(Gains(**GAINS, K_r=1))

@@ -26,24 +26,24 @@ from synctrl.errors import CouplingError, InputError, RobotError, SynctrlError
 ARM = load_robot("planar2r")
 
 REFUSALS = {
-    "no numbers": (checks.finite_array, ("dt", "1"), None),
+    "no numbers": (checks.finite_array, ("dt", "1"), "1"),
     "another shape": (checks.finite_array, ("dt", [1.0, 2.0], (3,)), (2,)),
     "not finite": (checks.finite_array, ("dt", [1.0, np.inf]), np.inf),
     "not one per joint": (checks.per_joint, ("dt", [1.0, 2.0], 3), (2,)),
-    "not symmetric": (checks.symmetric_matrix, ("dt", [[1.0, 2.0], [0.0, 1.0]], 2), None),
-    "no number": (checks.finite_number, ("dt", True), None),
+    "not symmetric": (checks.symmetric_matrix, ("dt", [[1.0, 2.0], [0.0, 1.0]], 2), ((1.0, 2.0), (0.0, 1.0))),
+    "no number": (checks.finite_number, ("dt", True), True),
     "not above zero": (checks.positive_number, ("dt", -0.5), -0.5),
     "below zero": (checks.non_negative_number, ("dt", -0.5), -0.5),
     "too few": (checks.count, ("dt", 2, 3), 2),
     "no index": (checks.index, ("dt", 2, 2), 2),
-    "no later end": (checks.window, ("dt", 0.2, 0.1), None),
-    "no truth value": (checks.boolean, ("dt", 1), None),
-    "another type": (checks.instance, ("dt", 1, str, "a text"), None),
-    "no such part": (checks.offers, ("dt", 1, ("bind",), "a part"), None),
-    "a class for an object": (checks.offers, ("dt", str, ("split",), "a text"), None),
+    "no later end": (checks.window, ("dt", 0.2, 0.1), (0.2, 0.1)),
+    "no truth value": (checks.boolean, ("dt", 1), 1),
+    "another type": (checks.instance, ("dt", 1, str, "a text"), "int"),
+    "no such part": (checks.offers, ("dt", 1, ("bind",), "a part"), 1),
+    "a class for an object": (checks.offers, ("dt", str, ("split",), "a text"), "type"),
     "an array of another shape": (checks.shaped, ("dt", [1.0], (2,)), (1,)),
-    "unknown word": (checks.choice, ("dt", "c", ("a", "b")), None),
-    "two lines": (checks.label, ("dt", "a\nb"), None),
+    "unknown word": (checks.choice, ("dt", "c", ("a", "b")), "c"),
+    "two lines": (checks.label, ("dt", "a\nb"), "a\nb"),
 }
 
 #: a refusal for every argument that parts of a cell are made of
@@ -78,6 +78,25 @@ def test_a_check_says_which_argument_is_at_fault_and_begins_its_message_with_it(
     with refused(InputError, "dt", found=found) as caught:
         check(*arguments)
     assert str(caught.value).startswith("dt: expected ")
+
+
+def test_what_was_found_is_plain_whatever_it_was():
+    class Own:
+        pass
+
+    endless: list = []
+    endless.append(endless)
+    for value, found in {
+        "an object of the caller's": (Own(), "Own"),
+        "a class": (Own, "type"),
+        "numbers of numpy": ([np.float64(0.5), np.int64(2)], (0.5, 2)),
+        "an array": (np.eye(2), ((1.0, 0.0), (0.0, 1.0))),
+        "objects in an array": (np.array([Own(), 1]), ("Own", 1)),
+        "objects in a list": (["a", [Own()], None], ("a", ("Own",), None)),
+    }.values():
+        for error in (InputError("no", found=value), InputError("no").about("dt", found=value)):
+            assert repr(error.found) == repr(found)
+    assert "list" in repr(InputError("no", found=endless).found)
 
 
 @pytest.mark.parametrize("whole", [3, np.int64(3), np.uint8(3)])

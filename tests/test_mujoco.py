@@ -225,5 +225,5 @@ def test_an_unknown_plant_and_a_compiled_one_are_refused() -> None:
     experiment = pair("planar2r")
     with refused(InputError, "plant"):
         experiment.simulate(0.01, plant="bullet")
-    with pytest.raises(InputError, match=r"engine='compiled' does not have plant='mujoco'"):
+    with refused(InputError, "plant", found="plant='mujoco'"):
         experiment.simulate(0.01, plant="mujoco", engine="compiled")

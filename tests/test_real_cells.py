@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import open_page
+from refusals import refused
 
 from synctrl import Experiment, Result
 from synctrl.analysis.certify import certify
@@ -135,10 +136,10 @@ def test_colours_go_from_grey_to_red_with_the_synchronization_error():
 
 def test_scenes_of_other_runs_are_refused(tmp_path):
     loaded = Result.load(run("four Pandas").save(tmp_path / "run.npz"))
-    with pytest.raises(InputError, match="still has its experiment"):
+    with refused(InputError, "experiment", found="no experiment"):
         formation_scene(loaded)
-    with pytest.raises(InputError, match="Attached"):
+    with refused(InputError, "result", found=()):
         payload_scene(run("four Pandas"), PAYLOAD)
     other = a460_pair().simulate(0.02)
-    with pytest.raises(InputError, match="along x, y and z, found joint1"):
+    with refused(InputError, "result", found=("joint1", "joint2", "joint3")):
         formation_scene(other)

@@ -23,6 +23,7 @@ from browser import open_page
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from refusals import refused
 
 from synctrl.errors import InputError, RobotError, RobotWarning
 from synctrl.show import scene as scene_module
@@ -328,7 +329,7 @@ def test_a_shape_without_bounds_is_refused_by_name() -> None:
     model, visual = planar()
     plane = coal.Halfspace(np.array([0.0, 0, 1]), 0.0)
     visual.addGeometryObject(pin.GeometryObject("floor", 0, 0, pin.SE3.Identity(), plane))
-    with pytest.raises(RobotError, match=r"'floor' is a Halfspace.*expected a box"):
+    with refused(RobotError, "visual 'floor'", found="Halfspace"):
         Scene().add_robot("robot", model, visual, pin.neutral(model))
 
 
@@ -567,7 +568,7 @@ def test_writing_needs_neither_a_server_nor_the_packages_that_talk_to_one(tmp_pa
 
 
 def test_a_folder_cannot_be_written_over(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"animation .* cannot be written"):
+    with refused(InputError, file=str(tmp_path)):
         Scene().write(tmp_path)
 
 
@@ -579,7 +580,7 @@ def test_a_notebook_gets_the_page_in_a_closed_frame(monkeypatch: pytest.MonkeyPa
     assert attributes["srcdoc"] == scene.page()
     assert "allow-same-origin" not in str(attributes["sandbox"])
     monkeypatch.setattr(scene_module, "NOTEBOOK_LIMIT", 1000)
-    with pytest.raises(InputError, match=r"0\.\d MB.*use write"):
+    with refused(InputError, found=len(scene.page())):
         scene.html()
 
 
@@ -589,39 +590,38 @@ POINTS = np.zeros((3, 3))
 
 
 @pytest.mark.parametrize(
-    ("act", "said"),
+    ("act", "subject", "found"),
     [
-        (lambda s: Scene(fps=0), "fps: expected a number above 0"),
-        (lambda s: Scene(title=None), "title: expected text, found NoneType"),
-        (lambda s: s.add_robot("r", *planar(), np.zeros((5, 3))), r"r: q: expected shape \(2,\) or \(T, 2\)"),
-        (lambda s: s.add_robot("r", *planar(), np.full((5, 2), np.nan)), "r: q: expected finite numbers"),
-        (lambda s: s.add_robot("r", *planar(), np.zeros((4, 2))), "expected 3 frames as before, found 4"),
-        (lambda s: s.add_sphere("ball", 0.1, POINTS, "#ff0000"), "already has a 'sphere ball'"),
-        (lambda s: s.add_sphere(7, 0.1, POINTS, "#ff0000"), "name: expected text, found int"),
-        (lambda s: s.add_sphere("b", -1, POINTS, "#ff0000"), "b: radius: expected no length below 0"),
-        (lambda s: s.add_sphere("b", 1, np.zeros((0, 3)), "#ff0000"), "b: position: expected shape"),
-        (lambda s: s.add_sphere("b", 1, POINTS, "rouge"), "b: color: expected #rrggbb.*found 'rouge'"),
-        (lambda s: s.add_sphere("b", 1, POINTS, "#gg0000"), "b: color: expected #rrggbb"),
-        (lambda s: s.add_sphere("b", 1, POINTS, (1, 0)), r"b: color: expected .*three or four.*\[1"),
-        (lambda s: s.add_sphere("b", 1, POINTS, (255, 0, 0)), r"numbers in \[0, 1\], found 0 to 255"),
-        (lambda s: s.add_sphere("b", 1, POINTS, 2 * np.ones((3, 3))), r"numbers in \[0, 1\], found 2 to 2"),
-        (lambda s: s.add_box("b", (1, 0, 1), POINTS, "#ff0000"), "b: size: expected three lengths above 0"),
-        (
-            lambda s: s.add_box("b", (1, 1, 1), POINTS, "#ff0000", np.zeros(4)),
-            "quaternion: expected a rotation",
-        ),
-        (lambda s: s.add_cylinder("b", 1, -1, POINTS, "#ff0000"), "b: length: expected a number above 0"),
-        (lambda s: s.add_segment("b", POINTS, np.zeros((5, 3)), 1, "#ff0000"), "b: end: expected 3 frames"),
-        (lambda s: s.add_line("b", np.zeros((0, 3)), "#ff0000"), "b: points: expected at least one"),
-        (lambda s: s.add_line("b", POINTS, "#ff0000", width=0), "b: width: expected a number above 0"),
-        (lambda s: s.camera((1, 1, 1), (1, 1, 1)), "camera: position and target are the same"),
-        (lambda s: s.html(height=-1), "height: expected a number above 0"),
+        (lambda s: Scene(fps=0), "fps", 0),
+        (lambda s: Scene(title=None), "title", "NoneType"),
+        (lambda s: s.add_robot("r", *planar(), np.zeros((5, 3))), "r: q", (5, 3)),
+        (lambda s: s.add_robot("r", *planar(), np.full((5, 2), np.inf)), "r: q", np.inf),
+        (lambda s: s.add_robot("r", *planar(), np.zeros((4, 2))), "r: q", 4),
+        (lambda s: s.add_sphere("ball", 0.1, POINTS, "#ff0000"), None, "sphere ball"),
+        (lambda s: s.add_sphere(7, 0.1, POINTS, "#ff0000"), "name", "int"),
+        (lambda s: s.add_sphere("b", -1, POINTS, "#ff0000"), "b: radius", -1),
+        (lambda s: s.add_sphere("b", 1, np.zeros((0, 3)), "#ff0000"), "b: position", (0, 3)),
+        (lambda s: s.add_sphere("b", 1, POINTS, "rouge"), "b: color", "rouge"),
+        (lambda s: s.add_sphere("b", 1, POINTS, "#gg0000"), "b: color", "#gg0000"),
+        (lambda s: s.add_sphere("b", 1, POINTS, (1, 0)), "b: color", (1, 0)),
+        (lambda s: s.add_sphere("b", 1, POINTS, (255, 0, 0)), "b: color", (0, 255)),
+        (lambda s: s.add_sphere("b", 1, POINTS, 2 * np.ones((3, 3))), "b: color", (2, 2)),
+        (lambda s: s.add_box("b", (1, 0, 1), POINTS, "#ff0000"), "b: size", (1, 0, 1)),
+        (lambda s: s.add_box("b", (1, 1, 1), POINTS, "#ff0000", np.zeros(4)), "b: quaternion", 0),
+        (lambda s: s.add_cylinder("b", 1, -1, POINTS, "#ff0000"), "b: length", -1),
+        (lambda s: s.add_segment("b", POINTS, np.zeros((5, 3)), 1, "#ff0000"), "b: end", 5),
+        (lambda s: s.add_line("b", np.zeros((0, 3)), "#ff0000"), "b: points", 0),
+        (lambda s: s.add_line("b", POINTS, "#ff0000", width=0), "b: width", 0),
+        (lambda s: s.camera((1, 1, 1), (1, 1, 1)), "camera", (1, 1, 1)),
+        (lambda s: s.html(height=-1), "height", -1),
     ],
 )
-def test_wrong_input_is_refused_with_what_was_found_and_what_is_expected(act: Any, said: str) -> None:
+def test_wrong_input_is_refused_with_what_is_wrong_and_what_was_found(
+    act: Any, subject: str | None, found: Any
+) -> None:
     scene = Scene()
     scene.add_sphere("ball", 0.1, np.eye(3), "#ff0000")
-    with pytest.raises(InputError, match=said):
+    with refused(InputError, subject, found=found):
         act(scene)
 
 

@@ -35,6 +35,7 @@ from synctrl.control.learning_scale import learning_scale  # noqa: E402
 from synctrl.errors import GainWarning, InputError, UnreachableError  # noqa: E402
 from synctrl.experiments import a460_pair, panda_four, planar_four, ur5_payload  # noqa: E402
 from synctrl.robots.parameters import LinearParameters  # noqa: E402
+from synctrl.robots.payload import Load, carrying  # noqa: E402
 from synctrl.robots.pseudo_inertia import pseudo_inertia, pullback  # noqa: E402
 
 UR5, PLANAR = load_robot("ur5"), load_robot("planar2r")
@@ -123,6 +124,21 @@ def test_a_bandwidth_that_a_robot_cannot_have_is_said():
 def test_a_period_that_is_too_long_for_the_bandwidth_is_said():
     with pytest.warns(GainWarning, match=r"Lambda gives"):
         Gains.suggest(a460_pair().cell, OMEGA, period=0.1)
+
+
+def test_damping_that_the_period_cuts_below_what_bears_the_load_is_said_with_the_sag():
+    pair, load = cell(task("ur3", "joint"), 2), 2.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        Gains.suggest(pair, OMEGA, payload=load)
+    with pytest.warns(GainWarning, match=r"0.1 rad \(m\) of sag .*: arm 0, joint 4: ") as told:
+        gains = Gains.suggest(pair, OMEGA, period=4e-3, payload=load)
+    robot, states = pair.robots[0], excursion(pair, 5.0)
+    carried = carrying(robot, Load(load))
+    known, whole = ([arm.gravity(q)[3] for q in states.q[:, 0]] for arm in (robot, carried))
+    missing = np.max(0.3 * np.abs(known) + np.abs(np.subtract(whole, known)))
+    said = re.search(r"arm 0, joint 4: (\S+) rad", str(told[0].message))
+    assert float(said[1]) == pytest.approx(missing / (gains.K_r[0][3] * gains.Lambda), rel=1e-2)
 
 
 def test_a_start_far_off_the_path_is_said_before_it_breaks_anything():

@@ -254,7 +254,7 @@ def plugged_in(experiment, wrong):
 
 
 def test_a_plant_that_a_factor_plugs_in_is_refused_where_a_single_run_refuses_it():
-    with pytest.raises(InputError, match="its acceleration"):
+    with refused(InputError, "plant OfOneRobot", found=(2,)):
         plugged_in(start(), True).simulate(dt=DT)
     factors = [Factor("wrong", Grid([0, 1]), plugged_in)]
     sweep = Sweep(start(), factors, dt=DT, engine="pinocchio", bands=BANDS)

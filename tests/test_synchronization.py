@@ -274,7 +274,7 @@ def test_functions_outside_the_theorem_are_refused_with_the_reason(f, subject, d
 def test_a_desired_motion_off_the_function_is_refused_with_robot_time_and_amount():
     f = SynchronizationFunction(lambda x, y, t: 2 * x - y, 2, 1)
     late = FunctionTrajectory(lambda t: [max(0.0, t - 3) ** 2], lambda t: [0.0], lambda t: [0.0])
-    with refused(SynchronizationError, "trajectories", time=5.0, found=[8.0]) as caught:
+    with refused(SynchronizationError, "trajectories", time=5.0, found=(8.0,)) as caught:
         f.coupling([late, Hold([0.0])], DURATION)
     assert "robot 1 alone would have to be moved by [-4.0] from [4.0]" in str(caught.value)
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from machines import random_robot, seeds
+from refusals import refused
 from sliders import GANTRY, SCARA, load, pair
 
 from synctrl import CartesianSpace, Cell, Coupling, Disturbance, JointSpace, Member, Result, load_robot
@@ -134,8 +135,9 @@ def test_a_stop_of_a_slide_is_told_in_metres_and_newtons(gantries):
         replace(gantries, disturbances=(push,)).simulate(dt=2e-3)
     assert "1e+12 N accelerates" in str(caught.value) and "m/s²" in str(caught.value)
     fast = [replace(member, v0=np.array([0, 0, 1e4])) for member in gantries.cell.members]
-    with pytest.raises(NonFiniteError, match=r"starts with 1e.04 m/s,"):
+    with refused(NonFiniteError, robot=0, joint=2, cause="start") as caught:
         replace(gantries, cell=Cell(fast, gantries.cell.coupling)).simulate(dt=2e-3)
+    assert "1e+04 m/s," in str(caught.value)
 
 
 def test_a_gain_that_is_too_large_is_told_in_the_unit_of_its_joint(gantries, scaras):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from synctrl import load_robot
 from synctrl.errors import InputError, MissingDependencyError, RobotError, RobotWarning
@@ -53,9 +54,8 @@ def test_an_argument_gets_the_value_that_is_given(value: object, name: str, tmp_
 @needs_xacro
 def test_an_argument_that_is_missing_is_named_with_the_way_to_give_it(tmp_path: Path) -> None:
     file = write(tmp_path / "a.xacro", link("$(arg side)"))
-    with pytest.raises(RobotError, match=r"argument side.*xacro_args=\{'side': \.\.\.\}") as caught:
+    with refused(RobotError, "xacro_args", found="side", file=str(file)):
         expand_xacro(file)
-    assert caught.value.file == str(file)
 
 
 @needs_xacro
@@ -71,7 +71,7 @@ def test_packages_are_found_by_the_name_in_their_manifest(tmp_path: Path) -> Non
 def test_packages_are_found_in_the_folders_that_the_user_names(tmp_path: Path) -> None:
     write(package(tmp_path / "far" / "parts", "parts") / "part.xacro", link("part"))
     file = write(tmp_path / "home" / "a.xacro", '<xacro:include filename="$(find parts)/part.xacro"/>')
-    with pytest.raises(RobotError, match=r"package 'parts' is not found.*package_dirs=\[\.\.\.\]"):
+    with refused(RobotError, "package_dirs", found="parts", file=str(file)):
         expand_xacro(file)
     assert link("part") in expand_xacro(file, package_dirs=[tmp_path / "far"])
 
@@ -112,13 +112,14 @@ def test_a_fault_deep_inside_is_said_with_its_file_and_macro(tmp_path: Path) -> 
     macro = '<xacro:macro name="part" params="n"><link name="${missing}"/></xacro:macro>'
     write(tmp_path / "part.xacro", macro + '<xacro:part n="1"/>')
     file = write(tmp_path / "a.xacro", '<xacro:include filename="part.xacro"/>')
-    with pytest.raises(RobotError, match=r"'missing' is not defined.*part\.xacro, in macro 'part'"):
+    with refused(RobotError, found="NameError", file=str(file)) as caught:
         expand_xacro(file)
+    assert "part.xacro, in macro 'part'" in caught.value.problem  # xacro's own words, with where it stood
 
 
 def test_arguments_that_are_no_plain_values_are_refused(tmp_path: Path) -> None:
     file = write(tmp_path / "a.xacro", link("a"))
-    with pytest.raises(InputError, match="xacro_args"):
+    with refused(InputError, "xacro_args", found="list"):
         expand_xacro(file, {"side": ["left"]})
 
 
@@ -126,7 +127,7 @@ def test_without_the_extra_the_advice_is_to_install_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(xacro_module, "find_spec", lambda name: None)
-    with pytest.raises(MissingDependencyError, match=r"synctrl\[xacro\]"):
+    with refused(MissingDependencyError, found="xacro"):
         expand_xacro(write(tmp_path / "a.xacro", link("a")))
 
 
@@ -164,10 +165,10 @@ def test_expressions_do_reach_python_without_a_fence(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("code", "event"),
     [
-        (f"{BUILTINS}['open']('OUT', 'w')", "may not write"),
-        (f"{BUILTINS}['open']('OUT', 'ab')", "may not write"),
-        (f"{BUILTINS}['open']('HERE', 'r+')", "may not write"),
-        (f"{GLOBALS}['open']('OUT', 65, 511)", "may not write"),
+        (f"{BUILTINS}['open']('OUT', 'w')", "write"),
+        (f"{BUILTINS}['open']('OUT', 'ab')", "write"),
+        (f"{BUILTINS}['open']('HERE', 'r+')", "write"),
+        (f"{GLOBALS}['open']('OUT', 65, 511)", "write"),
         (f"{GLOBALS}['system']('touch OUT')", "os.system"),
         (f"{GLOBALS}['fork']()", "os.fork"),
         (f"{GLOBALS}['posix_spawn']('/bin/touch', ['touch', 'OUT'], dict())", "os.posix_spawn"),
@@ -180,11 +181,11 @@ def test_expressions_do_reach_python_without_a_fence(tmp_path: Path) -> None:
         (f"{BUILTINS}['__import__']('socket')", "import"),
         (f"{BUILTINS}['__import__']('subprocess')", "import"),
         (f"{BUILTINS}['__import__']('ctypes')", "import"),
-        (f"{BUILTINS}['open']('/etc/passwd')", "may not read outside"),
-        (f"{GLOBALS}['listdir']('/etc')", "may not read outside"),
-        ("xacro.load_yaml('/etc/passwd')", "may not read outside"),
-        ("xacro.load_yaml('../outside.yaml')", "may not read outside"),
-        ("xacro.load_yaml('leads_out.yaml')", "may not read outside"),
+        (f"{BUILTINS}['open']('/etc/passwd')", "read outside of its packages"),
+        (f"{GLOBALS}['listdir']('/etc')", "read outside of its packages"),
+        ("xacro.load_yaml('/etc/passwd')", "read outside of its packages"),
+        ("xacro.load_yaml('../outside.yaml')", "read outside of its packages"),
+        ("xacro.load_yaml('leads_out.yaml')", "read outside of its packages"),
         ("(lambda: 0).__code__", "object.__getattr__"),
     ],
 )
@@ -197,7 +198,7 @@ def test_an_expression_can_do_nothing_but_compute(code: str, event: str, tmp_pat
     code = code.replace("OUT", str(out)).replace("HERE", str(home / "a.xacro"))
     file = write(home / "a.xacro", expression(code))
     before = file.read_bytes()
-    with pytest.raises(RobotError, match=event):
+    with refused(RobotError, found=event, file=str(file)):
         expand_xacro(file)
     assert not os.path.lexists(out)
     assert file.read_bytes() == before
@@ -207,7 +208,7 @@ def test_an_expression_can_do_nothing_but_compute(code: str, event: str, tmp_pat
 def test_an_include_reads_nothing_outside_the_package(tmp_path: Path) -> None:
     write(tmp_path / "outside.xacro", link("secret"))
     file = write(tmp_path / "home" / "a.xacro", '<xacro:include filename="../outside.xacro"/>')
-    with pytest.raises(RobotError, match="may not read outside"):
+    with refused(RobotError, found="read outside of its packages"):
         expand_xacro(file)
     package(tmp_path, "whole")  # then the folder above belongs to it
     assert link("secret") in expand_xacro(file)
@@ -217,7 +218,7 @@ def test_an_include_reads_nothing_outside_the_package(tmp_path: Path) -> None:
 def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.xacro")
     file = write(tmp_path / "a.xacro", '<xacro:include filename="pipe.xacro"/>')
-    with pytest.raises(RobotError, match="no regular file"):
+    with refused(RobotError, found="read what is no regular file"):
         expand_xacro(file)
 
 
@@ -242,21 +243,21 @@ def test_the_environment_is_not_shown(tmp_path: Path, monkeypatch: pytest.Monkey
 def test_an_expression_without_end_is_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(xacro_module, "TIME_LIMIT", 1.0)
     file = write(tmp_path / "a.xacro", link("${python.sum(python.range(10**15))}"))
-    with pytest.raises(RobotError, match="within 1 s"):
+    with refused(RobotError, found="no end", file=str(file)):
         expand_xacro(file)
 
 
 @needs_xacro
 @pytest.mark.parametrize(
-    ("body", "reason"),
+    ("body", "kind"),
     [
         (link("${'a' * 10**11}"), "MemoryError"),
-        (link("${'a' * 20000000}"), "at most 10 MB"),
-        ('<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/>', "recursion"),
+        (link("${'a' * 20000000}"), "ValueError"),
+        ('<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/>', "RecursionError"),
     ],
 )
-def test_a_file_that_grows_without_end_is_refused(body: str, reason: str, tmp_path: Path) -> None:
-    with pytest.raises(RobotError, match=reason):
+def test_a_file_that_grows_without_end_is_refused(body: str, kind: str, tmp_path: Path) -> None:
+    with refused(RobotError, found=kind):
         expand_xacro(write(tmp_path / "a.xacro", body))
 
 
@@ -270,14 +271,14 @@ def test_what_a_file_prints_is_no_answer(tmp_path: Path) -> None:
 @needs_xacro
 def test_without_a_python_to_start_it_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
-    with pytest.raises(RobotError, match="expected a process of Python"):
+    with refused(RobotError, found="no process"):
         expand_xacro(write(tmp_path / "a.xacro", link("a")))
 
 
 @needs_xacro
 def test_a_process_that_dies_is_said(tmp_path: Path) -> None:
     file = write(tmp_path / "a.xacro", expression(f"{GLOBALS}['_exit'](3)"))
-    with pytest.raises(RobotError, match="ended without an answer"):
+    with refused(RobotError, found="nothing"):
         expand_xacro(file)
 
 
@@ -309,13 +310,13 @@ def test_arguments_reach_the_robot(tmp_path: Path) -> None:
 @needs_xacro
 def test_what_it_expands_to_is_checked_as_any_urdf(tmp_path: Path) -> None:
     file = write(tmp_path / "arm.xacro", arm('<link name="tip"/>'))
-    with pytest.raises(RobotError, match=r"arm\.xacro.*unique name"):
+    with refused(RobotError, "link 'tip'", file=str(file)):
         load_robot(file)
 
 
 def test_arguments_for_another_kind_of_file_are_refused() -> None:
     file = load_robot("planar2r").document.file
-    with pytest.raises(InputError, match="xacro_args"):
+    with refused(InputError, "xacro_args", found=("a",)):
         load_robot(file, xacro_args={"a": 1})
 
 
@@ -323,7 +324,7 @@ def test_arguments_for_another_kind_of_file_are_refused() -> None:
 def test_a_definition_in_a_urdf_is_left_out_if_nothing_uses_it(use: str, tmp_path: Path) -> None:
     file = write(tmp_path / "arm.urdf", arm('<xacro:property name="width" value="1"/>' + use))
     if use:
-        with pytest.raises(RobotError, match="unexpanded xacro"):
+        with refused(RobotError, "link '${width}'", found="'name' of '${width}'"):
             load_robot(file)
     else:
         with pytest.warns(RobotWarning, match="xacro:property"):
@@ -340,5 +341,5 @@ def test_a_small_file_of_ours_loads() -> None:
 
 def test_it_is_refused_with_advice_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(xacro_module, "find_spec", lambda name: None)
-    with pytest.raises(MissingDependencyError, match=r"pip install 'synctrl\[xacro\]'"):
+    with refused(MissingDependencyError, found="xacro", file=str(CASE)):
         load_robot(CASE)

@@ -202,7 +202,9 @@ def _named(laws: Sequence[Law] | Mapping[str, Law]) -> dict[str, Law]:
     given = list(laws.values()) if isinstance(laws, Mapping) else list(laws)
     for law in given:
         if not hasattr(law, "bind") or isinstance(law, type):
-            raise InputError(f"expected, for example, [SlotineLi()], found {law!r}", subject="laws")
+            raise InputError(
+                f"expected, for example, [SlotineLi()], found {law!r}", subject="laws", found=law
+            )
     names = list(laws) if isinstance(laws, Mapping) else [_name(law) for law in given]
     if not given or len(set(names)) != len(names):
         expected = "expected laws of different names, as a mapping if there are two of one kind"

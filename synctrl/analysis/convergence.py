@@ -203,7 +203,9 @@ def _gamma(run: Replay) -> np.ndarray:
     if not isinstance(adaptation, BoundGradient):
         found = run.result.info.get("adaptation", {}).get("name", "another")
         raise InputError(
-            f"expected a run with the adaptation Gradient, eq. (14), found {found}", subject="result"
+            f"expected a run with the adaptation Gradient, eq. (14), found {found}",
+            subject="result",
+            found=found,
         )
     return adaptation.Gamma
 

@@ -151,7 +151,9 @@ def gain_condition_in_box(
     low, high = (spread(name, corner, (cell.n, cell.nv)) for name, corner in corners.items())
     if (low > high).any():
         raise InputError(
-            f"expected lower <= upper, found {low.tolist()} and {high.tolist()}", subject="lower, upper"
+            f"expected lower <= upper, found {low.tolist()} and {high.tolist()}",
+            subject="lower, upper",
+            found=(low.tolist(), high.tolist()),
         )
     span = positive_number("duration", experiment.duration if duration is None else duration)
     controller, found = experiment.closed_loop().controller, []

@@ -83,6 +83,7 @@ def check_numbers(result: Result) -> None:
                 f"expected numbers up to {LARGEST:g}, found {found:g} at "
                 f"t = {result.t[large[0][0]]:g} s; the run went astray, and nothing can be said of it",
                 subject=f"result, {name}",
+                found=found,
             )
 
 

@@ -59,11 +59,14 @@ def cache_folder() -> Path:
     try:
         return Path(chosen).expanduser().absolute()
     except RuntimeError as error:
-        raise InputError(f"expected a folder, found {chosen!r}: {error}", subject="SYNCTRL_CACHE") from error
+        raise InputError(
+            f"expected a folder, found {chosen!r}: {error}", subject="SYNCTRL_CACHE", found=chosen
+        ) from error
     except OSError as error:
         raise CompilationError(
             f"{chosen!r} is relative to a working folder that cannot be found: {error}",
             subject="SYNCTRL_CACHE",
+            found=chosen,
         ) from error
 
 

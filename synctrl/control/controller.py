@@ -284,6 +284,7 @@ def _named(role: str, part: Any) -> Iterator[None]:
         raise InputError(
             f"expected one that works where there are no errors, found {type(error).__name__}: {error}",
             subject=f"{role} {type(part).__qualname__}",
+            found=type(error).__name__,
         ) from error
 
 

@@ -88,8 +88,8 @@ class Gains:
             UnreachableError: a path that a robot cannot reach.
 
         Warns:
-            GainWarning: a mode that stays slower than the bandwidth, or a start so far off the path that the
-                first torque is beyond the limits.
+            GainWarning: a mode that stays slower than the bandwidth, damping that was cut below what bears
+                the payload, or a start so far off the path that the first torque is beyond the limits.
         """
         return cls(**suggested(cell, bandwidth, period, payload, dt, duration))
 
@@ -106,13 +106,18 @@ class Gains:
         unknown = set(changes) - set(_SIGNS)
         if unknown:
             known, found = ", ".join(_SIGNS), ", ".join(sorted(unknown))
-            raise InputError(f"expected some of {known}, found {found}", subject="gains")
+            raise InputError(f"expected some of {known}, found {found}", subject="gains", found=found)
         return replace(self, **changes)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers and lists under the gains' names."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return {name: None if value is None else value.tolist() for name, value in values.items()}
+
+    def __repr__(self) -> str:
+        """All gains; of long ones the first and the last entries."""
+        named = ", ".join(f"{field.name}={_shown(getattr(self, field.name))}" for field in fields(self))
+        return f"{type(self).__name__}({named})"
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Gains) and self.as_dict() == other.as_dict()
@@ -230,7 +235,15 @@ class RaggedGain:
     __rmul__ = __mul__
 
     def __repr__(self) -> str:
-        return repr(self.tolist())
+        return f"[{', '.join(map(_shown, self.rows))}]"
+
+
+def _shown(gain: np.ndarray | RaggedGain | None) -> str:
+    """A gain in one line of four digits, as numpy shortens arrays."""
+    if not isinstance(gain, np.ndarray):
+        return repr(gain)
+    text = np.array2string(gain, precision=4, threshold=12, edgeitems=3, separator=", ")
+    return " ".join(text.split())
 
 
 def are_ragged(value: Any) -> bool:

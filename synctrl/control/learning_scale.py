@@ -32,6 +32,7 @@ def learning_scale(parameters: Parameters, robot: Robot, q: np.ndarray) -> np.nd
         "expected FullParameters, BaseParameters, LinearParameters or FrictionParameters, found "
         f"{type(parameters).__name__}",
         subject="parameters",
+        found=type(parameters).__name__,
     )
 
 

@@ -62,7 +62,9 @@ def check_limits(limits: ArrayLike | None, shape: tuple[int, int]) -> np.ndarray
     array = numbers("torque_limits", limits, shape)
     if not (array >= 0).all():
         raise InputError(
-            f"expected numbers of at least 0, found {array[~(array >= 0)][0]:g}", subject="torque_limits"
+            f"expected numbers of at least 0, found {array[~(array >= 0)][0]:g}",
+            subject="torque_limits",
+            found=array[~(array >= 0)][0],
         )
     return array
 
@@ -172,7 +174,10 @@ def read_state(path: str | Path, like: Mapping[str, np.ndarray]) -> dict[str, np
 def _arrays(archive: zipfile.ZipFile, like: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     expected, found = sorted(f"{name}.npy" for name in like), sorted(archive.namelist())
     if found != expected:
-        raise ResultError(f"expected the arrays {', '.join(expected)}, found {', '.join(found) or 'none'}")
+        raise ResultError(
+            f"expected the arrays {', '.join(expected)}, found {', '.join(found) or 'none'}",
+            found=tuple(found),
+        )
     return {name: _array(archive, name, array) for name, array in like.items()}
 
 
@@ -181,7 +186,9 @@ def _array(archive: zipfile.ZipFile, name: str, like: np.ndarray) -> np.ndarray:
     entry = archive.getinfo(f"{name}.npy")
     size = len(header) + like.nbytes
     if entry.compress_type != zipfile.ZIP_STORED or entry.file_size != size:
-        raise ResultError(f"{name}: expected {size} bytes as they are, found {entry.file_size}")
+        raise ResultError(
+            f"{name}: expected {size} bytes as they are, found {entry.file_size}", found=entry.file_size
+        )
     data = archive.read(entry)
     if not data.startswith(header):
         raise ResultError(f"{name}: expected an array of floats of shape {like.shape}")

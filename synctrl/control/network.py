@@ -147,6 +147,7 @@ class Messages:
             raise InputError(
                 f"expected instants in order with {start:g} <= t < {end:g} s, found {times!s:.80}",
                 subject=where,
+                found=times,
             )
         return times.tolist()
 

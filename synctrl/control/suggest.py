@@ -71,6 +71,12 @@ class Arm:
         """Inertia with load, (K, nv, nv)."""
         return np.array([self.loaded.mass_matrix(q) for q in self.q])
 
+    @cached_property
+    def unknown(self) -> np.ndarray:
+        """Torque that holds an error of gravity's, and the load, (nv,), N·m: the largest along the path."""
+        g = self.gravity(self.robot)
+        return (GRAVITY_ERROR * np.abs(g) + np.abs(self.gravity(self.loaded) - g)).max(axis=0)
+
     def gravity(self, robot: Robot) -> np.ndarray:
         """Torque of gravity, (K, nv), N·m."""
         return np.array([robot.gravity(q) for q in self.q])
@@ -87,6 +93,7 @@ def suggested(
     arms = [Arm(cell, i, states, _load(robot, payload)) for i, robot in enumerate(cell.robots)]
     K_r = [damping(arm, omega, rates) for arm in arms]
     _warn_of_slow_modes(omega, rates, arms, K_r)
+    _warn_of_sag(rates, arms, K_r)
     _warn_of_first_torque(cell, rates, K_r)
     K_eps = np.min([stiffness(arm, K, cell, rates) for arm, K in zip(arms, K_r, strict=True)], axis=0)
     Gamma = [learning(arm, K, omega, rates) for arm, K in zip(arms, K_r, strict=True)]
@@ -109,10 +116,8 @@ def damping(arm: Arm, omega: float, rates: Rates) -> np.ndarray:
     Light joints are those with K_j > kappa room / (M^-1)_jj; kappa is the largest up to 1 with which all
     modes of M^-1 K_r are below the room.
     """
-    g = arm.gravity(arm.robot)
-    sag = GRAVITY_ERROR * np.abs(g) + np.abs(arm.gravity(arm.loaded) - g)
     inertia = np.einsum("kjj->kj", arm.M_loaded).mean(axis=0)
-    wish = np.maximum(DAMPING * omega * inertia, sag.max(axis=0) / (SAG * rates.Lambda))
+    wish = np.maximum(DAMPING * omega * inertia, arm.unknown / (SAG * rates.Lambda))
     M_inv = np.linalg.inv(arm.M)
     ceiling = rates.room / np.einsum("kjj->kj", M_inv).max(axis=0)
     low, high = 0.0, 2.0  # the first kappa is 1
@@ -185,6 +190,22 @@ def _warn_of_slow_modes(omega: float, rates: Rates, arms: list[Arm], K_r: list[n
         warn(
             f"expected modes of at least the bandwidth of {omega:g} rad/s, found: {'; '.join(slow)}; take a "
             "shorter dt or period, or a smaller bandwidth",
+            GainWarning,
+        )
+
+
+def _warn_of_sag(rates: Rates, arms: list[Arm], K_r: list[np.ndarray]) -> None:
+    """Say which joint of a robot sags most, where its damping was cut below what bears the load."""
+    found = []
+    for arm, K in zip(arms, K_r, strict=True):
+        sag = arm.unknown / (K * rates.Lambda)
+        joint = int(np.argmax(sag))
+        if sag[joint] > (1 + 1e-6) * SAG:
+            found.append(f"{arm.name}, joint {joint + 1}: {sag[joint]:.3g} {arm.robot.joint_units[joint]}")
+    if found:
+        warn(
+            f"expected at most {SAG:g} rad (m) of sag until an unknown load is learned, found up to: "
+            f"{'; '.join(found)}; take a shorter dt or period, or a smaller payload",
             GainWarning,
         )
 

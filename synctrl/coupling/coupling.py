@@ -112,7 +112,9 @@ class Coupling:
         """Differences of one robot and each other one; by default c = 1. The leader feels all of them."""
         instance("leader", leader, (int, np.integer), "the number of a robot")
         if not 0 <= leader < _count(n):
-            raise CouplingError(f"expected a robot from 0 to {n - 1}, found {leader}", subject="leader")
+            raise CouplingError(
+                f"expected a robot from 0 to {n - 1}, found {leader}", subject="leader", found=leader
+            )
         return cls._differences(n, [(leader, k) for k in range(n) if k != leader], c, "star", unit)
 
     @classmethod
@@ -164,6 +166,7 @@ class Coupling:
             raise InputError(
                 f"expected numbers above 0, found {a[k]:g} at index {k}; leave that pair out",
                 subject="edge_weights",
+                found=a[k],
             )
         return self._again(self.signs * a[:, None], self._source, self.unit)
 
@@ -286,7 +289,7 @@ class Coupling:
 def _count(n: int) -> int:
     instance("robots", n, (int, np.integer), "a number of robots")
     if isinstance(n, bool) or n < 2:
-        raise CouplingError(f"a coupling compares at least 2 robots, found {n}", subject="robots")
+        raise CouplingError(f"a coupling compares at least 2 robots, found {n}", subject="robots", found=n)
     return int(n)
 
 

@@ -91,7 +91,7 @@ def _check_finite(what: str, part: str, value: np.ndarray, times: np.ndarray, ro
             time=float(times[k]),
             robot=robot,
             cause=cause,
-        )
+        ).about(what, found=np.asarray(value)[k])
 
 
 def check_weights(source: WeightSource, times: np.ndarray, m: int) -> None:

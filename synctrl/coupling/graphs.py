@@ -51,7 +51,11 @@ def indices(name: str, value: np.ndarray) -> np.ndarray:
     """
     wrong = (value != np.round(value)) | (np.abs(value) > LARGEST)
     if wrong.any():
-        raise InputError(f"expected whole numbers of robots, found {value[wrong][0]:g}", subject=name)
+        raise InputError(
+            f"expected whole numbers of robots, found {value[wrong][0]:g}",
+            subject=name,
+            found=value[wrong][0],
+        )
     return value.astype(int)
 
 
@@ -62,7 +66,9 @@ def check_rows(name: str, n: int, edges: np.ndarray, signs: np.ndarray) -> None:
     """
     if not len(edges) or (edges.shape[1] != 2 and edges.shape != (1, n)):
         raise CouplingError(
-            f"expected shape (p, 2) with p > 0, or (1, {n}), found {edges.shape}", subject="edges"
+            f"expected shape (p, 2) with p > 0, or (1, {n}), found {edges.shape}",
+            subject="edges",
+            found=edges.shape,
         )
     _find("robots 0 to {last}", np.any((edges < 0) | (edges >= n), axis=1), edges, n)
     ordered = np.sort(edges, axis=1)
@@ -151,6 +157,7 @@ def _networkx_rows(graph: Any) -> tuple[list[tuple[Any, Any, Any]], int]:
             f"expected the nodes 0 to {n - 1}, found {found}{', ...' if n > 5 else ''}; "
             "networkx.convert_node_labels_to_integers renames them",
             subject="graph",
+            found=found,
         )
     return [(i, j, weight) for i, j, weight in graph.edges(data="weight", default=1.0)], n
 
@@ -158,5 +165,7 @@ def _networkx_rows(graph: Any) -> tuple[list[tuple[Any, Any, Any]], int]:
 def _row(edge: Any) -> tuple[Any, Any, Any]:
     parts = tuple(edge) if isinstance(edge, Iterable) and not isinstance(edge, str) else ()
     if len(parts) not in (2, 3):
-        raise InputError(f"expected pairs (i, j) or triples (i, j, weight), found {edge!r}", subject="graph")
+        raise InputError(
+            f"expected pairs (i, j) or triples (i, j, weight), found {edge!r}", subject="graph", found=edge
+        )
     return (*parts, 1.0)[:3]

@@ -41,7 +41,9 @@ def check_names(cell: str, names: Sequence[str]) -> None:
         label("name", name)
     twice = [name for name, count in Counter(names).items() if count > 1]
     if twice:
-        raise InputError(f"expected another one for each robot, found {twice[0]!r} twice", subject="name")
+        raise InputError(
+            f"expected another one for each robot, found {twice[0]!r} twice", subject="name", found=twice[0]
+        )
 
 
 def check_labels(cell: Any) -> None:
@@ -54,7 +56,9 @@ def check_labels(cell: Any) -> None:
         label("space: unit", unit)
     if len(cell.units) != cell.m:
         raise InputError(
-            f"expected one for each of {cell.m} coordinates, found {len(cell.units)}", subject="space: units"
+            f"expected one for each of {cell.m} coordinates, found {len(cell.units)}",
+            subject="space: units",
+            found=len(cell.units),
         )
     label("coupling: name", cell.coupling.name)
     label("coupling: unit", cell.coupling.unit)
@@ -62,7 +66,8 @@ def check_labels(cell: Any) -> None:
         label("space: name of a coordinate", axis)
     if not all(map(str.strip, cell.labels)) or len({*cell.labels}) < len(cell.labels):
         expected = "expected a word of its own as the name of every coordinate"
-        raise InputError(f"{expected}, found {', '.join(map(repr, cell.labels))}", subject="space")
+        found = ", ".join(map(repr, cell.labels))
+        raise InputError(f"{expected}, found {found}", subject="space", found=cell.labels)
     for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True):
         for word in (robot.name, *robot.joint_names, *parameters.names):
             label(f"{name}: name of a joint or parameter", word)
@@ -83,10 +88,14 @@ def check_trajectory(name: str, trajectory: Any, labels: tuple[str, ...]) -> Non
     offers(where, trajectory, ("__call__", "dimension", "breaks"), "a trajectory such as Hold")
     if trajectory.dimension != m:
         coordinates = f"expected {m} coordinates ({', '.join(labels)})"
-        raise InputError(f"{coordinates}, found {trajectory.dimension}", subject=where)
+        raise InputError(
+            f"{coordinates}, found {trajectory.dimension}", subject=where, found=trajectory.dimension
+        )
     motion = trajectory(np.zeros(1))
     if not isinstance(motion, tuple) or len(motion) != 3:
-        raise InputError(f"expected position, velocity and acceleration, found {motion!r}", subject=where)
+        raise InputError(
+            f"expected position, velocity and acceleration, found {motion!r}", subject=where, found=motion
+        )
     for part, value in zip(MOTION_PARTS, motion, strict=True):
         finite_array(f"{where}, {part} at t = 0 s", value, (1, m))
 
@@ -119,7 +128,8 @@ def member_parameters(name: str, robot: Robot, friction: Friction, given: Any) -
         try:
             return parameters_of("full" if given is None else given, robot)
         except InputError as error:
-            raise InputError(f"{name}, {error}").about(f"{name}, {error.subject}") from None
+            where = f"{name}, {error.subject}"
+            raise InputError(error.problem, subject=where, found=error.found) from None
     parameters = _with_friction(name, friction, given)
     where = f"{name}, parameters"
     offers(where, parameters, ("names", "theta", "regressor"), "parameters, for example FullParameters")
@@ -181,14 +191,16 @@ def _check_sizes(where: str, parameters: Any, robot: Robot) -> None:
     expected, still = (robot.nv, len(theta)), np.zeros(robot.nv)
     if len(parameters.names) != len(theta):
         names = f"expected a name for each of {len(theta)} values"
-        raise InputError(f"{names}, found {len(parameters.names)}", subject=where)
+        raise InputError(
+            f"{names}, found {len(parameters.names)}", subject=where, found=len(parameters.names)
+        )
     try:
         found = np.shape(parameters.regressor(still, still, still, still))
     except ValueError as error:
         raise InputError(f"they belong to another robot: {error}", subject=where) from error
     if found != expected:
         regressor = f"expected a regressor of shape {expected} for '{robot.name}'"
-        raise InputError(f"{regressor}, found {found}", subject=where)
+        raise InputError(f"{regressor}, found {found}", subject=where, found=found)
 
 
 def _check_truth(where: str, parameters: Any, robot: Robot, friction: Friction) -> None:

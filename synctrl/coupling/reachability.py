@@ -59,7 +59,7 @@ def _unreachable(name: str, robot: Robot, t: float, target: np.ndarray, cell: Ce
     return UnreachableError(
         f"{name} ('{robot.name}') cannot reach its desired position at t = {t:g} s: {wanted}; "
         "expected a path inside the workspace of its tip"
-    ).about(f"{name}, trajectory", found=target.tolist(), time=float(t))
+    ).about(f"{name}, trajectory", found=target, time=float(t))
 
 
 def check_motions(cell: Cell, times: np.ndarray) -> None:

@@ -200,7 +200,9 @@ class SynchronizationFunction:
         instance("trajectories", trajectories, Sequence, "one for each robot")
         if len(trajectories) != self.robots:
             expected = f"expected one for each of {self.robots} robots"
-            raise InputError(f"{expected}, found {len(trajectories)}", subject="trajectories")
+            raise InputError(
+                f"{expected}, found {len(trajectories)}", subject="trajectories", found=len(trajectories)
+            )
         coordinates = tuple(f"coordinate {k}" for k in range(1, self.dimension + 1))
         for i, trajectory in enumerate(trajectories, start=1):
             check_trajectory(f"robot {i}", trajectory, coordinates)

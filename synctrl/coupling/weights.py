@@ -70,7 +70,11 @@ class ConstantWeights:
     def __init__(self, c: ArrayLike):
         self.c = finite_array("c", c)
         if self.c.ndim not in (1, 2, 3):
-            raise InputError(f"expected shape (n,), (n, m) or (n, m, m), found {self.c.shape}", subject="c")
+            raise InputError(
+                f"expected shape (n,), (n, m) or (n, m, m), found {self.c.shape}",
+                subject="c",
+                found=self.c.shape,
+            )
         self.robots = len(self.c)
         self._known: dict[int, Weights] = {}
 
@@ -118,6 +122,7 @@ class FunctionWeights:
                 f"expected a function of t returning c, c' and c'', found {value!r}; "
                 "SmoothWeights.from_function takes one that returns c alone",
                 subject="c",
+                found=value,
             )
         try:
             parts = [finite_array(name, part) for name, part in zip(DERIVATIVES, value, strict=True)]
@@ -171,7 +176,9 @@ class SmoothWeights:
         made_for = self._c.shape[-1]
         if made_for != m:
             raise CouplingError(
-                f"expected weights for {m} coordinates, found some for {made_for}", subject="c"
+                f"expected weights for {m} coordinates, found some for {made_for}",
+                subject="c",
+                found=made_for,
             )
         outside = self._c.first_outside(times)
         if outside is not None:
@@ -200,7 +207,9 @@ def as_source(robots: int, c: ArrayLike | WeightFunction | WeightSource) -> Weig
         source = FunctionWeights(robots, c) if callable(c) else ConstantWeights(c)
     if source.robots != robots:
         raise InputError(
-            f"expected one weight for each of {robots} robots, found {source.robots}", subject="c"
+            f"expected one weight for each of {robots} robots, found {source.robots}",
+            subject="c",
+            found=source.robots,
         )
     return source
 
@@ -214,7 +223,9 @@ def as_matrices(c: np.ndarray, m: int) -> np.ndarray:
         return c[:, :, None] * np.eye(m)
     if c.shape == (n, m, m):
         return c.copy()
-    raise InputError(f"expected shape ({n},), ({n}, {m}) or ({n}, {m}, {m}), found {c.shape}", subject="c")
+    raise InputError(
+        f"expected shape ({n},), ({n}, {m}) or ({n}, {m}, {m}), found {c.shape}", subject="c", found=c.shape
+    )
 
 
 def geometric_mean(c: np.ndarray) -> float:
@@ -249,7 +260,7 @@ def _singular(c: np.ndarray, times: np.ndarray) -> CouplingError:
     return CouplingError(
         f"the weight c of the robot at index {i} has no inverse at t = {times[k]:g} s "
         f"(condition number {condition[k, i]:.2g}): {c[k, i].tolist()}"
-    ).about("c", robot=int(i), time=float(times[k]))
+    ).about("c", found=c[k, i], robot=int(i), time=float(times[k]))
 
 
 __getattr__ = names_elsewhere(__name__, ".desired", "check_weights")

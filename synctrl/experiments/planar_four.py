@@ -106,4 +106,4 @@ def _disturbances(disturbance: str | Disturbance | Sequence[Disturbance] | None)
     if isinstance(disturbance, Sequence) and not isinstance(disturbance, str):
         return tuple(disturbance)
     expected = "expected None, 'torque' or Disturbance objects"
-    raise InputError(f"{expected}, found {disturbance!r}", subject="disturbance")
+    raise InputError(f"{expected}, found {disturbance!r}", subject="disturbance", found=disturbance)

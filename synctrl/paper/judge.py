@@ -97,7 +97,8 @@ def compare_runs(ours: Result, theirs: Result) -> Agreement:
         )
     if not np.array_equal(ours.t, theirs.t) or ours.x.shape != theirs.x.shape:
         raise InputError(
-            f"expected the same instants of the same cell, found {ours!r} and {theirs!r}", subject="runs"
+            f"expected the same instants of the same cell, found {ours!r} and {theirs!r}",
+            subject="runs",
         )
     tracking = _relative(ours.tracking_error, theirs.tracking_error)
     return Agreement(str(ours.info["title"]), ours.t, tracking, _relative(ours.sync_error, theirs.sync_error))

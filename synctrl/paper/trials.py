@@ -150,7 +150,11 @@ def match_peak_torque(bench: Bench, target: float, scaled: Sequence[str] = ("Lam
     """
     target = positive_number("target", target)
     if not scaled or set(scaled) - set(SCALABLE):
-        raise InputError(f"expected some of {', '.join(SCALABLE)}, found {list(scaled)!r}", subject="scaled")
+        raise InputError(
+            f"expected some of {', '.join(SCALABLE)}, found {list(scaled)!r}",
+            subject="scaled",
+            found=list(scaled),
+        )
     base, before = bench.experiment.gains.independent(), bench.runs
 
     def gains(factor: float) -> Gains:

@@ -137,6 +137,7 @@ def _rank(values: np.ndarray, name: str) -> int:
             "expected singular values of the regressor with a clear gap above zero, "
             f"found {values[rank - 1]:.3g} above it and {dropped:.3g} below",
             subject=f"robot '{name}'",
+            found=(values[rank - 1], dropped),
         )
     return rank
 

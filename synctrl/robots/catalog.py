@@ -16,7 +16,8 @@ from pkgutil import iter_modules
 from types import ModuleType
 from typing import Any
 
-from ..errors import InputError, MissingDependencyError, RobotError, near
+from ..checks import instance
+from ..errors import MissingDependencyError, RobotError, near
 from .robot import Robot
 from .urdf.description import Description, read_urdf, urdf_folder
 from .urdf.document import Inertial
@@ -132,8 +133,7 @@ def load_description(
         RobotError: an unknown name, with the near ones.
         MissingDependencyError: a package that has the robot, or reads its kind of file, is not installed.
     """
-    if not isinstance(source, (str, Path)):
-        raise InputError(f"expected a name or a path, found {type(source).__name__}", subject="robot")
+    instance("robot", source, (str, Path), "a name or a path")
     options: dict[str, Any] = {"inertials": inertials, "strict": strict, "xacro_args": xacro_args}
     if isinstance(source, str) and source.startswith(PREFIX):
         source, folders, own_args = described(source.removeprefix(PREFIX))
@@ -205,7 +205,8 @@ def described(name: str) -> tuple[Path, tuple[str | Path, ...], Mapping[str, obj
     attribute = next((a for a in _FILES if said.get(a)), None)
     if attribute is None:
         expected = "expected a URDF, a xacro file or MJCF"
-        raise RobotError(f"{expected}, found none of {', '.join(_FILES)}", subject=f"robot {name!a}")
+        words = f"{expected}, found none of {', '.join(_FILES)}"
+        raise RobotError(words, subject=f"robot {name!a}", found=0)
     args = said.get("XACRO_ARGS", {}) if attribute == "XACRO_PATH" else None
     folders = [said[folder] for folder in _FOLDERS if said.get(folder)]
     return Path(said[attribute]), (*folders, *said.get("XACRO_PACKAGE_PATHS", {}).values()), args
@@ -218,6 +219,7 @@ def _module(name: str) -> ModuleType:
             f"it comes from the package {PACKAGE}, which is not installed; install it with: "
             "pip install 'synctrl[robot_descriptions]'",
             subject=f"robot {name!a}",
+            found=PACKAGE,
         )
     names = [module.name for module in iter_modules(found.submodule_search_locations)]
     if not _NAME.fullmatch(name) or name not in names:
@@ -230,4 +232,5 @@ def _module(name: str) -> ModuleType:
         raise RobotError(
             f"expected a robot of {PACKAGE}, found: {type(error).__name__}: {error}",
             subject=f"robot {name!a}",
+            found=type(error).__name__,
         ) from error

@@ -54,7 +54,9 @@ def planar_arm(lengths: Sequence[float], masses: Sequence[float], name: str = "p
     l, m = finite_array("lengths", lengths, (None,)), finite_array("masses", masses, (None,))
     if not len(l) or len(l) != len(m):
         raise InputError(
-            f"expected as many of each, at least 1, found {len(l)} and {len(m)}", subject="lengths, masses"
+            f"expected as many of each, at least 1, found {len(l)} and {len(m)}",
+            subject="lengths, masses",
+            found=(len(l), len(m)),
         )
     rods = [
         _rod(k, positive_number(f"lengths[{k}]", l[k]), positive_number(f"masses[{k}]", m[k]))
@@ -106,7 +108,7 @@ def weld(
         raise FrameNotFound(document.name, frame, links)
     if name in links or f"{name}_weld" in {joint.name for joint in document.joints}:
         expected = f"expected one that robot '{document.name}' does not have yet"
-        raise InputError(f"{expected}, found '{name}'", subject="name")
+        raise InputError(f"{expected}, found '{name}'", subject="name", found=name)
     payload = _payload(name, positive_number("mass", mass), _triple("com", com), size, inertia)
     joint = Joint(f"{name}_weld", "fixed", frame, name, Pose(_triple("xyz", xyz), _triple("rpy", rpy)))
     return replace(document, links=(*document.links, payload), joints=(*document.joints, joint))
@@ -138,7 +140,9 @@ def write_urdf(document: Document, path: str | Path) -> Path:
         write_whole(file, to_xml(document))
     except OSError as error:
         raise InputError(
-            f"expected a file that can be written, found: {error.strerror}", subject=str(file)
+            f"expected a file that can be written, found: {error.strerror}",
+            subject=str(file),
+            found=error.strerror,
         ) from error
     return file
 
@@ -194,7 +198,7 @@ def _triple(name: str, value: ArrayLike) -> tuple[float, ...]:
 def _check_name(what: str, name: str) -> None:
     if not isinstance(name, str) or not is_plain(name):
         rule = "1 to 128 letters, digits, '_', '-' or '.', beginning with a letter, a digit or '_'"
-        raise InputError(f"expected {rule}, found {name!r}", subject=what)
+        raise InputError(f"expected {rule}, found {name!r}", subject=what, found=name)
 
 
 def _check_meshes(document: Document, file: Path) -> None:

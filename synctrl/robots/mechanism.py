@@ -76,6 +76,7 @@ def _mechanism(robot: Robot) -> tuple[Mechanism, pin.SE3]:
             "the compiled engine needs one joint on the base and a tip that moves, "
             f"found {len(roots)} joints on the base and tip '{robot.tip}'; use engine='pinocchio'",
             subject=f"robot '{robot.name}'",
+            found=(len(roots), robot.tip),
         )
     joints = tuple(_joint(model, j, first=j == roots[0]) for j in range(1, model.njoints))
     fixed = Mechanism(

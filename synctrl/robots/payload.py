@@ -64,6 +64,7 @@ class Payload:
                 "expected positive principal moments, none larger than the sum of the "
                 f"others, found {moments.tolist()} kg·m^2",
                 subject="payload, inertia",
+                found=moments.tolist(),
             )
         return inertia
 
@@ -95,7 +96,9 @@ def carrying(robot: Robot, load: Payload) -> Robot:
     frame = robot.model.frames[frame_id(robot.name, robot.model, name)]
     if frame.parentJoint == 0:
         raise InputError(
-            f"expected one of robot '{robot.name}' that moves, found '{name}'", subject="payload, frame"
+            f"expected one of robot '{robot.name}' that moves, found '{name}'",
+            subject="payload, frame",
+            found=name,
         )
     model = pin.Model(robot.model)
     body = pin.Inertia(load.mass, np.array(load.com), np.array(load.inertia))

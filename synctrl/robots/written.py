@@ -94,5 +94,6 @@ def read_robot(
         raise RobotError(
             f"expected the joints {', '.join(joints)}, found {', '.join(robot.joint_names)}",
             subject=f"robot '{name}'",
+            found=robot.joint_names,
         )
     return robot

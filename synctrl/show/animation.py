@@ -89,12 +89,10 @@ def payload_pair_scene(
         InputError: a run of other robots or in another space, or one without its experiment.
     """
     check_run(result, *DRAWN)
-    if result.x.shape[1] != 2 or result.info["task_unit"] != "rad":
-        raise InputError(
-            "expected two robots in joint space, found "
-            f"{result.x.shape[1]} with coordinates in {result.info['task_unit']}",
-            subject="result",
-        )
+    found = result.x.shape[1], result.info["task_unit"]
+    if found != (2, "rad"):
+        words = f"expected two robots in joint space, found {found[0]} with coordinates in {found[1]}"
+        raise InputError(words, subject="result", found=found)
     share, limit = error_share(result, limit)
     caption = (
         f"The payload is drawn, not simulated; fully red from {_shown(result, limit)} of synchronization "
@@ -174,9 +172,8 @@ def payload_scene(result: Result, size: ArrayLike, fps: float = 25) -> Scene:
     scene = arms_scene(result, cell.robots, frames, fps, caption)
     hands = [hand for member in cell.members if isinstance(hand := member.trajectory, Attached)]
     if not len(hands) == cell.n == 2:
-        raise InputError(
-            "expected two robots whose desired motions are Attached to a payload", subject="result"
-        )
+        words = "expected two robots whose desired motions are Attached to a payload"
+        raise InputError(words, subject="result", found=tuple(type(hand).__name__ for hand in hands))
     position, orientation = _held(result.x[frames], hands)
     extent = finite_array("size", size, (3,))
     color = error_colors(result)[frames, 0]
@@ -251,6 +248,7 @@ def vehicle_animation(result: Result, wheel_radius: float, track: float, fps: fl
             f"expected two wheels with one angle each, found {result.x.shape[1]} robots with "
             f"{result.x.shape[2]} coordinates",
             subject="result",
+            found=(result.x.shape[1], result.x.shape[2]),
         )
     times = frame_times(result, fps)
     frames = np.searchsorted(0.5 * (result.t[1:] + result.t[:-1]), times)  # the nearest logged instants

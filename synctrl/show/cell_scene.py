@@ -88,6 +88,7 @@ def _robots(
                 f"expected the one that made this result: {about['name']} ('{about.get('model', '?')}') "
                 f"cannot be made again from the file, {error}",
                 subject="experiment",
+                found=about["name"],
             ) from error
     return robots
 

@@ -186,8 +186,10 @@ def _primitive(visual: pin.GeometryObject, color: Color) -> Shape:
         case kind if hasattr(shape, "tri_indices"):
             return _triangles(shape, color)
     raise RobotError(
-        f"visual '{visual.name}' is a {kind}, which cannot be drawn; expected a box, sphere, ellipsoid, "
-        "cylinder, cone, capsule or a mesh"
+        f"it is a {kind}, which cannot be drawn; expected a box, sphere, ellipsoid, cylinder, cone, capsule "
+        "or a mesh",
+        subject=f"visual '{visual.name}'",
+        found=kind,
     )
 
 

@@ -226,5 +226,7 @@ def unit(name: str, quaternion: np.ndarray) -> np.ndarray:
     """
     norms = np.linalg.norm(quaternion, axis=1, keepdims=True)
     if norms.min() < TINY:
-        raise InputError(f"{name}: quaternion: expected a rotation, found one of length {norms.min():g}")
+        found = norms.min()
+        words = f"expected a rotation, found one of length {found:g}"
+        raise InputError(words, subject=f"{name}: quaternion", found=found)
     return continuous(quaternion / norms)

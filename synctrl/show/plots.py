@@ -93,7 +93,8 @@ def save(figure: Figure, stem: str | Path) -> tuple[Path, Path]:
             figure.savefig(vectors, format="svg", metadata={"Date": None, "Creator": None})
             figure.savefig(pixels, format="png", metadata={"Software": None}, pil_kwargs=_PNG)
     except OSError as error:
-        raise ResultError(f"cannot write the figure '{stem}': {error.strerror or error}") from error
+        reason = error.strerror or str(error)
+        raise ResultError(f"cannot write the figure '{stem}': {reason}", file=stem, found=reason) from error
     return png, svg
 
 
@@ -249,7 +250,8 @@ def titled(name: str, width: float) -> str:
 def _read_limits(limits: tuple[float, float]) -> tuple[float, float]:
     low, high = finite_array("limits", limits, (2,))
     if not low < high:
-        raise InputError(f"expected the lower one first, found {low:g} and {high:g}", subject="limits")
+        words = f"expected the lower one first, found {low:g} and {high:g}"
+        raise InputError(words, subject="limits", found=(low, high))
     return float(low), float(high)
 
 

@@ -236,7 +236,9 @@ def gallery(result: Result, *names: str, width: float = WIDTH) -> Gallery:
             or a width below `NARROWEST`.
     """
     if not finite_number("width", width) >= NARROWEST:
-        raise InputError(f"expected at least {NARROWEST:g} inches, found {width:g}", subject="width")
+        raise InputError(
+            f"expected at least {NARROWEST:g} inches, found {width:g}", subject="width", found=width
+        )
     found = Gallery(str(result.info["title"]))
     for name in names or FIGURES:
         try:

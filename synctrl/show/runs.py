@@ -28,9 +28,8 @@ def check_run(result: Result, *arrays: str) -> None:
     """
     instance("result", result, Result, "a Result")
     if not len(result.t):
-        raise InputError(
-            "nothing was logged, so there is nothing to draw", subject=f"run '{result.info['title']}'"
-        )
+        words = "nothing was logged, so there is nothing to draw"
+        raise InputError(words, subject=f"run '{result.info['title']}'", found=0)
     for name in arrays:
         numbers = getattr(result, name)
         seen = np.abs(numbers) <= LARGEST
@@ -39,6 +38,7 @@ def check_run(result: Result, *arrays: str) -> None:
             raise InputError(
                 f"expected numbers up to {LARGEST:g} to draw, found {found:g}; the run went astray",
                 subject=f"run '{result.info['title']}', {name}",
+                found=found,
             )
 
 
@@ -62,6 +62,7 @@ def shown_experiment(result: Result, experiment: Experiment | None) -> Experimen
             "expected the one that made this result, or one that still has its experiment; "
             "this one was loaded from a file",
             subject="experiment",
+            found="no experiment",
         )
     experiment = experiment_of(result, experiment)
     cell = experiment.cell
@@ -70,6 +71,7 @@ def shown_experiment(result: Result, experiment: Experiment | None) -> Experimen
             f"expected the one that made the result, of {result.q.shape[1]} robots with up to "
             f"{result.q.shape[2]} joints and {result.x.shape[2]} coordinates, found {cell!r}",
             subject="experiment",
+            found=(cell.n, cell.nv, cell.m),
         )
     return experiment
 
@@ -85,6 +87,7 @@ def frame_times(result: Result, fps: float) -> np.ndarray:
         raise InputError(
             f"expected at most {MOST_FRAMES} frames, found {result.t[-1] * fps:.3g} at {fps:g} a second",
             subject="fps",
+            found=fps,
         )
     return np.append(0.0, np.arange(0.0, result.t[-1], 1 / fps)[1:])
 

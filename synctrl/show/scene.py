@@ -98,7 +98,7 @@ class Scene:
         """A line that stands still, such as a desired path: `points` (k, 3) in m, `width` in m."""
         path = finite_array(f"{name}: points", points, (None, 3))
         if not len(path):
-            raise InputError(f"{name}: points: expected at least one point, found none")
+            raise InputError("expected at least one point, found none", subject=f"{name}: points", found=0)
         radius = positive_number(f"{name}: width", width) / 2
         self._add(Node(label("line", name), shapes=[shapes.tube(path, radius, read_color(name, color))]))
 
@@ -122,7 +122,8 @@ class Scene:
         """A box of `size` (3,) in m, at `position` (T, 3) or (3,), turned by `quaternion` (T, 4) or (4,)."""
         extent = finite_array(f"{name}: size", size, (3,))
         if extent.min() <= 0:
-            raise InputError(f"{name}: size: expected three lengths above 0, found {extent}")
+            words = f"expected three lengths above 0, found {extent}"
+            raise InputError(words, subject=f"{name}: size", found=extent)
         self._add_solid("box", name, shapes.box(extent), position, quaternion, np.ones((1, 3)), color)
 
     def add_cylinder(
@@ -179,7 +180,8 @@ class Scene:
         eye = finite_array("camera position", position, (3,))
         aim = finite_array("camera target", target, (3,))
         if np.linalg.norm(eye - aim) < TINY:
-            raise InputError(f"camera: position and target are the same point {eye}; expected two points")
+            words = f"position and target are the same point {eye}; expected two points"
+            raise InputError(words, subject="camera", found=eye)
         self._camera = eye, aim
 
     # -- what comes out -----------------------------------------------------------------------------------
@@ -205,7 +207,8 @@ class Scene:
         try:
             write_whole(path, self.page().encode("utf-8", "replace"))
         except OSError as error:
-            raise InputError(f"animation '{path}' cannot be written: {error.strerror}") from error
+            words = f"animation '{path}' cannot be written: {error.strerror}"
+            raise InputError(words, file=path, found=error.strerror) from error
         return path
 
     def html(self, height: int = 480) -> str:
@@ -218,7 +221,8 @@ class Scene:
         if len(text) > NOTEBOOK_LIMIT:
             raise InputError(
                 f"the scene takes {len(text) / 1e6:.1f} MB, of which a notebook holds "
-                f"{NOTEBOOK_LIMIT / 1e6:.0f} MB; use write() and link to the file"
+                f"{NOTEBOOK_LIMIT / 1e6:.0f} MB; use write() and link to the file",
+                found=len(text),
             )
         return frame(text, round(positive_number("height", height)))
 
@@ -245,7 +249,7 @@ class Scene:
 
     def _add(self, node: Node) -> None:
         if any(node.name == other.name for other in self.nodes):
-            raise InputError(f"the scene already has a {node.name!r}; expected another name")
+            raise InputError(f"expected another name, found {node.name!r} twice", found=node.name)
         self.nodes.append(node)
 
     def _add_solid(
@@ -272,11 +276,13 @@ class Scene:
         if array.shape == (width,):
             return array[None]
         if array.ndim != 2 or array.shape[1] != width or not len(array):
-            raise InputError(f"{name}: expected shape ({width},) or (T, {width}), found {array.shape}")
+            words = f"expected shape ({width},) or (T, {width}), found {array.shape}"
+            raise InputError(words, subject=name, found=array.shape)
         if len(array) > 1:
             self._frames = self._frames or len(array)
             if len(array) != self._frames:
-                raise InputError(f"{name}: expected {self._frames} frames as before, found {len(array)}")
+                words = f"expected {self._frames} frames as before, found {len(array)}"
+                raise InputError(words, subject=name, found=len(array))
         return array
 
     def _lengths(self, name: str, value: ArrayLike) -> np.ndarray:
@@ -284,7 +290,8 @@ class Scene:
         array = finite_array(name, value)
         lengths = self._series(name, array.reshape(-1, 1) if array.ndim < 2 else array, 1)
         if lengths.min() < 0:
-            raise InputError(f"{name}: expected no length below 0, found {lengths.min():g}")
+            found = lengths.min()
+            raise InputError(f"expected no length below 0, found {found:g}", subject=name, found=found)
         return np.maximum(lengths, TINY)
 
     def _colors(self, name: str, color: ColorLike) -> np.ndarray | None:

@@ -77,16 +77,18 @@ def read_color(name: str, color: ColorLike) -> Color:
         return to_rgba(given)
     except ValueError:
         raise InputError(
-            f"color: expected #rrggbb, a name, or three or four numbers, found {given!r}", subject=name
+            f"expected #rrggbb, a name, or three or four numbers, found {given!r}",
+            subject=f"{name}: color",
+            found=given,
         ) from None
 
 
 def within_unit(name: str, rgb: np.ndarray) -> np.ndarray:
     """`rgb` if all its numbers are in [0, 1]."""
     if rgb.size and (rgb.min() < 0 or rgb.max() > 1):
-        raise InputError(
-            f"color: expected numbers in [0, 1], found {rgb.min():g} to {rgb.max():g}", subject=name
-        )
+        low, high = rgb.min(), rgb.max()
+        words = f"expected numbers in [0, 1], found {low:g} to {high:g}"
+        raise InputError(words, subject=f"{name}: color", found=(low, high))
     return rgb
 
 

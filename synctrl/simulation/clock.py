@@ -170,7 +170,9 @@ def make_clock(
     """
     duration, dt = positive_number("duration", duration), positive_number("dt", dt)
     if dt > duration:
-        raise InputError(f"expected at most the duration of {duration:g} s, found {dt:g} s", subject="dt")
+        raise InputError(
+            f"expected at most the duration of {duration:g} s, found {dt:g} s", subject="dt", found=dt
+        )
     if duration / dt > MAX_STEPS:
         raise InputError(f"{duration:g} s in steps of {dt:g} s are more than {MAX_STEPS} steps", subject="dt")
     every = 1 if log_dt is None else multiple("log_dt", log_dt, dt)
@@ -230,5 +232,7 @@ def multiple(name: str, interval: float, dt: float) -> int:
     interval = positive_number(name, interval)
     count = round(interval / dt)
     if count < 1 or abs(count * dt - interval) > 1e-9 * interval:
-        raise InputError(f"expected a multiple of dt = {dt:g} s, found {interval:g} s", subject=name)
+        raise InputError(
+            f"expected a multiple of dt = {dt:g} s, found {interval:g} s", subject=name, found=interval
+        )
     return count

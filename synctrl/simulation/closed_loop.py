@@ -244,14 +244,15 @@ class ClosedLoop:
         for what, rows in found.items():
             if not np.isfinite(rows).all():
                 i = int(np.argmin(np.isfinite(rows).all(axis=1)))
-                raise self._lost(f"{self.cell.names[i]} {rows[i].tolist()} as its {what}", i)
+                raise self._lost(f"{self.cell.names[i]} {rows[i].tolist()} as its {what}", rows[i], i)
         if not np.isfinite(signals.memory_dot).all():
-            raise self._lost(f"{signals.memory_dot.tolist()!s:.200} as the rate of its memory", None)
+            found = signals.memory_dot
+            raise self._lost(f"{found.tolist()!s:.200} as the rate of its memory", found, None)
 
-    def _lost(self, what: str, robot: int | None) -> NonFiniteError:
+    def _lost(self, what: str, found: np.ndarray, robot: int | None) -> NonFiniteError:
         names = " or ".join(dict.fromkeys(kind.__qualname__ for kind in self._foreign))
         text = f"{names} gives {what}, from a state that is finite; expected finite numbers"
-        return NonFiniteError(text, robot=robot, cause="part")
+        return NonFiniteError(text, robot=robot, cause="part").about(names, found=found)
 
 
 def _is_ours(kind: type) -> bool:

@@ -228,6 +228,8 @@ def find_engine(engine: str | Engine) -> Engine:
     if isinstance(engine, type) or not all(callable(getattr(engine, m, None)) for m in ("refuses", "run")):
         known = ", ".join(map(repr, ENGINES))
         raise InputError(
-            f"expected one of {known}, or an engine of your own, found {engine!r}", subject="engine"
+            f"expected one of {known}, or an engine of your own, found {engine!r}",
+            subject="engine",
+            found=engine,
         )
     return engine

@@ -132,7 +132,7 @@ def stopped(loop: ClosedLoop, t: float, y: np.ndarray, v: np.ndarray, found: Ala
         f"the {check} of {name} is {value:.3g} at t = {t:g} s; {loop.cell.space!r} says that its coordinates "
         "mean nothing there",
         **about,
-    )
+    ).about(check, found=value)
 
 
 def _run_away(loop: ClosedLoop, t: float, y: np.ndarray, v: np.ndarray) -> NonFiniteError:

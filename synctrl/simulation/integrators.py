@@ -112,6 +112,7 @@ def _check_thread(method: str, version: str) -> None:
             f"LSODA of SciPy {version} solves one problem at a time, so it runs in the main thread only, "
             f"found thread '{current_thread().name}'; use another method, or SciPy 1.17 or newer",
             subject="integrator",
+            found=current_thread().name,
         )
 
 

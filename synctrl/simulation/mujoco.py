@@ -245,6 +245,7 @@ def _common_gravity(cell: Cell) -> np.ndarray:
                 f"MuJoCo has one gravity for all robots, expected that of {cell.names[0]}, "
                 f"{expected.tolist()} m/s^2, for {name} as well, found {robot.gravity_vector.tolist()}",
                 subject="cell",
+                found=robot.gravity_vector.tolist(),
             )
     return expected
 

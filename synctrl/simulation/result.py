@@ -208,7 +208,9 @@ def _check_outputs(result: Result) -> None:
     described = result.info.get("outputs", {})
     if described.keys() != result.outputs.keys():
         raise InputError(
-            f"expected those of info['outputs'], {[*described]}, found {[*result.outputs]}", subject="outputs"
+            f"expected those of info['outputs'], {[*described]}, found {[*result.outputs]}",
+            subject="outputs",
+            found=[*result.outputs],
         )
     expected = shapes(result.info, len(result.t)) if described else {}
     for name, array in result.outputs.items():

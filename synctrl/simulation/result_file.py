@@ -82,7 +82,7 @@ def write_result(path: Path, info: Mapping[str, Any], arrays: Mapping[str, np.nd
         try:
             text = json.dumps(info)
         except (TypeError, ValueError, RecursionError) as error:
-            raise ResultError(f"expected plain data, found {error}", subject="info") from None
+            raise ResultError(f"expected plain data, found {error}", subject="info", found=error) from None
         check_info(read_json(text))
         check_arrays(info, arrays)
         content: dict[str, Any] = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
@@ -115,9 +115,9 @@ def _named(path: Path, what: str) -> Iterator[None]:
     try:
         yield
     except (ResultError, *_DAMAGE_OF_ARCHIVES) as error:
-        damage = ResultError(f"{what} '{path}': {error}", file=path)
-        damage.subject, damage.found = getattr(error, "subject", None), getattr(error, "found", None)
-        raise damage from error
+        found = getattr(error, "found", None) or getattr(error, "strerror", None)
+        damage = ResultError(f"{what} '{path}': {error}", file=path, found=found)
+        raise damage.about(getattr(error, "subject", None)) from error
 
 
 # -- archives ---------------------------------------------------------------------------------------------
@@ -166,7 +166,9 @@ def _read_text(archive: zipfile.ZipFile, member: zipfile.ZipInfo | None) -> str:
         header = _read_header(stream, member)
         if header.dtype.kind != "U" or header.shape:
             raise ResultError(
-                f"expected a text, found {header.dtype} of shape {header.shape}", subject="info"
+                f"expected a text, found {header.dtype} of shape {header.shape}",
+                subject="info",
+                found=(str(header.dtype), header.shape),
             )
         return str(_read_numbers(stream, header))
 
@@ -199,6 +201,7 @@ def _read_header(stream: IO[bytes], member: zipfile.ZipInfo) -> Header:
             f"expected {size} bytes of an array of shape {shape}, found "
             f"{member.file_size - length - len(start)}",
             subject=f"{member.filename!a}",
+            found=member.file_size - length - len(start),
         )
     return Header(np.dtype(f"{byte_order}{kind}{width}"), "F" if fortran == "True" else "C", shape)
 
@@ -243,7 +246,9 @@ def check_arrays(info: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> N
         if name in LAYOUT and not np.isfinite(array).all():
             where = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
             raise ResultError(
-                f"expected finite numbers, found {array[where]} at {where}", subject=f"array '{name}'"
+                f"expected finite numbers, found {array[where]} at {where}",
+                subject=f"array '{name}'",
+                found=array[where],
             )
     _check_times(arrays["t"])
 
@@ -274,7 +279,9 @@ def check_shape(name: str, dtype: np.dtype, found: tuple[int, ...], expected: tu
     )
     if not fits or dtype != np.float64:
         raise ResultError(
-            f"expected float64 of shape {expected}, found {dtype} of shape {found}", subject=f"array '{name}'"
+            f"expected float64 of shape {expected}, found {dtype} of shape {found}",
+            subject=f"array '{name}'",
+            found=(str(dtype), found),
         )
 
 
@@ -284,4 +291,5 @@ def _check_times(t: np.ndarray) -> None:
         raise ResultError(
             f"expected times that grow, at most {LATEST:g} s, found {t[wrong[0]]} at {wrong[0]}",
             subject="array 't'",
+            found=t[wrong[0]],
         )

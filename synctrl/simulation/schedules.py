@@ -94,6 +94,7 @@ def _check(cell: Cell, disturbance: Disturbance) -> None:
         raise InputError(
             f"expected a number or shape ({nv},), found {disturbance.torque.shape}",
             subject="disturbance, torque",
+            found=disturbance.torque.shape,
         )
 
 

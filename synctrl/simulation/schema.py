@@ -33,7 +33,7 @@ def read_json(text: str) -> Any:
     try:
         data = json.loads(text, object_pairs_hook=_once)
     except (ValueError, RecursionError) as error:
-        raise ResultError(f"expected JSON, found {error}", subject="info") from None
+        raise ResultError(f"expected JSON, found {error}", subject="info", found=error) from None
     anything("info", data, {})
     return data
 
@@ -167,7 +167,7 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _refuse(where: str, expected: str, found: Any) -> NoReturn:
-    raise ResultError(f"expected {expected}, found {found!a:.80}", subject=where)
+    raise ResultError(f"expected {expected}, found {found!a:.80}", subject=where, found=found)
 
 
 # -- info of a result --------------------------------------------------------------------------------------
@@ -262,7 +262,7 @@ def check_info(info: Any) -> None:
     """
     form = info.get("format") if isinstance(info, dict) else type(info).__name__
     if form not in FORMATS:
-        raise ResultError(f"expected the format '{FORMAT}', found {form!a:.80}")
+        raise ResultError(f"expected the format '{FORMAT}', found {form!a:.80}", found=form)
     entries({"sizes": SIZES})("info", info, {})
     INFO("info", info, info["sizes"])
     _check_robots(info["robots"], info["sizes"])
@@ -271,6 +271,7 @@ def check_info(info: Any) -> None:
             raise ResultError(
                 f"expected an identifier with 'time' as its first axis, found {about['axes']!a:.80}",
                 subject=f"info, outputs, {name}",
+                found=about["axes"],
             )
 
 
@@ -288,4 +289,5 @@ def _check_robots(robots: list[dict[str, Any]], sizes: Mapping[str, int]) -> Non
                 "expected as many theta as parameters, and torque_limits and joint_units as joints, up to "
                 f"{sizes['parameter']} and {sizes['joint']}, found {found}",
                 subject=f"info, robots[{k}]",
+                found=found,
             )

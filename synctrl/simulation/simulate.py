@@ -247,7 +247,9 @@ def _carry_out(
     choice("integrator", integrator, ("rk4", *ADAPTIVE))
     by = find_engine(engine)
     if progress is not None and not callable(progress):
-        raise InputError(f"expected a function of the time reached, found {progress!r}", subject="progress")
+        raise InputError(
+            f"expected a function of the time reached, found {progress!r}", subject="progress", found=progress
+        )
     rtol, atol = (positive_number(*each) for each in zip(("rtol", "atol"), tolerances, strict=True))
     adaptive = integrator != "rk4"
     if adaptive:
@@ -268,7 +270,7 @@ def _needs_rk4(integrator: str, engine: str | Engine, control_period: float | No
         raise InputError(f"{expected}, found {integrator!r}", subject="integrator", found=integrator)
     if control_period is not None:
         expected = "sampled control needs the integrator 'rk4'"
-        raise InputError(f"{expected}, found {integrator!r}", subject="control_period")
+        raise InputError(f"{expected}, found {integrator!r}", subject="control_period", found=integrator)
 
 
 def _describe(disturbance: Disturbance) -> dict[str, Any]:

@@ -95,7 +95,9 @@ def _connected(client: Any, workers: int) -> Iterator[Any]:
         return
     if client is not None and not isinstance(client, str):
         raise InputError(
-            f"expected a Dask client or an address, found {type(client).__name__}", subject="client"
+            f"expected a Dask client or an address, found {type(client).__name__}",
+            subject="client",
+            found=type(client).__name__,
         )
     with contextlib.ExitStack() as stack:
         if client is None:

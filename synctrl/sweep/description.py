@@ -97,7 +97,11 @@ def row_format(about: Mapping[str, Any]) -> Format:
     measures = FORMATS[about["format"]]
     expected = columns(factors, measures)
     if about.get("columns") != expected:
-        raise InputError(f"expected {expected}, found {about.get('columns')!r}", subject="columns")
+        raise InputError(
+            f"expected {expected}, found {about.get('columns')!r}",
+            subject="columns",
+            found=about.get("columns"),
+        )
     duration = positive_number("duration", about.get("duration"))
     if "search" in about:
         instance("search", about["search"], Mapping, "a description of the search")
@@ -106,7 +110,9 @@ def row_format(about: Mapping[str, Any]) -> Format:
     draws = Draws(factors, count("samples", about.get("samples")), count("seed", about.get("seed"), least=0))
     if about.get("runs") != draws.count:
         raise InputError(
-            f"expected {draws.count}, as the factors say, found {about.get('runs')!r}", subject="runs"
+            f"expected {draws.count}, as the factors say, found {about.get('runs')!r}",
+            subject="runs",
+            found=about.get("runs"),
         )
     return Format(expected, draws, duration, measures)
 
@@ -118,7 +124,9 @@ def checked_bands(bands: Any) -> dict[str, Band]:
         InputError: other kinds, or values that are no band.
     """
     if not isinstance(bands, Mapping) or set(bands) != set(ERRORS):
-        raise InputError(f"expected numbers for {' and '.join(ERRORS)}, found {bands!r}", subject="bands")
+        raise InputError(
+            f"expected numbers for {' and '.join(ERRORS)}, found {bands!r}", subject="bands", found=bands
+        )
     return {kind: checked_band(f"bands, {kind}", bands[kind]) for kind in ERRORS}
 
 
@@ -149,7 +157,7 @@ def _described_factors(factors: Any) -> dict[str, Values | None]:
         instance("factors", name, str, "the name of a factor")
         instance(f"factor '{name}'", values, Mapping, "a description of its values")
         if name in found:
-            raise InputError(f"expected different names, found '{name}' again", subject="factors")
+            raise InputError(f"expected different names, found '{name}' again", subject="factors", found=name)
         found[name] = described(values)
     if not found:
         raise InputError("expected at least one, found none", subject="factors")

@@ -42,7 +42,11 @@ class _Interval:
         for name in ("low", "high"):
             object.__setattr__(self, name, finite_number(f"{kind}, {name}", getattr(self, name)))
         if not self.low < self.high:
-            raise InputError(f"expected low < high, found {self.low:g} and {self.high:g}", subject=kind)
+            raise InputError(
+                f"expected low < high, found {self.low:g} and {self.high:g}",
+                subject=kind,
+                found=(self.low, self.high),
+            )
 
     def at(self, share: float) -> float:
         """The value below which a share of the distribution lies, 0 <= share <= 1."""
@@ -114,10 +118,14 @@ class _Listed:
     def __init__(self, values: Sequence[Any]):
         kind = type(self).__name__
         if isinstance(values, str) or not len(values):
-            raise InputError(f"expected a list of numbers, words or parts, found {values!r}", subject=kind)
+            raise InputError(
+                f"expected a list of numbers, words or parts, found {values!r}", subject=kind, found=values
+            )
         self.values = tuple(_plain(kind, part_label(value) if is_part(value) else value) for value in values)
         if len(set(self.values)) != len(self.values):
-            raise InputError(f"expected different values, found {list(self.values)}", subject=kind)
+            raise InputError(
+                f"expected different values, found {list(self.values)}", subject=kind, found=list(self.values)
+            )
         self.meant: Mapping[Value, Any] = dict(zip(self.values, values, strict=True))
 
     def describe(self) -> dict[str, Any]:
@@ -210,6 +218,7 @@ def part_label(part: Any) -> str:
         raise InputError(
             f"expected settings that are plain data from as_dict, found {settings!r}",
             subject=type(part).__name__,
+            found=settings,
         ) from error
     return f"{settings['name']}({', '.join(f'{key}={text[key]}' for key in settings if key != 'name')})"
 
@@ -224,7 +233,9 @@ def _plain(name: str, value: Any) -> Value:
     if not isinstance(value, str):
         return finite_number(name, value)
     if not is_text(value):
-        raise InputError(f"expected a word that can be written to a file, found {value!a}", subject=name)
+        raise InputError(
+            f"expected a word that can be written to a file, found {value!a}", subject=name, found=value
+        )
     return str(value)
 
 

@@ -61,15 +61,20 @@ class Factor:
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():
-            raise InputError(f"expected a name, found {self.name!r}", subject="factor")
+            raise InputError(f"expected a name, found {self.name!r}", subject="factor", found=self.name)
         needed = ("describe",) if isinstance(self.values, Grid) else ("draw", "describe")
         if not all(callable(getattr(self.values, method, None)) for method in needed):
             raise InputError(
                 f"expected a distribution, which has draw and describe, or a Grid, found {self.values!r}",
                 subject=f"factor '{self.name}'",
+                found=self.values,
             )
         if not callable(self.change):
-            raise InputError(f"expected a function, found {self.change!r}", subject=f"factor '{self.name}'")
+            raise InputError(
+                f"expected a function, found {self.change!r}",
+                subject=f"factor '{self.name}'",
+                found=self.change,
+            )
 
     def apply(self, setup: Setup, value: Value) -> Setup:
         """The setup with this factor at a value.
@@ -193,7 +198,9 @@ def _part(name: str, values: Grid | Choice) -> Factor:
     instance(name, values, (Grid, Choice), f"a Grid or a Choice of kinds of {name}")
     for value in values.meant.values():
         if not is_part(value):
-            raise InputError(f"expected parts with bind and as_dict, found {value!r}", subject=name)
+            raise InputError(
+                f"expected parts with bind and as_dict, found {value!r}", subject=name, found=value
+            )
     return Factor(name, values, partial(variations.with_part, part=name, meant=values.meant))
 
 

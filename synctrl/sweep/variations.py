@@ -133,6 +133,7 @@ def same_parameters(parameters: Parameters, robot: Robot) -> Parameters:
         f"expected full, linear or friction parameters, found {type(parameters).__name__} "
         f"for robot '{robot.name}'; vary them with a function of your own",
         subject="true parameters",
+        found=type(parameters).__name__,
     )
 
 

@@ -69,7 +69,9 @@ class Redundancy:
         weights = _rows("weights", self.weights, robots, 1.0)
         if any((row <= 0).any() for row in weights):
             lowest = min(map(min, weights))
-            raise InputError(f"expected numbers above 0, found {lowest}", subject="redundancy, weights")
+            raise InputError(
+                f"expected numbers above 0, found {lowest}", subject="redundancy, weights", found=lowest
+            )
         gain = 0.0 if self.posture is None else self.gain
         posture = _rows("posture", self.posture, robots, 0.0)
         gains = [np.full(robot.nv, gain) for robot in robots]
@@ -253,10 +255,14 @@ def _rows(name: str, value: ArrayLike | None, robots: Sequence[Robot], default: 
     where = f"redundancy, {name}"
     given: Any = list(value) if isinstance(value, np.ndarray) and value.ndim else value
     if not isinstance(given, (list, tuple)) or not len(given) or np.ndim(given[0]) > 1:
-        raise InputError(f"expected one row of numbers, or a list of rows, found {value!r}", subject=where)
+        raise InputError(
+            f"expected one row of numbers, or a list of rows, found {value!r}", subject=where, found=value
+        )
     rows = given if np.ndim(given[0]) else [given] * len(robots)
     if len(rows) != len(robots):
-        raise InputError(f"expected {len(robots)} rows, one per robot, found {len(rows)}", subject=where)
+        raise InputError(
+            f"expected {len(robots)} rows, one per robot, found {len(rows)}", subject=where, found=len(rows)
+        )
     return [
         finite_array(f"{where} of '{robot.name}'", row, (robot.nv,))
         for robot, row in zip(robots, rows, strict=True)

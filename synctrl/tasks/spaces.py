@@ -114,6 +114,7 @@ class JointSpace:
                 f"expected robots with the same number of joints, found {found}; "
                 "synchronize such robots in Cartesian space",
                 subject="joint space",
+                found=found,
             )
         return BoundJointSpace()
 
@@ -222,7 +223,9 @@ class TipSpace(ABC):
         for robot in robots:
             if robot.nv < self.m:
                 expected = f"expected robots with at least {self.m} joints"
-                raise InputError(f"{expected}, found '{robot.name}' with {robot.nv}", subject=repr(self))
+                raise InputError(
+                    f"{expected}, found '{robot.name}' with {robot.nv}", subject=repr(self), found=robot.nv
+                )
         return self.over(Tips(robots), [[robot.nv] for robot in robots], self.redundancy.spread(robots))
 
     def over(
@@ -270,7 +273,9 @@ class CartesianSpace(TipSpace):
         redundancy: Redundancy | None = None,
     ):
         if not isinstance(axes, str) or not axes or set(axes) - set(AXES) or len(set(axes)) != len(axes):
-            raise InputError(f"expected different letters out of x, y, z, found {axes!r}", subject="axes")
+            raise InputError(
+                f"expected different letters out of x, y, z, found {axes!r}", subject="axes", found=axes
+            )
         super().__init__(len(axes), max_condition, singularity, redundancy)
         self.axes = axes
         self.rows = [AXES.index(a) for a in axes]

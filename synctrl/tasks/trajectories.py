@@ -154,7 +154,9 @@ class Circle:
         axes = np.array([self.first, self.second])
         if not np.allclose(axes @ axes.T, np.eye(2), atol=1e-9):
             raise TrajectoryError(
-                f"expected orthonormal axes, found {self.first} and {self.second}", subject="first, second"
+                f"expected orthonormal axes, found {self.first} and {self.second}",
+                subject="first, second",
+                found=(self.first, self.second),
             )
 
     def __call__(self, t: ArrayLike) -> Motion:

@@ -81,9 +81,15 @@ def chosen(Gamma: np.ndarray | RaggedGain | None, adaptation: Adaptation | None)
         return Gradient(Gamma)
     if adaptation is None or Gamma is not None:
         found = "neither" if adaptation is None else "both"
-        raise InputError(f"expected the gain Gamma or an adaptation, found {found}", subject="adaptation")
+        raise InputError(
+            f"expected the gain Gamma or an adaptation, found {found}", subject="adaptation", found=found
+        )
     if not hasattr(adaptation, "bind") or isinstance(adaptation, type):
-        raise InputError(f"expected, for example, Gradient(0.3), found {adaptation!r}", subject="adaptation")
+        raise InputError(
+            f"expected, for example, Gradient(0.3), found {adaptation!r}",
+            subject="adaptation",
+            found=adaptation,
+        )
     return adaptation
 
 

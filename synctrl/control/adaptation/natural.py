@@ -57,6 +57,7 @@ class Natural:
                 "Natural expects robots with the same numbers of bodies and parameters, found "
                 f"{bodies} bodies",
                 subject="adaptation",
+                found=bodies,
             )
         return BoundNatural(cell, bodies[0], self.gamma, self.gamma_friction)
 
@@ -81,6 +82,7 @@ class BoundNatural:
                 "Natural starts from bodies that can exist; the "
                 f"pseudo-inertia of body {k + 1} has the eigenvalue {smallest[i, k]:.3g}, expected above 0",
                 subject=f"theta_hat0 of {self._cell.names[i]}",
+                found=smallest[i, k],
             )
         L = np.linalg.cholesky(P)
         return self._join(_entries(L), friction)

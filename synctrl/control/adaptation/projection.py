@@ -100,7 +100,9 @@ class Ball:
         """
         if self.radius.shape not in ((), (cell.n,)):
             raise InputError(
-                f"expected a number or shape ({cell.n},), found {self.radius.shape}", subject="radius"
+                f"expected a number or shape ({cell.n},), found {self.radius.shape}",
+                subject="radius",
+                found=self.radius.shape,
             )
         return BoundBall(cell, metric_of(self.Gamma, cell), np.broadcast_to(self.radius, cell.n))
 

@@ -44,7 +44,7 @@ def chosen(law: Law | None, reference_acceleration: str | None, k_r_space: str |
         law = SunMills(reference_acceleration or "exact", k_r_space or "joint")
     elif not hasattr(law, "bind") or isinstance(law, type):
         raise InputError(
-            f"expected, for example, SunMills() or ChungSlotine(0.3), found {law!r}", subject="law"
+            f"expected, for example, SunMills() or ChungSlotine(0.3), found {law!r}", subject="law", found=law
         )
     acceleration = _agreed("reference_acceleration", reference_acceleration, law, "exact")
     space = getattr(law, "k_r_space", k_r_space or "joint")
@@ -60,5 +60,6 @@ def _agreed(name: str, given: str | None, law: Law, otherwise: str) -> str:
             f"expected {own!r}, which is what the law {type(law).__name__} has, or nothing beside "
             f"it, found {given!r}",
             subject=name,
+            found=given,
         )
     return own

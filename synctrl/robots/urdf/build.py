@@ -71,6 +71,7 @@ def _check_inertias(document: Document, model: pin.Model) -> None:
             raise document.error(
                 f"expected a model with the inertial parameters of the document, {wanted}, found {found}",
                 joints[name],
+                found=found,
             )
 
 

@@ -41,7 +41,9 @@ def with_inertials(document: Document, inertials: Mapping[str, Inertial | Mappin
     for name in inertials:
         if name not in names:
             found = f"{name!a}{near(str(name), names)}"
-            raise InputError(f"expected links of {document.source}, found {found}", subject="inertials")
+            raise InputError(
+                f"expected links of {document.source}, found {found}", subject="inertials", found=found
+            )
     given = {name: _inertial(f"inertials[{name!a}]", value) for name, value in inertials.items()}
     links = (replace(link, inertial=given.get(link.name, link.inertial)) for link in document.links)
     return replace(document, links=tuple(links))
@@ -53,7 +55,7 @@ def _inertial(subject: str, value: Inertial | Mapping[str, Any]) -> Inertial:
     instance(subject, value, Mapping, "an Inertial or a mapping")
     for key in value:
         if key not in KEYS:
-            raise InputError(f"expected {', '.join(KEYS)}, found {key!a}", subject=subject)
+            raise InputError(f"expected {', '.join(KEYS)}, found {key!a}", subject=subject, found=key)
     for key in ("mass", "inertia"):
         if key not in value:
             raise InputError(f"expected '{key}', found none", subject=subject)
@@ -130,7 +132,9 @@ def _check_position(document: Document, joint: Joint, position: float) -> None:
         return
     if not limit.lower <= position <= limit.upper:
         raise document.error(
-            f"expected a position from {limit.lower:g} to {limit.upper:g}, found {position:g}", joint
+            f"expected a position from {limit.lower:g} to {limit.upper:g}, found {position:g}",
+            joint,
+            found=position,
         )
 
 

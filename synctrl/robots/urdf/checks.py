@@ -79,7 +79,9 @@ def _check_unique(document: Document) -> None:
             if item.name in first:
                 before = first[item.name].line
                 line = f" in line {before}" if before else ""
-                raise document.error(f"expected a unique name, found another {kind}{line}", item)
+                raise document.error(
+                    f"expected a unique name, found another {kind}{line}", item, found=f"another {kind}"
+                )
             first[item.name] = item
 
 
@@ -89,11 +91,15 @@ def _check_references(document: Document) -> None:
         for role, name in (("parent", joint.parent), ("child", joint.child)):
             if name not in links:
                 raise document.error(
-                    f"expected a {role} among the links, found {quoted(name)}{near(name, links)}", joint
+                    f"expected a {role} among the links, found {quoted(name)}{near(name, links)}",
+                    joint,
+                    found=name,
                 )
         if joint.parent == joint.child:
             raise document.error(
-                f"expected two links, found {quoted(joint.child)} as both parent and child", joint
+                f"expected two links, found {quoted(joint.child)} as both parent and child",
+                joint,
+                found=joint.child,
             )
 
 
@@ -105,13 +111,15 @@ def _check_roots(document: Document) -> None:
                 f"expected a tree, in which link {quoted(joint.child)} has one parent joint, found "
                 f"{quoted(joint_of[joint.child].name)} too",
                 joint,
+                found=joint_of[joint.child].name,
             )
         joint_of[joint.child] = joint
     roots = [link.name for link in document.links if link.name not in joint_of]
     if len(roots) > 1:
         raise document.error(
             f"expected one root link, found {len(roots)}: {some(roots)}; "
-            "each other link needs a joint whose child it is"
+            "each other link needs a joint whose child it is",
+            found=len(roots),
         )
     if not roots:
         raise document.error("expected a root link, found a cycle through every link")

@@ -194,11 +194,11 @@ def existing_file(path: str | Path) -> Path:
         kind = "a folder" if file.is_dir() else "no such file"
         beside = sorted(f.name for f in file.parent.glob("*.urdf"))
     except (OSError, ValueError) as error:
-        raise RobotError(f"{expected}, found: {error}", file=shown) from error
+        raise RobotError(f"{expected}, found: {error}", file=shown, found=str(error)) from error
     hint = near(file.name, beside) or (
         f"; in its folder there are: {', '.join(beside[:5])}" if beside else ""
     )
-    raise RobotError(f"expected a URDF file, found {kind}{hint}", file=file)
+    raise RobotError(f"expected a URDF file, found {kind}{hint}", file=file, found=kind)
 
 
 def read_source(
@@ -214,7 +214,8 @@ def read_source(
     if file.suffix.lower() == XACRO_SUFFIX:
         return read_text(file, expand(file, xacro_args, packages).encode(), notes)
     if xacro_args is not None:
-        raise InputError(f"expected none for a file that is no xacro file: {file}", subject="xacro_args")
+        words = f"expected none for a file that is no xacro file: {file}"
+        raise InputError(words, subject="xacro_args", found=tuple(xacro_args))
     data = read_bytes(file)
     if file.suffix.lower() != ".urdf" and parse_xml(str(file), data).tag == MJCF_ROOT:
         return read_mjcf(file, packages, notes)

@@ -40,7 +40,10 @@ def read_mjcf(file: Path, packages: Packages, notes: Notes) -> Document:
     try:
         model = mujoco.MjModel.from_xml_string(whole.text, whole.assets)
     except ValueError as error:
-        raise RobotError(f"expected MJCF that MuJoCo compiles, found: {_line(error)}", file=file) from error
+        found = _line(error)
+        raise RobotError(
+            f"expected MJCF that MuJoCo compiles, found: {found}", file=file, found=found
+        ) from error
     writer = _Writer(mujoco, model, whole, file, notes)
     document = writer.document()
     check_dynamics(mujoco, model, document, writer.held)
@@ -51,9 +54,8 @@ def _mujoco(file: Path) -> Any:
     try:
         import mujoco
     except ImportError as error:
-        raise MissingDependencyError(
-            f"{file}: reading MJCF needs MuJoCo: pip install 'synctrl[mujoco]'"
-        ) from error
+        words = f"{file}: reading MJCF needs MuJoCo: pip install 'synctrl[mujoco]'"
+        raise MissingDependencyError(words, file=file, found="mujoco") from error
     return mujoco
 
 
@@ -95,8 +97,10 @@ class _Writer:
         taken = set(names)
         return [name or unique(f"{word}{k}", taken) for k, name in enumerate(names)]
 
-    def _error(self, problem: str, subject: str | None = None) -> RobotError:
-        return RobotError(problem, subject=subject, file=self.file)
+    def _error(self, expected: str, found: str, subject: str | None = None, more: str = "") -> RobotError:
+        return RobotError(
+            f"expected {expected}, found {found}{more}", subject=subject, found=found, file=self.file
+        )
 
     # -- what is no such robot ----------------------------------------------------------------------------
 
@@ -104,16 +108,12 @@ class _Writer:
         model = self.model
         for name, kind in zip(self.joint_names, map(int, model.jnt_type), strict=True):
             if found := _REFUSED_TYPES.get(kind):
-                raise self._error(
-                    f"expected hinges and slides on a fixed base, found {found}", f"joint {quoted(name)}"
-                )
+                raise self._error("hinges and slides on a fixed base", found, f"joint {quoted(name)}")
         for body in np.flatnonzero(model.body_jntnum > 1):
-            found = f"{model.body_jntnum[body]}, and nothing between them that has a mass"
-            raise self._error(
-                f"expected one joint of a body, found {found}", f"body {quoted(self.bodies[body])}"
-            )
+            found, more = str(model.body_jntnum[body]), ", and nothing between them that has a mass"
+            raise self._error("one joint of a body", found, f"body {quoted(self.bodies[body])}", more)
         if model.nflex:
-            raise self._error("expected rigid bodies, found a flexible one")
+            raise self._error("rigid bodies", "a flexible one")
         if model.ntendon:
             self.notes.add("left out", "tendon", "tendons, with their springs, dampers and limits")
         for joint in np.flatnonzero(model.jnt_stiffness):
@@ -200,9 +200,7 @@ class _Writer:
                 continue
             if kind != int(kinds.mjEQ_JOINT):
                 found = kinds(kind).name.removeprefix("mjEQ_").lower()
-                raise self._error(
-                    f"expected a tree, found an equality of kind '{found}', which closes a loop"
-                )
+                raise self._error("a tree", f"an equality of kind '{found}'", more=", which closes a loop")
             if self.joint_names[model.eq_obj1id[k]] == joint.name:
                 joint = self._follower(joint, k)
         return joint
@@ -216,9 +214,7 @@ class _Writer:
             self.held[joint.name] = rest
             return joint.fixed(rest)
         if any(higher):
-            raise self._error(
-                "expected joints that follow each other in proportion, found a curve", joint.title
-            )
+            raise self._error("joints that follow each other in proportion", "a curve", joint.title)
         offset = rest - float(slope) * float(model.qpos0[model.jnt_qposadr[leader]])
         return replace(joint, mimic=Mimic(self.joint_names[leader], float(slope), offset))
 

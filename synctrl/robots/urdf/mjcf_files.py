@@ -21,11 +21,11 @@ MAX_MESH_BYTES = 50_000_000
 NOT_NEEDED = ("visual", "statistic", "custom", "sensor", "keyframe", "contact")
 """Sections that say nothing about the mechanism."""
 REFUSED = {
-    "extension": "a plugin, which can do anything to the dynamics",
-    "plugin": "a plugin, which can do anything to the dynamics",
-    "model": "a model within the model; write it out with mujoco's MjSpec first",
-    "flexcomp": "a flexible body",
-    "composite": "a composite body",
+    "extension": ("a plugin", ", which can do anything to the dynamics"),
+    "plugin": ("a plugin", ", which can do anything to the dynamics"),
+    "model": ("a model within the model", "; write it out with mujoco's MjSpec first"),
+    "flexcomp": ("a flexible body", ""),
+    "composite": ("a composite body", ""),
 }
 _PICTURES = ("texture", "skin", "layer")
 _TETRAHEDRON = "0 0 0 1 0 0 0 1 0 0 0 1"
@@ -79,7 +79,7 @@ class _Reader:
         weighty = _weighty_meshes(root, compiler.get("inertiafromgeom") == "true")
         for element in root.walk():
             if element.tag in REFUSED:
-                element.refuse("one rigid mechanism", REFUSED[element.tag])
+                element.refuse("one rigid mechanism", *REFUSED[element.tag])
             if element.tag == "mesh" and "file" in element.attributes:
                 self._mesh(element, compiler, weighty)
             elif named := [name for name in element.attributes if name.startswith("file")]:
@@ -101,7 +101,8 @@ class _Reader:
     def _included(self, element: Element) -> Element:
         self.included += 1
         if self.included > MAX_INCLUDES:
-            element.refuse(f"at most {MAX_INCLUDES} files included", "more; does a file include itself?")
+            words = f"at most {MAX_INCLUDES} files included"
+            element.refuse(words, "more", "; does a file include itself?")
         named = element.text("file")
         places = (self.file.parent / named, Path(element.file).parent / named)
         for file in places:
@@ -139,12 +140,13 @@ class _Reader:
     def _content(self, element: Element, path: Path) -> bytes:
         expected, file = "a mesh, from which a body without <inertial> has its mass", self.file.parent / path
         if not self.packages.allows(file):
-            element.refuse(expected, f"{quoted(str(path))} outside of the package")
+            place = "outside of the package"
+            raise element.error(f"expected {expected}, found {quoted(str(path))} {place}", place)
         try:
             return read_regular(file, MAX_MESH_BYTES)
         except Unusable as error:
-            found = f"{quoted(str(path))}: {error}"
-            raise element.error(f"expected {expected}, found {found}") from error
+            words = f"expected {expected}, found {quoted(str(path))}: {error}"
+            raise element.error(words, str(error)) from error
 
 
 def _weighty_meshes(root: Element, all_of_them: bool) -> set[str]:

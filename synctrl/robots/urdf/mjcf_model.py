@@ -93,7 +93,8 @@ def check_dynamics(mujoco: Any, compiled: Any, document: Document, held: Mapping
         if abs(found - expected).max() > SAME * max(abs(expected).max(), 1e-9):
             raise document.error(
                 f"expected the torque that MuJoCo computes, {expected}, found {found}: something in the file "
-                "acts on the joints that is not read here"
+                "acts on the joints that is not read here",
+                found=found,
             )
 
 

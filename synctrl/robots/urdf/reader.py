@@ -185,7 +185,8 @@ LINK_EXTENSIONS = ("contact", "surface", "gravity", "kinematic", "self_filter", 
 
 _DEFINITIONS = ("xacro:property", "xacro:arg")
 _EXPANDS = "a plain URDF"
-_ADVICE = "unexpanded xacro; expand the file with xacro first, or load the .xacro file itself"
+_ADVICE = ": unexpanded xacro; expand the file with xacro first, or load the .xacro file itself"
+_TREE, _CLOSING = "a tree of links and joints", ", which closes a loop"
 _CLOSES = ("loop_joint", "closed_loop", "loop_closure", "ball_constraint", "linear_bushing_rpy", "equality")
 
 
@@ -200,12 +201,12 @@ def refuse_xacro(root: Element) -> None:
     unused = [child for child in root.children if child.tag in _DEFINITIONS and not child.children]
     for element in root.walk():
         if element.tag.startswith("xacro:") and element not in unused:
-            element.refuse(_EXPANDS, f"<{shown_tag(element.tag)}>: {_ADVICE}")
+            element.refuse(_EXPANDS, f"<{shown_tag(element.tag)}>", _ADVICE)
     robot = (part for child in root.children if child.tag not in EXTENSIONS for part in child.walk())
     for element in (root, *robot):
         for key, value in element.attributes.items():
             if "${" in value or "$(" in value:
-                element.refuse(_EXPANDS, f"{quoted(key)} of {quoted(value)}: {_ADVICE}")
+                element.refuse(_EXPANDS, f"{quoted(key)} of {quoted(value)}", _ADVICE)
 
 
 def refuse_loops(root: Element) -> None:
@@ -217,12 +218,12 @@ def refuse_loops(root: Element) -> None:
     for element in root.walk():
         name = element.tag.rpartition(":")[2]
         if name in _CLOSES or (":" in element.tag and name == "joint"):
-            element.refuse("a tree of links and joints", f"<{shown_tag(element.tag)}>, which closes a loop")
+            element.refuse(_TREE, f"<{shown_tag(element.tag)}>", _CLOSING)
     carried = {end.attributes.get("link", "") for joint in root.all("joint") for end in joint.all("child")}
     for extension in (child for child in root.children if child.tag in EXTENSIONS):
         for element in extension.walk():
             if element.tag == "joint" and _joins(element, carried):
-                element.refuse("a tree of links and joints", "a joint for a simulator, which closes a loop")
+                element.refuse(_TREE, "a joint for a simulator", _CLOSING)
 
 
 def _joins(joint: Element, carried: set[str]) -> bool:

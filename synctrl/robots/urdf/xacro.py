@@ -62,18 +62,24 @@ def expand(file: Path, args: Mapping[str, object] | None, packages: Packages) ->
     }
     answer = _conversation(file, request, packages)
     if "text" not in answer:
-        reason = str(answer.get("error") or "the process that expands it ended without an answer")
-        expected = "expected a xacro file that can be expanded"
-        raise RobotError(f"{expected}, found: {reason}{_advice(reason)}", file=file)
+        raise _failure(file, answer)
     return str(answer["text"])
 
 
-def _advice(reason: str) -> str:
-    if found := re.search(r"Undefined substitution argument (\w+)", reason):
-        return f"; give it with xacro_args={{{found[1]!r}: ...}}"
-    if re.search(r"package '[^']*' is not found", reason):
-        return "; give a folder that holds it with package_dirs=[...]"
-    return ""
+def _failure(file: Path, answer: Mapping[str, Any]) -> RobotError:
+    """Why a file does not expand; where the user can mend it, the subject is the argument that does."""
+    reason = str(answer.get("error") or "the process that expands it ended without an answer")
+    words, found = (
+        f"expected a xacro file that can be expanded, found: {reason}",
+        answer.get("found", "nothing"),
+    )
+    if missing := re.search(r"Undefined substitution argument (\w+)", reason):
+        words += f"; give it with xacro_args={{{missing[1]!r}: ...}}"
+        return RobotError(words, file=file).about("xacro_args", found=missing[1])
+    if missing := re.search(r"package '([^']*)' is not found", reason):
+        words += "; give a folder that holds it with package_dirs=[...]"
+        return RobotError(words, file=file).about("package_dirs", found=missing[1])
+    return RobotError(words, file=file, found=found)
 
 
 def _mappings(args: Mapping[str, object]) -> dict[str, str]:
@@ -81,8 +87,9 @@ def _mappings(args: Mapping[str, object]) -> dict[str, str]:
     instance("xacro_args", args, Mapping, "names with values")
     for name, value in args.items():
         if not isinstance(name, str) or not isinstance(value, (str, int, float)):
-            found = f"{name!a}: {type(value).__name__}"
-            raise InputError(f"expected a text, number or truth value, found {found}", subject="xacro_args")
+            kind = type(value).__name__
+            words = f"expected a text, number or truth value, found {name!a}: {kind}"
+            raise InputError(words, subject="xacro_args", found=kind)
     return {n: str(value).lower() if isinstance(value, bool) else str(value) for n, value in args.items()}
 
 
@@ -92,7 +99,9 @@ def _library(name: str, file: Path) -> str:
     if spec is None or spec.origin is None:
         raise MissingDependencyError(
             f"{file}: expanding a xacro file needs {name}: pip install 'synctrl[xacro]'; or expand it with "
-            "ROS first, and load the URDF"
+            "ROS first, and load the URDF",
+            file=file,
+            found=name,
         )
     return str(Path(spec.origin).parent.parent)
 
@@ -133,9 +142,8 @@ def _child(file: Path) -> Iterator[tuple[IO[str], IO[str]]]:
             command, stdin=pipe, stdout=pipe, stderr=nothing, env=given, encoding="utf-8"
         )
     except OSError as error:
-        raise RobotError(
-            f"expected a process of Python that expands it, found: {error}", file=file
-        ) from error
+        words = f"expected a process of Python that expands it, found: {error}"
+        raise RobotError(words, file=file, found="no process") from error
     late = Event()
 
     def stop() -> None:
@@ -153,4 +161,5 @@ def _child(file: Path) -> Iterator[tuple[IO[str], IO[str]]]:
         with suppress(OSError):  # what was not sent is lost with it
             child.communicate()
     if late.is_set():
-        raise RobotError(f"expected a xacro file that expands within {TIME_LIMIT:g} s, found more", file=file)
+        words = f"expected a xacro file that expands within {TIME_LIMIT:g} s, found more"
+        raise RobotError(words, file=file, found="no end")

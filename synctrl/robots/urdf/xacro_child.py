@@ -7,7 +7,8 @@ nothing pass but what expanding takes. That is a fence and no sandbox: it is bui
 
 It reads one line of JSON, {"file", "args", "roots", "libraries"}, from the standard input, and writes lines
 of JSON: {"find": name} for each package it needs, answered by a line with its folder or null, and in the end
-{"text": ...} or {"error": ...}. It imports nothing of this package, and runs with `python -I -S`.
+{"text": ...} or {"error": ..., "found": ...}, the reason in words and in one word: what the fence does not
+let pass, or else the kind of the error. It imports nothing of this package, and runs with `python -I -S`.
 """
 
 from __future__ import annotations
@@ -52,7 +53,9 @@ def main() -> None:
     try:
         _send(answer, text=_expanded(xacro, request["file"], request["args"]))
     except BaseException as error:
-        _send(answer, error=_reason(xacro, error))
+        cause = _cause(error)
+        found = getattr(cause, "event", type(cause).__name__)
+        _send(answer, error=_reason(xacro, error, cause), found=found)
 
 
 def _send(answer: TextIO, **message: str) -> None:
@@ -92,6 +95,12 @@ def _limit_resources() -> None:
 # -- the fence ---------------------------------------------------------------------------------------------
 
 
+class Fenced(PermissionError):
+    """Something that a xacro file may not do: `event` is the one of Python, or what it is about in words."""
+
+    event = ""
+
+
 def _fence(roots: list[str]) -> Callable[[str, tuple], None]:
     """An audit hook that stops every event but reading and listing below `roots`, and harmless ones."""
 
@@ -103,7 +112,7 @@ def _fence(roots: list[str]) -> Callable[[str, tuple], None]:
         elif event in LISTING:
             _check_inside(roots, args[0])
         else:
-            _refuse(f"do this: {event}", args)
+            _refuse(event, args, "do this: ")
 
     return hook
 
@@ -124,8 +133,10 @@ def _check_inside(roots: list[str], path: Any) -> None:
         _refuse("read outside of its packages", path)
 
 
-def _refuse(what: str, value: Any) -> NoReturn:
-    raise PermissionError(errno.EACCES, f"a xacro file may not {what}", ascii(value)[:200])
+def _refuse(what: str, value: Any, doing: str = "") -> NoReturn:
+    error = Fenced(errno.EACCES, f"a xacro file may not {doing}{what}", ascii(value)[:200])
+    error.event = what
+    raise error
 
 
 # -- expanding ---------------------------------------------------------------------------------------------
@@ -138,11 +149,15 @@ def _expanded(xacro: Any, file: str, args: dict[str, str]) -> str:
     return str(text)
 
 
-def _reason(xacro: Any, error: BaseException) -> str:
+def _cause(error: Any) -> BaseException:
+    """What was raised in the end, below what xacro made of it."""
+    while getattr(error, "exc", None) is not None:
+        error = error.exc
+    return error
+
+
+def _reason(xacro: Any, error: BaseException, cause: BaseException) -> str:
     """xacro's reason in one line, with the files and macros that led to it."""
-    cause: Any = error
-    while getattr(cause, "exc", None) is not None:
-        cause = cause.exc
     kind = "" if str(cause) else type(cause).__name__
     told = cause if str(error).startswith("<class") else error  # xacro repeats what the cause says
     words = " ".join([kind, *str(told).split()]).strip()

@@ -58,13 +58,13 @@ class Element:
 
     # -- saying what is wrong -----------------------------------------------------------------------------
 
-    def error(self, problem: str) -> RobotError:
+    def error(self, problem: str, found: object = None) -> RobotError:
         """An error about this element."""
-        return RobotError(problem, subject=self.place, file=self.file, line=self.line)
+        return RobotError(problem, subject=self.place, found=found, file=self.file, line=self.line)
 
-    def refuse(self, expected: str, found: str) -> NoReturn:
-        """Raise the error: this was expected, that was found."""
-        raise self.error(f"expected {expected}, found {found}")
+    def refuse(self, expected: str, found: str, more: str = "") -> NoReturn:
+        """Raise the error: this was expected, that was found; `more` says what about it."""
+        raise self.error(f"expected {expected}, found {found}{more}", found)
 
     def note(self, kind: str, text: str) -> None:
         """Remark something about this element, see `Notes`."""
@@ -198,7 +198,7 @@ def read_bytes(file: Path) -> bytes:
     try:
         return read_regular(file, MAX_BYTES)
     except Unusable as error:
-        raise RobotError(str(error), file=file) from error
+        raise RobotError(str(error), file=file, found=str(error)) from error
 
 
 def parse_xml(file: str, data: bytes, notes: Notes | None = None) -> Element:
@@ -219,13 +219,14 @@ def _utf8(file: str, data: bytes) -> bytes:
     if b"\0" in data:
         line = data.count(b"\n", 0, data.index(b"\0")) + 1
         found = "a zero character, as in UTF-16"
-        raise RobotError(f"expected text in UTF-8, found {found}", file=file, line=line)
+        raise RobotError(f"expected text in UTF-8, found {found}", file=file, line=line, found=found)
     try:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         found = f"byte {data[error.start]:#04x}"
-        raise RobotError(f"expected text in UTF-8, found {found}", file=file, line=line) from error
+        words = f"expected text in UTF-8, found {found}"
+        raise RobotError(words, file=file, line=line, found=found) from error
     return data
 
 
@@ -282,7 +283,8 @@ class _Reader:
 
     def _refuse(self, expected: str, found: str, line: int = 0) -> NoReturn:
         line = line or self.parser.CurrentLineNumber
-        raise RobotError(f"expected {expected}, found {found}", file=self.file, line=line)
+        words = f"expected {expected}, found {found}"
+        raise RobotError(words, file=self.file, line=line, found=found)
 
 
 def _place(parent: Element | None, tag: str, attributes: dict[str, str]) -> str:
