@@ -66,7 +66,7 @@ def check_inertia(robot: str, joint: str, row: np.ndarray) -> None:
     """Refuse ten inertial parameters that no body can have."""
     body = f"robot '{robot}', body of '{joint}'"
     if row[0] <= 0:
-        raise RobotError(f"expected a mass above 0 kg, found {row[0]:g}", subject=body, found=row[0])
+        raise RobotError.expected("a mass above 0 kg", row[0], body)
     lowest, _, highest = principal_moments(row)
     if lowest < -NO_MOMENT or highest <= 0:
         raise RobotError(

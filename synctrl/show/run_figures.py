@@ -236,9 +236,7 @@ def gallery(result: Result, *names: str, width: float = WIDTH) -> Gallery:
             or a width below `NARROWEST`.
     """
     if not finite_number("width", width) >= NARROWEST:
-        raise InputError(
-            f"expected at least {NARROWEST:g} inches, found {width:g}", subject="width", found=width
-        )
+        raise InputError.expected(f"at least {NARROWEST:g} inches", width, "width")
     found = Gallery(str(result.info["title"]))
     for name in names or FIGURES:
         try:

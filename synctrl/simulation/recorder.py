@@ -249,7 +249,7 @@ def _version(package: str) -> str:
 
 def _check_names(where: str, entries: Any, taken: Collection[str]) -> None:
     if not isinstance(entries, Mapping):
-        raise InputError(f"expected entries by name, found {entries!r:.80}", subject=where, found=entries)
+        raise InputError.expected("entries by name", entries, where, shown=f"{entries!r:.80}")
     for name in entries:
         if not isinstance(name, str) or not name.isidentifier() or name in taken:
             text = f"expected names that are not taken, found {name!r:.80}"
@@ -265,9 +265,10 @@ def _check_output(where: str, output: Any, lengths: Mapping[str, int]) -> None:
     except (TypeError, ValueError, AttributeError, IndexError):
         sound = False
     if not sound:
-        raise InputError(
-            f"expected an array of floats over {lengths['time']} instants, its unit, and the names of its "
-            f"axes, of which the first is 'time', found {output!r:.80}",
-            subject=where,
-            found=output,
+        raise InputError.expected(
+            f"an array of floats over {lengths['time']} instants, its unit, and the names of its "
+            f"axes, of which the first is 'time'",
+            output,
+            where,
+            shown=f"{output!r:.80}",
         )

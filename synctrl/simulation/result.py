@@ -207,11 +207,7 @@ def _check_outputs(result: Result) -> None:
     """Refuse outputs that are not those that info speaks of."""
     described = result.info.get("outputs", {})
     if described.keys() != result.outputs.keys():
-        raise InputError(
-            f"expected those of info['outputs'], {[*described]}, found {[*result.outputs]}",
-            subject="outputs",
-            found=[*result.outputs],
-        )
+        raise InputError.expected(f"those of info['outputs'], {[*described]}", [*result.outputs], "outputs")
     expected = shapes(result.info, len(result.t)) if described else {}
     for name, array in result.outputs.items():
         try:

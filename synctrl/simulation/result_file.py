@@ -82,7 +82,7 @@ def write_result(path: Path, info: Mapping[str, Any], arrays: Mapping[str, np.nd
         try:
             text = json.dumps(info)
         except (TypeError, ValueError, RecursionError) as error:
-            raise ResultError(f"expected plain data, found {error}", subject="info", found=error) from None
+            raise ResultError.expected("plain data", error, "info", shown=f"{error}") from None
         check_info(read_json(text))
         check_arrays(info, arrays)
         content: dict[str, Any] = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
@@ -197,11 +197,10 @@ def _read_header(stream: IO[bytes], member: zipfile.ZipInfo) -> Header:
         raise ResultError(f"expected float64, found float{8 * int(width)}", subject=f"{member.filename!a}")
     size = int(width) * (4 if kind == "U" else 1) * prod(shape)
     if len(start) + length + size != member.file_size:
-        raise ResultError(
-            f"expected {size} bytes of an array of shape {shape}, found "
-            f"{member.file_size - length - len(start)}",
-            subject=f"{member.filename!a}",
-            found=member.file_size - length - len(start),
+        raise ResultError.expected(
+            f"{size} bytes of an array of shape {shape}",
+            member.file_size - length - len(start),
+            f"{member.filename!a}",
         )
     return Header(np.dtype(f"{byte_order}{kind}{width}"), "F" if fortran == "True" else "C", shape)
 

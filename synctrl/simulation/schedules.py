@@ -91,10 +91,8 @@ def _check(cell: Cell, disturbance: Disturbance) -> None:
     instance("disturbances", disturbance, Disturbance, "Disturbance objects")
     nv = cell.robots[index("disturbance, robot", disturbance.robot, cell.n)].nv
     if disturbance.torque.shape not in ((), (nv,)):
-        raise InputError(
-            f"expected a number or shape ({nv},), found {disturbance.torque.shape}",
-            subject="disturbance, torque",
-            found=disturbance.torque.shape,
+        raise InputError.expected(
+            f"a number or shape ({nv},)", disturbance.torque.shape, "disturbance, torque"
         )
 
 

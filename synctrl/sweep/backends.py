@@ -94,11 +94,7 @@ def _connected(client: Any, workers: int) -> Iterator[Any]:
         yield client
         return
     if client is not None and not isinstance(client, str):
-        raise InputError(
-            f"expected a Dask client or an address, found {type(client).__name__}",
-            subject="client",
-            found=type(client).__name__,
-        )
+        raise InputError.expected("a Dask client or an address", type(client), "client")
     with contextlib.ExitStack() as stack:
         if client is None:
             client = stack.enter_context(_local_cluster(workers))

@@ -220,7 +220,7 @@ def _check_dimension(name: str, trajectory: Any, m: int) -> None:
     if dimension != m:
         numbers = f"{m} number{'s' * (m != 1)}"
         found = repr(trajectory) if dimension is None else f"one of {dimension}"
-        raise InputError(f"expected a trajectory of {numbers}, found {found}", subject=name, found=dimension)
+        raise InputError.expected(f"a trajectory of {numbers}", dimension, name, shown=found)
 
 
 def _axial(A: np.ndarray) -> np.ndarray:
