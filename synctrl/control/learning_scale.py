@@ -28,12 +28,8 @@ def learning_scale(parameters: Parameters, robot: Robot, q: np.ndarray) -> np.nd
     Raises:
         InputError: parameters of another kind than this package's.
     """
-    raise InputError(
-        "expected FullParameters, BaseParameters, LinearParameters or FrictionParameters, found "
-        f"{type(parameters).__name__}",
-        subject="parameters",
-        found=type(parameters).__name__,
-    )
+    kinds = "FullParameters, BaseParameters, LinearParameters or FrictionParameters"
+    raise InputError.expected(kinds, type(parameters), "parameters")
 
 
 @learning_scale.register

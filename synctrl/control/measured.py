@@ -61,11 +61,7 @@ def check_limits(limits: ArrayLike | None, shape: tuple[int, int]) -> np.ndarray
         return np.full(shape, np.inf)
     array = numbers("torque_limits", limits, shape)
     if not (array >= 0).all():
-        raise InputError(
-            f"expected numbers of at least 0, found {array[~(array >= 0)][0]:g}",
-            subject="torque_limits",
-            found=array[~(array >= 0)][0],
-        )
+        raise InputError.expected("numbers of at least 0", array[~(array >= 0)][0], "torque_limits")
     return array
 
 
@@ -174,9 +170,8 @@ def read_state(path: str | Path, like: Mapping[str, np.ndarray]) -> dict[str, np
 def _arrays(archive: zipfile.ZipFile, like: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     expected, found = sorted(f"{name}.npy" for name in like), sorted(archive.namelist())
     if found != expected:
-        raise ResultError(
-            f"expected the arrays {', '.join(expected)}, found {', '.join(found) or 'none'}",
-            found=tuple(found),
+        raise ResultError.expected(
+            f"the arrays {', '.join(expected)}", tuple(found), shown=", ".join(found) or "none"
         )
     return {name: _array(archive, name, array) for name, array in like.items()}
 
