@@ -102,7 +102,7 @@ def index(name: str, value: object, count: int) -> int:
     """`value` as the index of one of so many things, counted from 0."""
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not whole or not 0 <= value < count:  # type: ignore[operator]
-        raise InputError.expected(f"an index from 0 to {count - 1}", value, name)
+        raise InputError.expected(f"an index from 0 to {count - 1}", value, name, shown=repr(value))
     return int(value)  # type: ignore[call-overload]
 
 
@@ -130,7 +130,8 @@ def instance(name: str, value: object, kind: type | tuple[type, ...], expected: 
         InputError: `value` is no instance of `kind`.
     """
     if not isinstance(value, kind):
-        raise InputError.expected(expected, type(value), name)
+        its_kind = type(value).__name__
+        raise InputError.expected(expected, its_kind, name, shown=its_kind)
 
 
 def offers(name: str, value: Any, parts: tuple[str, ...], expected: str) -> None:

@@ -71,24 +71,20 @@ class SynctrlError(Portable, Exception):
 
     @classmethod
     def expected(
-        cls, what: str, found: Any, subject: str | None = None, *, shown: str | None = None, **place: Any
+        cls, what: str, found: Any, subject: str | None = None, shown: str = "", **place: Any
     ) -> Self:
-        """The error about something else than what is expected: its message and its data.
+        """The error about something else than what is expected.
 
         Args:
             what: is expected, in words.
             found: what is there instead.
             subject: see `SynctrlError`.
-            shown: how the message shows it; by default as Python writes it, a float with six digits and a
-                type by its name.
+            shown: how the message shows it; by default as Python writes it, and a float with six digits.
             place: `file` and `line`.
         """
         value = found.tolist() if isinstance(found, (np.generic, np.ndarray)) else found
-        if isinstance(value, type):
-            value = shown = value.__name__
-        if shown is None:
-            shown = f"{value:g}" if isinstance(value, float) else repr(value)
-        return cls(f"expected {what}, found {shown}", subject=subject, found=value, **place)
+        shown = shown or (f"{value:g}" if isinstance(value, float) else repr(value))
+        return cls(f"expected {what}, found {shown}", subject=subject, found=found, **place)
 
     def about(self, subject: str | None = None, **data: Any) -> Self:
         """This error with more data, for one whose message says in words of its own what it is about."""

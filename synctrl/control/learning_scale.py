@@ -28,8 +28,11 @@ def learning_scale(parameters: Parameters, robot: Robot, q: np.ndarray) -> np.nd
     Raises:
         InputError: parameters of another kind than this package's.
     """
-    kinds = "FullParameters, BaseParameters, LinearParameters or FrictionParameters"
-    raise InputError.expected(kinds, type(parameters), "parameters")
+    expected, found = (
+        "FullParameters, BaseParameters, LinearParameters or FrictionParameters",
+        type(parameters),
+    )
+    raise InputError.expected(expected, found.__name__, "parameters", shown=found.__name__)
 
 
 @learning_scale.register

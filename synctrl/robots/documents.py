@@ -53,11 +53,7 @@ def planar_arm(lengths: Sequence[float], masses: Sequence[float], name: str = "p
     _check_name("name", name)
     l, m = finite_array("lengths", lengths, (None,)), finite_array("masses", masses, (None,))
     if not len(l) or len(l) != len(m):
-        raise InputError(
-            f"expected as many of each, at least 1, found {len(l)} and {len(m)}",
-            subject="lengths, masses",
-            found=(len(l), len(m)),
-        )
+        raise InputError.expected("as many of each, at least 1", (len(l), len(m)), "lengths, masses")
     rods = [
         _rod(k, positive_number(f"lengths[{k}]", l[k]), positive_number(f"masses[{k}]", m[k]))
         for k in range(len(l))

@@ -60,12 +60,8 @@ class Payload:
         inertia = symmetric_matrix("payload, inertia", full, 3)
         moments = np.linalg.eigvalsh(inertia)
         if moments[0] <= 0 or moments[2] > (1 + 1e-9) * (moments[0] + moments[1]):
-            raise InputError(
-                "expected positive principal moments, none larger than the sum of the "
-                f"others, found {moments.tolist()} kg·m^2",
-                subject="payload, inertia",
-                found=moments.tolist(),
-            )
+            possible = "positive principal moments in kg·m^2, none larger than the sum of the others"
+            raise InputError.expected(possible, moments, "payload, inertia")
         return inertia
 
     def carried_at(self, t: float) -> bool:
@@ -95,11 +91,7 @@ def carrying(robot: Robot, load: Payload) -> Robot:
     name = load.frame or robot.tip
     frame = robot.model.frames[frame_id(robot.name, robot.model, name)]
     if frame.parentJoint == 0:
-        raise InputError(
-            f"expected one of robot '{robot.name}' that moves, found '{name}'",
-            subject="payload, frame",
-            found=name,
-        )
+        raise InputError.expected(f"one of robot '{robot.name}' that moves", name, "payload, frame")
     model = pin.Model(robot.model)
     body = pin.Inertia(load.mass, np.array(load.com), np.array(load.inertia))
     model.appendBodyToJoint(frame.parentJoint, body, frame.placement)

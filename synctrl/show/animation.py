@@ -243,13 +243,10 @@ def vehicle_animation(result: Result, wheel_radius: float, track: float, fps: fl
         InputError: a run of other robots.
     """
     check_run(result, "x", "x_desired")
-    if result.x.shape[1:] != (2, 1):
-        raise InputError(
-            f"expected two wheels with one angle each, found {result.x.shape[1]} robots with "
-            f"{result.x.shape[2]} coordinates",
-            subject="result",
-            found=(result.x.shape[1], result.x.shape[2]),
-        )
+    n, m = result.x.shape[1:]
+    if (n, m) != (2, 1):
+        found = f"{n} robots with {m} coordinates"
+        raise InputError.expected("two wheels with one angle each", (n, m), "result", shown=found)
     times = frame_times(result, fps)
     frames = np.searchsorted(0.5 * (result.t[1:] + result.t[:-1]), times)  # the nearest logged instants
     driven = vehicle_path(result.x[:, :, 0], wheel_radius, track)

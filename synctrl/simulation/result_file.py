@@ -165,11 +165,7 @@ def _read_text(archive: zipfile.ZipFile, member: zipfile.ZipInfo | None) -> str:
     with archive.open(member) as stream:
         header = _read_header(stream, member)
         if header.dtype.kind != "U" or header.shape:
-            raise ResultError(
-                f"expected a text, found {header.dtype} of shape {header.shape}",
-                subject="info",
-                found=(str(header.dtype), header.shape),
-            )
+            raise ResultError.expected("a text", (str(header.dtype), header.shape), "info")
         return str(_read_numbers(stream, header))
 
 
@@ -244,11 +240,8 @@ def check_arrays(info: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> N
         check_shape(name, array.dtype, array.shape, expected[name])
         if name in LAYOUT and not np.isfinite(array).all():
             where = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
-            raise ResultError(
-                f"expected finite numbers, found {array[where]} at {where}",
-                subject=f"array '{name}'",
-                found=array[where],
-            )
+            shown = f"{array[where]} at {where}"
+            raise ResultError.expected("finite numbers", array[where], f"array '{name}'", shown=shown)
     _check_times(arrays["t"])
 
 
@@ -277,18 +270,13 @@ def check_shape(name: str, dtype: np.dtype, found: tuple[int, ...], expected: tu
         e is None or e == f for e, f in zip(expected, found, strict=True)
     )
     if not fits or dtype != np.float64:
-        raise ResultError(
-            f"expected float64 of shape {expected}, found {dtype} of shape {found}",
-            subject=f"array '{name}'",
-            found=(str(dtype), found),
-        )
+        kind, shown = (str(dtype), found), f"{dtype} of shape {found}"
+        raise ResultError.expected(f"float64 of shape {expected}", kind, f"array '{name}'", shown=shown)
 
 
 def _check_times(t: np.ndarray) -> None:
     wrong = np.flatnonzero(~(np.abs(t) <= LATEST) | (np.diff(t, prepend=-np.inf) <= 0))
     if wrong.size:
-        raise ResultError(
-            f"expected times that grow, at most {LATEST:g} s, found {t[wrong[0]]} at {wrong[0]}",
-            subject="array 't'",
-            found=t[wrong[0]],
-        )
+        k = wrong[0]
+        growing = f"times that grow, at most {LATEST:g} s"
+        raise ResultError.expected(growing, t[k], "array 't'", shown=f"{t[k]} at {k}")

@@ -42,11 +42,7 @@ class _Interval:
         for name in ("low", "high"):
             object.__setattr__(self, name, finite_number(f"{kind}, {name}", getattr(self, name)))
         if not self.low < self.high:
-            raise InputError(
-                f"expected low < high, found {self.low:g} and {self.high:g}",
-                subject=kind,
-                found=(self.low, self.high),
-            )
+            raise InputError.expected("low < high", (self.low, self.high), kind)
 
     def at(self, share: float) -> float:
         """The value below which a share of the distribution lies, 0 <= share <= 1."""

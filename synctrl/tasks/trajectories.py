@@ -153,11 +153,7 @@ class Circle:
         self.second = finite_array("second", np.eye(m)[1] if second is None else second, (m,))
         axes = np.array([self.first, self.second])
         if not np.allclose(axes @ axes.T, np.eye(2), atol=1e-9):
-            raise TrajectoryError(
-                f"expected orthonormal axes, found {self.first} and {self.second}",
-                subject="first, second",
-                found=(self.first, self.second),
-            )
+            raise TrajectoryError.expected("orthonormal axes", axes, "first, second")
 
     def __call__(self, t: ArrayLike) -> Motion:
         w = self.speed
