@@ -7,10 +7,12 @@ import warnings
 from pathlib import Path
 
 import test_imports
-from test_trip import trip
+from test_trip import calls, trip
 
+from synctrl import load_robot
 from synctrl.errors import StepWarning
 from synctrl.experiments import a460_pair, planar_four
+from synctrl.robots.urdf import urdf_folder
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = (DOCS / "architecture.md").read_text("utf-8")
@@ -31,6 +33,20 @@ def test_the_way_to_a_torque_is_the_one_that_the_page_tells():
     told = re.findall(r"^\| \d+ \| `([\w.]+)` \|", PAGE, flags=re.MULTILINE)
     assert told == trip(planar_four())
     assert len(trip(a460_pair())) == 9  # "in joint space there are nine"
+
+
+def test_the_way_of_a_file_to_a_robot_is_the_one_that_the_page_tells():
+    told = re.findall(r"^\| `(\w+)` \| `(robots/urdf/\w+\.py)` \|", PAGE, flags=re.MULTILINE)
+    names = [name for name, _ in told]
+    called = calls(load_robot, urdf_folder() / "planar2r" / "planar2r.urdf")
+    assert list(dict.fromkeys(name for name in called if name in names)) == names
+    for name, file in told:
+        assert f"\ndef {name}(" in (test_imports.PACKAGE / file).read_text("utf-8"), (name, file)
+
+
+def test_the_page_has_every_module_that_reads_robots():
+    modules = {path.name for path in (test_imports.PACKAGE / "robots" / "urdf").glob("[!_]*.py")}
+    assert modules == set(re.findall(r"`robots/urdf/(\w+\.py)`", PAGE))
 
 
 def test_the_picture_has_the_rooms_from_the_ground_up():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,7 @@ def test_arms_with_meshes_come_back_from_a_file(tmp_path):
     assert [g.meshPath for g in again.visual.geometryObjects] == [
         g.meshPath for g in ur5.visual.geometryObjects
     ]
+    assert write_robot(ur5) == write_robot(ur5) != write_robot(ur5.placed((1, 0, 0)))
     assert "file" not in write_robot(ur5)  # the place of the catalogue's files is none of the result's
 
 
@@ -153,8 +155,9 @@ def test_a_description_of_another_robot_or_no_description_is_refused_by_name(sta
     robots = [{**robot, "joints": ["a", "b"]} for robot in star.info["robots"]]
     for wrong in (robots, [{**robot, "urdf": "<robot"} for robot in robots]):
         run = replace(star, info={**star.info, "robots": wrong}, experiment=None)
-        with refused(InputError, "experiment", found="robot 1"):
+        with refused(InputError, "experiment", found="robot 1") as caught:
             scene_of(run)
+        assert str(Path(__file__).parents[1]) not in str(caught.value)  # it comes from no file of ours
 
 
 def test_a_notebook_shows_the_scene_or_says_that_it_is_too_large(star, monkeypatch):
@@ -189,5 +192,6 @@ def test_a_result_does_not_choose_the_folder_from_which_meshes_are_read(tmp_path
     robot = load_robot(tmp_path / "boxes.urdf")
     loaded = reloaded(pair((robot, robot)).simulate(0.02, dt=2e-3), tmp_path)
     for folders in ((), [tmp_path / "other"]):
-        with pytest.warns(RobotWarning, match=r"box\.stl"):
+        with pytest.warns(RobotWarning, match=r"box\.stl") as told:
             assert "Not shown of robot 1: box.stl" in scene_of(loaded, package_dirs=folders).page()
+        assert str(told[0].message).startswith("the result's robot 'robot 1':")

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import pinocchio as pin
@@ -52,19 +51,16 @@ class Mechanism:
         return [joints, self.tip_parent, self.tip_translation.tolist(), self.tip_rotation.tolist()]
 
 
-#: what was found for each robot that still exists: a robot does not change
-_FOUND: WeakKeyDictionary[Robot, tuple[Mechanism, pin.SE3]] = WeakKeyDictionary()
-
-
 def mechanism(robot: Robot) -> tuple[Mechanism, pin.SE3]:
     """A robot's mechanism, and the placement of its first joint in the world.
 
     Raises:
         RobotError: several joints on the base, or a tip on the base.
     """
-    if robot not in _FOUND:
-        _FOUND[robot] = _mechanism(robot)
-    return _FOUND[robot]
+    if "mechanism" not in robot.kept:
+        robot.kept["mechanism"] = _mechanism(robot)
+    found: tuple[Mechanism, pin.SE3] = robot.kept["mechanism"]
+    return found
 
 
 def _mechanism(robot: Robot) -> tuple[Mechanism, pin.SE3]:

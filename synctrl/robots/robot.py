@@ -60,6 +60,7 @@ class Robot:
         self.visual = visual
         self.document = document
         self.report = report
+        self.kept: dict[str, Any] = {}  #: what was computed from it once, by name: a robot does not change
         check_joints(self.name, model)
         check_numbering(self.name, model)
         self.tip, self.tip_id = tip, frame_id(self.name, model, tip)

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from weakref import WeakKeyDictionary
 
 from ..checks import LONGEST_LABEL, unprintable
 from ..errors import RobotError
@@ -18,8 +17,6 @@ from .urdf.writer import to_xml
 
 #: characters; longer descriptions are not kept
 LONGEST = 100_000
-#: what was written for each robot that still exists: a robot does not change
-_WRITTEN: WeakKeyDictionary[Robot, dict[str, str]] = WeakKeyDictionary()
 
 
 def write_robot(robot: Robot) -> dict[str, str]:
@@ -28,9 +25,9 @@ def write_robot(robot: Robot) -> dict[str, str]:
     "file" is where it was read from, beside which its meshes are, unless it comes with this package or with
     example-robot-data. A robot that no document describes, or too long a one, gives nothing.
     """
-    if robot not in _WRITTEN:
-        _WRITTEN[robot] = _write(robot)
-    return dict(_WRITTEN[robot])
+    if "written" not in robot.kept:
+        robot.kept["written"] = _write(robot)
+    return dict(robot.kept["written"])
 
 
 def _write(robot: Robot) -> dict[str, str]:
@@ -57,12 +54,12 @@ def _stock(file: Path) -> bool:
 
 
 def _trusted(file: str | None, folders: Iterable[Path]) -> Path:
-    """Where a description says that it was, if that is in a folder that the user named; else among ours."""
+    """Where a description says that it was, if that is in a folder that the user named; else beside ours."""
     if file is not None:
         resolved = Path(file).resolve()
         if any(resolved.is_relative_to(folder.resolve()) for folder in folders):
             return resolved
-    return urdf_folder() / "loaded.urdf"
+    return urdf_folder() / "none.urdf"
 
 
 def read_robot(
@@ -85,7 +82,8 @@ def read_robot(
     if "urdf" not in about:
         raise RobotError("its description was not kept", subject=f"robot '{name}'")
     folders = named_folders(package_dirs)
-    document = read_text(_trusted(about.get("file"), folders), about["urdf"].encode())
+    called = f"the result's robot '{name}'"
+    document = read_text(_trusted(about.get("file"), folders), about["urdf"].encode(), called=called)
     found = describe(document, folders)
     robot = Robot(
         found.model, about.get("tip", found.tip), visual=found.visual, name=name, document=found.document

@@ -221,17 +221,22 @@ class Joint:
 
 @dataclass(frozen=True)
 class Document:
-    """A robot as a URDF describes it. `file` is where it was read from, or None."""
+    """A robot as a URDF describes it. `file` is where it was read from, `called` what messages say."""
 
     name: str
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
     file: Path | None = None
+    called: str = ""
 
     @property
     def source(self) -> str:
         """What messages call it."""
-        return str(self.file) if self.file else f"robot {quoted(self.name)}"
+        return self._place or f"robot {quoted(self.name)}"
+
+    @property
+    def _place(self) -> str:
+        return self.called or str(self.file or "")
 
     @property
     def moving_joints(self) -> tuple[Joint, ...]:
@@ -280,8 +285,8 @@ class Document:
             line: where that part stands; by default the line of the item.
             found: what was found.
         """
-        robot = None if self.file else f"robot {quoted(self.name)}"
+        robot = None if self._place else self.source
         place = item and ", ".join(word for word in (item.title, part) if word)
         subject = ": ".join(word for word in (robot, place) if word)
         line = line or (item.line if item else 0)
-        return RobotError(problem, subject=subject or None, found=found, file=self.file, line=line)
+        return RobotError(problem, subject=subject or None, found=found, file=self._place or None, line=line)

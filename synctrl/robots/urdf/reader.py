@@ -26,16 +26,16 @@ _NO_AXIS = 1e-6
 _UNIT_AXIS = 1e-3
 
 
-def read_text(file: Path, data: bytes, notes: Notes | None = None) -> Document:
+def read_text(file: Path, data: bytes, notes: Notes | None = None, called: str = "") -> Document:
     """The content of a URDF file as a document whose every value is finite and of the right kind.
 
     How the values fit together is not looked at here, see `check_tree` and `check_bodies`. `notes` takes what
-    is left out and assumed.
+    is left out and assumed; `called` is what messages say in the place of the file's name.
 
     Raises:
         RobotError: with line, link or joint, what was found and what is expected.
     """
-    root = parse_xml(str(file), data, notes)
+    root = parse_xml(called or str(file), data, notes)
     if root.tag != "robot":
         root.refuse("a URDF with the root element <robot>", f"<{shown_tag(root.tag)}>")
     refuse_xacro(root)
@@ -47,6 +47,7 @@ def read_text(file: Path, data: bytes, notes: Notes | None = None) -> Document:
         links=tuple(_link(element, materials) for element in root.all("link")),
         joints=tuple(_joint(element) for element in root.all("joint")),
         file=file,
+        called=called,
     )
 
 
