@@ -116,6 +116,21 @@ def window(name: str, start: object, stop: object) -> tuple[float, float]:
     return first, last
 
 
+def limits(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> np.ndarray:
+    """Limits, which may be infinite; without any, infinite ones.
+
+    Raises:
+        InputError: another shape, not numbers, or below 0.
+    """
+    if value is None:
+        return np.full(shape, np.inf)
+    array = numbers(name, value, shape)
+    if not (array >= 0).all():
+        found = float(array[~(array >= 0)][0])
+        raise InputError(f"expected numbers of at least 0, found {found:g}", subject=name, found=found)
+    return array
+
+
 def boolean(name: str, value: object) -> bool:
     """`value` if it is True or False."""
     if not isinstance(value, (bool, np.bool_)):

@@ -30,7 +30,7 @@ def seen(rng: np.random.Generator) -> Seen:
     """Random signals with a gradient that belongs to them."""
     q, v, v_ref, a_ref, s_q = rng.standard_normal((5, 2, 3))
     Y = rng.standard_normal((2, 3, 30))
-    return Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Y)
+    return Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Y, s_q, s_q)
 
 
 def some_state(bound, rng: np.random.Generator) -> np.ndarray:

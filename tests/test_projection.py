@@ -49,7 +49,7 @@ ALL = {**FULL, **FORGETTING, **TIGHT}
 def seen(rng: np.random.Generator) -> Seen:
     q, v, v_ref, a_ref, s_q = rng.standard_normal((5, 2, 3))
     Y = rng.standard_normal((2, 3, P))
-    return Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Y)
+    return Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Y, s_q, s_q)
 
 
 def with_adaptation(experiment: Experiment, adaptation) -> Experiment:

@@ -195,6 +195,9 @@ def _check_plant(loop: ClosedLoop) -> None:
         "a plant with a state of its own": plant.hidden0.size > 0,
         "a plant with other robots than the cell": list(map(id, plant.schedule.free))
         != list(map(id, robots)),
+        "other torque limits than those that the controller knows": not np.array_equal(
+            plant.torque_limits, loop.controller.torque_limits
+        ),
     }
     for name in (name for name, found in special.items() if found):
         raise _refusal("plant", name, name)

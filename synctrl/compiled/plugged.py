@@ -29,7 +29,7 @@ from ..errors import InputError
 from .algebra import column_of, symbols
 
 #: what a rate is a function of, beside z and the gradient
-MOTION = ("q", "v", "v_ref", "a_ref", "s_q")
+MOTION = ("q", "v", "v_ref", "a_ref", "s_q", "tau", "applied")
 
 
 class Learning(NamedTuple):
@@ -37,7 +37,7 @@ class Learning(NamedTuple):
 
     Attributes:
         estimate: CasADi function, z -> theta_hat.
-        rate: CasADi function, z, q, v, v_ref, a_ref, s_q, Y^T s_q -> z'.
+        rate: CasADi function, z, q, v, v_ref, a_ref, s_q, tau, what is applied of it, Y^T s_q -> z'.
         settle: CasADi function, z -> z after a step; None if it stays what it is.
         leap: CasADi function, z, z', h -> z after a sample of h s; None if that is z + h z', settled.
     """

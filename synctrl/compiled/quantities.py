@@ -146,7 +146,7 @@ FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
             (
                 "q", "v", "sine", "cosine", "z", *HEARD, "e", "x_dot", "xd_dot", "xd_ddot",
                 "w", "w_dot", "J", "J_dot", "J_inv", "G", "zeta", "zeta_dot", "damping_rate", "weights",
-                "Lambda", "beta", "K_eps", "K_r", "Gamma", "W_inv", "base",
+                "Lambda", "beta", "K_eps", "K_r", "Gamma", "limits", "W_inv", "base",
             ),
             ("tau", "z_dot", "e_star", "s_q", "velocity_lost"),
         ),

@@ -20,6 +20,7 @@ from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.weights import Weights
 from ..robots.parameters import friction_diagonals
 from ..robots.symbolic import Symbols
+from ..tasks.algebra import limited
 from ..tasks.measurement import Poses, Positions
 from ..tasks.redundancy import Inversion, velocity_lost
 from ..tasks.spaces import Measurement
@@ -124,11 +125,13 @@ class Trace:
         v_ref, a_ref, s_q, feedback = law.compute_joint_command(
             asked, task, self._row("v"), self.space, self._row("K_r"), self.kind.k_r_space
         )
-        model_torque, z_dot = self._adaptive(v_ref, a_ref, s_q)
+        model_torque, gradient = self._adaptive(v_ref, a_ref, s_q)
+        tau = model_torque + feedback
+        z_dot = self._learned(gradient, (v_ref, a_ref, s_q, tau))
         lost = velocity_lost(self._jacobians()[0], v_ref, asked.xref_dot) if self.kind.damped else None
         return self._function(
             "control",
-            tau=model_torque + feedback, z_dot=z_dot, e_star=asked.e_star, s_q=s_q, velocity_lost=lost,
+            tau=tau, z_dot=z_dot, e_star=asked.e_star, s_q=s_q, velocity_lost=lost,
         )  # fmt: skip
 
     def _errors(self, task: Measurement) -> Errors:
@@ -157,16 +160,22 @@ class Trace:
             yield self._function("leap", leapt=array_of(learning.leap(*sampled)))
 
     def _adaptive(self, v_ref: np.ndarray, a_ref: np.ndarray, s_q: np.ndarray) -> tuple:
-        """Y theta_hat, and z' of the adaptation; with (14) its state z is theta_hat."""
+        """Y theta_hat and Y^T s_q; with (14) the state z of the adaptation is theta_hat."""
         learning, z = self.kind.learning, self.given["z"]
         motion = tuple(map(column_of, (v_ref, a_ref, s_q)))
         if learning is None:
-            torque, gradient = self._model(z, *motion)
-            return array_of(torque, -1), self._row("Gamma") * array_of(gradient, -1)
+            return tuple(array_of(part, -1) for part in self._model(z, *motion))
         theta_hat = self.given["theta_hat"]
         parts = self.ca.substitute([*self._model(theta_hat, *motion)], [theta_hat], [learning.estimate(z)])
-        z_dot = learning.rate(z, self.q, self.v, *motion, parts[1])
-        return array_of(parts[0], -1), array_of(z_dot)
+        return tuple(array_of(part, -1) for part in parts)
+
+    def _learned(self, gradient: np.ndarray, motion: tuple[np.ndarray, ...]) -> np.ndarray:
+        """z' of the adaptation, given v_ref, a_ref, s_q and tau."""
+        learning, tau, limits = self.kind.learning, motion[-1], self._row("limits")
+        if learning is None:
+            return self._row("Gamma") * gradient
+        rows = (*motion, limited(tau, -limits, limits), gradient)
+        return array_of(learning.rate(self.given["z"], self.q, self.v, *map(column_of, rows)))
 
     def _model(self, theta_hat: Any, v_ref: Any, a_ref: Any, s_q: Any) -> tuple[Any, Any]:
         """Y theta_hat, and Y^T s_q as the derivative of s_q^T Y theta_hat with respect to theta_hat."""

@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, instance, offers, shaped
+from ..checks import finite_array, instance, limits, offers, shaped
 from ..coupling.cell import Cell, Reference
 from ..errors import InputError, SynctrlError
 from ..renamed import argument, names_elsewhere, tell
 from ..robots.regressors import Regressors, make_regressors
+from ..tasks.algebra import limited
 from ..tasks.spaces import Measurement
 from . import law, laws
 from .adaptation import Adaptation, Seen, chosen
@@ -101,12 +102,15 @@ class Controller:
         adaptation: how it learns; by default `Gradient(gains.Gamma)`, eq. (14).
         law: from errors to reference motion and force; by default `SunMills`.
         network: what the robots know of each other; by default `Ideal`.
+        torque_limits: (n, nv), N·m, at which the robots cut torque off, as far as an adaptation is to know of
+            it; infinite by default. `tau` is what is asked for, whatever the limits.
         reference_acceleration, k_r_space: shorthand for the options of `SunMills`. Where the damping acts,
             "joint" or "task", may be said beside any law.
 
     Raises:
-        InputError: gains of the wrong size, an unknown option or one that the law contradicts, Gamma and an
-            adaptation, or neither, or parts that give something of another shape than they should.
+        InputError: gains or limits of the wrong size, an unknown option or one that the law contradicts,
+            Gamma and an adaptation, or neither, or parts that give something of another shape than they
+            should.
     """
 
     def __init__(
@@ -117,6 +121,7 @@ class Controller:
         adaptation: Adaptation | None = None,
         law: Law | None = None,
         network: Network | None = None,
+        torque_limits: ArrayLike | None = None,
         reference_acceleration: str | None = None,
         k_r_space: str | None = None,
     ):
@@ -138,6 +143,8 @@ class Controller:
         connection = Ideal() if network is None else network
         offers("network", connection, ("bind",), "a network, for example Ideal()")
         self.network, self.network_settings = connection.bind(cell), settings_of(connection)
+        self.torque_limits = limits("torque_limits", torque_limits, (cell.n, cell.nv))
+        self._cuts = bool(np.isfinite(self.torque_limits).any())
         check_parts(self.law, self.network, cell.n, cell.coupling.pairs, m)
 
     @property
@@ -174,7 +181,8 @@ class Controller:
             InputError: another size, or numbers that are not finite.
         """
         cell = self.cell
-        check_reference(reference, cell.n, cell.m)
+        instance("reference", reference, Reference, "a Reference, for example of Cell.references")
+        reference.check(cell.n, cell.m)
         state: Any = argument("Controller.evaluate", "theta_hat", theta_hat, "z", z)
         memory: Any = integral
         return self.signals(
@@ -213,7 +221,8 @@ class Controller:
         Y = self._compute_regressors(q, v, v_ref, a_ref)
         theta_hat = self.adaptation.estimate(z)
         tau = np.matvec(Y, theta_hat) + feedback  # (13), (32)
-        seen = Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Y)
+        applied = limited(tau, -self.torque_limits, self.torque_limits) if self._cuts else tau
+        seen = Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Y, tau, applied)
         z_dot = self.adaptation.rate(z, seen)
         return Signals(
             reference, task, received, errors, asked, v_ref, a_ref, s_q, Y, tau, theta_hat, z_dot, seen
@@ -229,18 +238,6 @@ def settings_of(part: Adaptation | Law | Network) -> dict[str, Any]:
     settings, where = part.as_dict(), f"{type(part).__qualname__}, as_dict"
     instance(where, settings, Mapping, "names and settings, for example {'gain': 1.0}")
     return {"name": type(part).__name__, **settings}
-
-
-def check_reference(reference: Reference, n: int, m: int) -> None:
-    """Refuse what is no desired motion and weights of n robots at one instant.
-
-    Raises:
-        InputError: another kind or size, or numbers that are not finite.
-    """
-    instance("reference", reference, Reference, "a Reference, for example of Cell.references")
-    finite_array("reference: xd, xd' and xd''", reference.desired, (3, n, m))
-    for name, weight in zip(("c", "c'", "c''", "c^-1"), reference.weights, strict=True):
-        finite_array(f"reference: {name}", weight, (n, m, m))
 
 
 def check_parts(law: BoundLaw, network: BoundNetwork, n: int, p: int, m: int) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import boolean, choice, finite_array, finite_number, instance, positive_number
+from ..checks import boolean, choice, finite_array, finite_number, instance, limits, positive_number
 from ..coupling.cell import Reference
 from ..errors import InputError, ResultError
 from . import measured
@@ -80,7 +80,7 @@ class DiscreteController:
         self.faults = choice("faults", faults, FAULTS)
         self._shape = self.cell.n, self.cell.nv
         self._messages = Messages(self.cell, controller.network)
-        self._limits = measured.check_limits(torque_limits, self._shape)
+        self._limits = limits("torque_limits", torque_limits, self._shape)
         self.held: int
         self.signals: Signals | None
         self._samples: int

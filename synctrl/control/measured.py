@@ -51,20 +51,6 @@ def measurement(q: ArrayLike, v: ArrayLike, shape: tuple[int, int]) -> np.ndarra
     return motion
 
 
-def check_limits(limits: ArrayLike | None, shape: tuple[int, int]) -> np.ndarray:
-    """Limits, (n, nv), N·m; infinite ones for None.
-
-    Raises:
-        InputError: another shape, not numbers, or below 0.
-    """
-    if limits is None:
-        return np.full(shape, np.inf)
-    array = numbers("torque_limits", limits, shape)
-    if not (array >= 0).all():
-        raise InputError.expected("numbers of at least 0", array[~(array >= 0)][0], "torque_limits")
-    return array
-
-
 def not_finite(cell: Cell, t: float, motion: np.ndarray) -> InputError | None:
     """What is wrong with a measurement, (2, n, nv), if a number of it is not finite."""
     if np.isfinite(motion).all():

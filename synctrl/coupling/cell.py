@@ -114,6 +114,16 @@ class Reference:
     c_ddot = property(lambda self: self.weights.c_ddot)
     c_inv = property(lambda self: self.weights.c_inv)
 
+    def check(self, n: int, m: int) -> None:
+        """Refuse what is no desired motion and weights of n robots at one instant.
+
+        Raises:
+            InputError: another size, or numbers that are not finite.
+        """
+        finite_array("reference: xd, xd' and xd''", self.desired, (3, n, m))
+        for name, weight in zip(("c", "c'", "c''", "c^-1"), self.weights, strict=True):
+            finite_array(f"reference: {name}", weight, (n, m, m))
+
 
 class Cell:
     """n robots that perform one task.

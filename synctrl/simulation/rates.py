@@ -187,7 +187,7 @@ def _learned(loop: ClosedLoop, i: int, Y: np.ndarray) -> np.ndarray:
     def rate(gradient: np.ndarray) -> np.ndarray:
         rows = np.zeros(cell.theta.shape)
         rows[i] = gradient
-        return adaptation.rate(z, Seen(still, still, still, still, still, rows, None))
+        return adaptation.rate(z, Seen(still, still, still, still, still, rows, None, still, still))
 
     rest = rate(np.zeros(Y.shape[1]))
     changes = [np.clip(np.nan_to_num(rate(row) - rest), -HUGE, HUGE) for row in Y]

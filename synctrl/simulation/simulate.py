@@ -39,7 +39,7 @@ from .engines import Engine, Run, find_engine, run_adaptive
 from .guard import Progress
 from .integrators import ADAPTIVE
 from .limits import warn_of_saturation
-from .plant import PHYSICS, Plant
+from .plant import PHYSICS, Plant, torque_limits
 from .result import Result
 from .schedules import Disturbance, DisturbanceSchedule, Payload
 from .step_error import StepError, warn_of_step
@@ -94,16 +94,17 @@ class Experiment:
 
     def closed_loop(self, plant: str = "pinocchio") -> ClosedLoop:
         """The differential equation of this experiment; `plant` as in `simulate`."""
+        body = self.plant_type(self.cell, physics=plant, payloads=self.payloads, saturate=self.saturate)
         controller = Controller(
             self.cell,
             self.gains,
             adaptation=self.adaptation,
             law=self.law,
             network=self.network,
+            torque_limits=torque_limits(self.cell) if self.saturate else None,
             reference_acceleration=self.reference_acceleration,
             k_r_space=self.k_r_space,
         )
-        body = self.plant_type(self.cell, physics=plant, payloads=self.payloads, saturate=self.saturate)
         return ClosedLoop(controller, body)
 
     def simulate(

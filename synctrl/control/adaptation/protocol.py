@@ -29,6 +29,8 @@ class Seen:
         s_q: v_ref - v, (n, nv).
         gradient: Y^T s_q, (n, P).
         regressor: Y, (n, nv, P); not in generated code.
+        tau: torque that the controller asks for, (n, nv), N·m.
+        applied: what the limits that it knows leave of it, (n, nv), N·m.
     """
 
     q: np.ndarray
@@ -38,6 +40,8 @@ class Seen:
     s_q: np.ndarray
     gradient: np.ndarray
     regressor: Any
+    tau: np.ndarray
+    applied: np.ndarray
 
 
 class BoundAdaptation(Protocol):
