@@ -135,11 +135,7 @@ def write_urdf(document: Document, path: str | Path) -> Path:
         file.parent.stat()  # a folder of a mistyped name is not made
         write_whole(file, to_xml(document))
     except OSError as error:
-        raise InputError(
-            f"expected a file that can be written, found: {error.strerror}",
-            subject=str(file),
-            found=error.strerror,
-        ) from error
+        raise InputError.expected("a file that can be written", error.strerror, str(file)) from error
     return file
 
 
