@@ -190,7 +190,7 @@ def _triple(name: str, value: ArrayLike) -> tuple[float, ...]:
 def _check_name(what: str, name: str) -> None:
     if not isinstance(name, str) or not is_plain(name):
         rule = "1 to 128 letters, digits, '_', '-' or '.', beginning with a letter, a digit or '_'"
-        raise InputError.expected(f"{rule}", name, what)
+        raise InputError.expected(rule, name, what)
 
 
 def _check_meshes(document: Document, file: Path) -> None:
