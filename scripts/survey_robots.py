@@ -16,7 +16,7 @@ import multiprocessing
 import os
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from functools import partial
@@ -26,6 +26,16 @@ from pathlib import Path
 from survey_one import LIBRARIES, Row, Task, survey
 
 TIME_LIMIT = 120.0
+
+SAID: dict[str, Callable[[str, str], bool]] = {
+    "some pictures missing": lambda kind, text: kind == "left out" and "is not shown" in text,
+    "joints held": lambda kind, text: kind == "locked",
+    "limits taken as none": lambda kind, text: kind == "assumed" and ("limit" in text or "range" in text),
+    "suspicious": lambda kind, text: kind == "suspicious",
+}
+"""Columns of the table that count the arms of which something is said, and which notes say it."""
+WEIGHTLESS = ("expected a mass above", "expected an inertia, found none")
+"""How an arm is refused that has a moving body without mass or inertia."""
 
 
 def main(arguments: Sequence[str] | None = None) -> list[Row]:
@@ -110,16 +120,21 @@ def _send(there: Connection, task: Task, compare: bool) -> None:
 
 
 def table(rows: dict[Path, list[Row]]) -> str:
-    """A line per collection, why robots were refused, what was said of the others, and how exact they are."""
+    """A line per collection, which robots are refused, what is said of the others, and how exact they are."""
     every = [row for found in rows.values() for row in found]
     lines = [
-        f"| collection | commit | files | arms with masses | load | {' | '.join(LIBRARIES)} |",
-        "| --- | --- | ---: | ---: | ---: |" + " ---: |" * len(LIBRARIES),
+        f"| collection | commit | files | arms with masses | load | {' | '.join([*SAID, *LIBRARIES])} |",
+        "| --- | --- | ---: | ---: | ---: |" + " ---: |" * len([*SAID, *LIBRARIES]),
         *(_line(collection.name, _commit(collection), found) for collection, found in rows.items()),
         _line("together", "", every),
+        "",
+        *_shares(every),
+        "",
+        "Refused:",
+        "",
+        *(f"- {row.file}: {row.refusal}" for row in every if row.refusal),
     ]
     parts = [
-        ("Why arms are refused", Counter(_kind(row.refusal) for row in every if row.refusal)),
         (
             "What is said of arms that load",
             Counter(n for row in every for n in {_note(*x) for x in row.notes}),
@@ -135,9 +150,24 @@ def _line(name: str, commit: str, rows: Iterable[Row]) -> str:
     rows = list(rows)
     arms = [row for row in rows if row.what == "arm"]
     loaded = sum(not row.refusal for row in arms)
-    others = [str(sum(not row.others.get(name, "no") for row in arms)) for name in LIBRARIES]
-    share = f" ({100 * loaded / len(arms):.0f} %)" if arms else ""
-    return f"| {name} | {commit} | {len(rows)} | {len(arms)} | {loaded}{share} | {' | '.join(others)} |"
+    said = [sum(any(says(*note) for note in row.notes) for row in arms) for says in SAID.values()]
+    others = [sum(not row.others.get(name, "no") for row in arms) for name in LIBRARIES]
+    return f"| {' | '.join(map(str, (name, commit, len(rows), len(arms), loaded, *said, *others)))} |"
+
+
+def _shares(rows: Iterable[Row]) -> list[str]:
+    """How many arms load: of all with any mass, and of those with mass and inertia wherever they move."""
+    arms = [row for row in rows if row.what == "arm"]
+    whole = [row for row in arms if not any(words in row.refusal for words in WEIGHTLESS)]
+    return [
+        _share("arms that have any mass", arms),
+        _share("arms that are not refused for a missing mass or inertia of what moves", whole),
+    ]
+
+
+def _share(what: str, arms: Sequence[Row]) -> str:
+    loaded = sum(not row.refusal for row in arms)
+    return f"- Of {len(arms)} {what}, {loaded} load, {100 * loaded / max(len(arms), 1):.1f} %."
 
 
 def _commit(collection: Path) -> str:

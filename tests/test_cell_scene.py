@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -182,6 +183,24 @@ def test_meshes_beside_a_file_of_ones_own_are_found_again_from_elsewhere(tmp_pat
     (tmp_path / "box.stl").unlink()
     with pytest.warns(RobotWarning, match=r"box\.stl"):
         assert "Not shown of robot 1: box.stl" in scene_of(loaded, package_dirs=tmp_path).page()
+
+
+def test_of_a_robot_that_comes_back_only_missing_pictures_are_said_again(tmp_path):
+    text = urdf("odd one", SCARA)
+    (tmp_path / "odd.urdf").write_text(text, encoding="utf-8")
+    with pytest.warns(RobotWarning, match="odd one"):
+        robot = load_robot(tmp_path / "odd.urdf")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read_robot(write_robot(robot), "left", robot.joint_names)
+    (tmp_path / "odd.urdf").write_text(
+        text.replace('<box size="0.3 0.06 0.06"/>', '<mesh filename="no.stl"/>'), encoding="utf-8"
+    )
+    with pytest.warns(RobotWarning):
+        robot = load_robot(tmp_path / "odd.urdf")
+    with pytest.warns(RobotWarning, match=r"^robot 'left':\n  left out \(\d\): .*no\.stl") as said:
+        read_robot(write_robot(robot), "left", robot.joint_names)
+    assert len(said) == 1
 
 
 def test_a_result_does_not_choose_the_folder_from_which_meshes_are_read(tmp_path):

@@ -88,6 +88,22 @@ def test_dynamics_are_those_of_mujoco_in_random_states(tmp_path: Path) -> None:
         assert abs(robot.inverse_dynamics(q, v, a) - expected).max() < ROUNDING
 
 
+def test_joints_without_a_name_get_one_and_move_as_they_do_in_mujoco(tmp_path: Path) -> None:
+    text = ARM.replace('<position joint="push"', '<position joint="turn"')
+    text = text.replace('name="spin" ', "").replace('name="push" ', "")
+    robot, named = quietly(write(tmp_path, text)), quietly(write(tmp_path, ARM, "named.xml"))
+    assert robot.joint_names == ("turn", "joint1", "joint2")
+    for q, v, a in np.random.default_rng(1).uniform(-2, 2, (5, 3, robot.nv)):
+        assert abs(robot.inverse_dynamics(q, v, a) - named.inverse_dynamics(q, v, a)).max() < ROUNDING
+
+
+def test_a_body_and_a_site_that_are_named_as_the_world_are_told_from_it(tmp_path: Path) -> None:
+    text = ARM.replace('<body name="hand"', '<body name="universe"').replace("tool", "universe")
+    robot = quietly(write(tmp_path, text), tip="universe (link)")
+    frames = {frame.name for frame in robot.model.frames}
+    assert robot.nv == 3 and {"universe (link)", "universe (link)_2"} <= frames
+
+
 def test_a_site_is_a_frame_where_mujoco_has_it(tmp_path: Path) -> None:
     file = write(tmp_path, ARM)
     robot, model = quietly(file, tip="tool"), mujoco.MjModel.from_xml_path(str(file))

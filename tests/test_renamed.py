@@ -15,6 +15,7 @@ from synctrl.control.adaptation import Natural
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, planar_four
 from synctrl.renamed import names_elsewhere
+from synctrl.robots.urdf import urdf_folder
 
 #: names by the module that had them, and the module that has them now
 MOVED = {
@@ -96,6 +97,14 @@ def test_a_name_that_is_another_one_now_is_the_same_thing_and_says_which(old, na
     with pytest.warns(DeprecationWarning, match=f"{home}.{name} is deprecated: use {home}.{today}"):
         found = getattr(import_module(old), name)
     assert found is getattr(import_module(home), today)
+
+
+def test_a_document_is_read_from_its_file_as_before():
+    reader = import_module("synctrl.robots.urdf.reader")
+    file = urdf_folder() / "planar2r" / "planar2r.urdf"
+    with pytest.warns(DeprecationWarning, match=r"read_document is deprecated: use .*reader\.read_text"):
+        document = reader.read_document(file)
+    assert document == reader.read_text(file, file.read_bytes())
 
 
 @pytest.mark.parametrize("old", MOVED)

@@ -98,6 +98,11 @@ def same_as_pinocchio(robot: Robot, file: Path, **positions: float) -> None:
         np.testing.assert_allclose(Y @ robot.inertial_parameters, torque, rtol=1e-10, atol=1e-10)
 
 
+def test_a_moment_that_is_negative_by_rounding_is_said(tmp_path):
+    text = robot_text(ARM).replace('ixx="0.01"', 'ixx="-1e-35"', 1)
+    assert [note.kind for note in loaded(tmp_path, text).report] == ["suspicious"]
+
+
 # -- held joints -------------------------------------------------------------------------------------------
 
 
@@ -162,6 +167,38 @@ def test_a_base_that_is_none_is_held_and_named(tmp_path):
     robot = loaded(tmp_path, robot_text(virtual, chain("a b", parent="turn")))
     assert held(robot) == {"jx", "jy", "jturn"}
     same_as_pinocchio(robot, tmp_path / "robot.urdf", jx=0.0, jy=0.0, jturn=0.0)
+
+
+def test_a_base_that_turns_without_mass_and_then_drives_is_held_and_named(tmp_path):
+    text = robot_text(
+        link("turned", None), joint("jturn", "base", "turned"),
+        chain("driven", parent="turned", type="prismatic", lower=0.3), chain("a b", parent="driven"),
+    )  # fmt: skip
+    robot = loaded(tmp_path, text)
+    assert held(robot) == {"jturn", "jdriven"}
+    for q in np.random.default_rng(5).uniform(-2, 2, (5, robot.nv)):
+        assert np.linalg.eigvalsh(robot.mass_matrix(q))[0] > 0
+    same_as_pinocchio(robot, tmp_path / "robot.urdf", jturn=0.0, jdriven=0.3)
+
+
+SEEN = '<visual><geometry><sphere radius="0.1"/></geometry></visual></link>'
+
+
+@pytest.mark.parametrize(
+    "turned, behind",
+    [
+        (link("turned", None), chain("x a b", parent="turned")),
+        (link("turned", None), chain("x", parent="turned", type="prismatic")),
+        (
+            link("turned", None).replace("</link>", SEEN),
+            chain("x", parent="turned", type="prismatic") + chain("a", "x"),
+        ),
+    ],
+    ids=["a turn behind it", "a slide with nothing on it", "a link that is seen"],
+)
+def test_what_turns_without_mass_is_else_no_such_base(turned, behind, tmp_path):
+    with refused(RobotError, "joint 'jturn'"):
+        loaded(tmp_path, robot_text(turned, joint("jturn", "base", "turned"), behind))
 
 
 def test_a_turning_first_link_without_mass_is_no_such_base(tmp_path):
@@ -256,7 +293,10 @@ def test_an_arm_is_not_cut_behind_its_tip(tmp_path):
     assert robot.nv == 3 and not robot.report
 
 
-@pytest.mark.parametrize(("tip", "words"), [("base", "no joint moves it"), ("f1", "on a finger")])
+@pytest.mark.parametrize(
+    ("tip", "words"),
+    [("base", "no joint moves it"), ("universe", "no joint moves it"), ("f1", "on a finger")],
+)
 def test_a_tip_on_the_base_or_on_a_finger_is_suspicious(tip, words, tmp_path):
     robot = loaded(tmp_path, robot_text(HAND), tip=tip)
     assert any(words in note.text for note in robot.report.of_kind("suspicious"))

@@ -79,6 +79,21 @@ def test_small_files_of_ours_are_surveyed_without_a_crash(
     assert len(json.loads(out.with_suffix(".json").read_text())[CASES.name]) == len(rows)
 
 
+def test_the_table_says_who_is_refused_and_counts_those_without_mass_apart() -> None:
+    arm = survey_robots.Row("good", notes=[("locked", "held at 0 rad"), ("suspicious", "a range")])
+    rows = [
+        arm,
+        survey_robots.Row("light", refusal="joint 'a': expected a mass above 0 kg, found 0"),
+        survey_robots.Row("twisted", refusal="joint 'a': expected lower below upper, found 1 and 0"),
+        survey_robots.Row("wheels", what="wheels or fingers"),
+    ]
+    text = survey_robots.table({Path("one"): rows})
+    assert "- twisted: joint 'a': expected lower below upper" in text and "- light: joint" in text
+    assert "Of 3 arms that have any mass, 1 load, 33.3 %" in text
+    assert "Of 2 arms that are not refused for a missing mass" in text and "1 load, 50.0 %" in text
+    assert "| together |  | 4 | 3 | 1 | 0 | 1 | 0 | 1 |" in text
+
+
 def test_dynamics_are_compared_with_plain_pinocchio_and_both_engines_run(tmp_path: Path) -> None:
     pytest.importorskip("casadi")
     (tmp_path / "one" / "arm.urdf").parent.mkdir()

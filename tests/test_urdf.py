@@ -104,7 +104,8 @@ def test_two_joints_on_one_axis_with_next_to_nothing_between_them_are_refused(tm
         (b"", "no element found"),
         (b"\x01\x02\x03", "well-formed"),
         (b"just text", "well-formed"),
-        (GOOD.encode("utf-16"), "UTF-8"),
+        (GOOD.replace("utf-8", "utf-16").encode(), "'utf-16'"),
+        (GOOD.replace("utf-8", "us-ascii").replace("good", "g\u00f6d", 1).encode(), "none of ascii"),
         (GOOD.encode().replace(b"good", b"g\xf6od", 1), "0xf6"),
         (b"<robot name='x'>" + b" " * 10_000_001 + b"</robot>", "at most 10 MB"),
         (GOOD.replace('encoding="utf-8"', "").encode("utf-16-le"), "UTF-16"),
@@ -113,6 +114,51 @@ def test_two_joints_on_one_axis_with_next_to_nothing_between_them_are_refused(tm
 )
 def test_a_file_that_is_no_urdf_is_refused(content, words, tmp_path):
     assert words in refusal(write(tmp_path, content))
+
+
+@pytest.mark.parametrize(
+    ("declared", "encoding"),
+    [
+        ("utf-8", "utf-8-sig"),
+        ("UTF-16", "utf-16"),
+        ("utf-8", "utf-16"),
+        ("ISO-8859-1", "latin-1"),
+        ("windows-1252", "cp1252"),
+    ],
+)
+def test_a_file_is_read_in_the_encoding_of_its_mark_or_else_of_its_declaration(declared, encoding, tmp_path):
+    text = GOOD.replace("utf-8", declared).replace('name="good"', 'name="gr\u00f6\u00dfer"')
+    with pytest.warns(RobotWarning, match="names are taken as they stand"):
+        description = read_urdf(write(tmp_path, text.encode(encoding)))
+    assert description.document.name == "gr\u00f6\u00dfer"
+
+
+def test_a_file_of_a_chinese_maker_is_read_as_it_declares(tmp_path):
+    text = GOOD.replace("utf-8", "GB2312").replace('name="good"', 'name="\u81c2"')
+    with pytest.warns(RobotWarning):
+        assert read_urdf(write(tmp_path, text.encode("gbk"))).document.name == "\u81c2"
+
+
+_LOADS = """
+import sys
+from synctrl import load_robot
+from synctrl.errors import RobotError
+try:
+    load_robot(sys.argv[1])
+except RobotError as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize("name", ["a.urdf", "a.xml", "a.xacro", "a.urdf.xacro"])
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder"])
+def test_what_is_no_regular_file_is_refused_and_not_waited_for(kind, name, tmp_path):
+    """In a process of its own, which may hang."""
+    make = {"pipe": os.mkfifo, "device": lambda file: file.symlink_to("/dev/zero"), "folder": Path.mkdir}
+    make[kind](tmp_path / name)
+    run = [sys.executable, "-c", _LOADS, str(tmp_path / name)]
+    said = subprocess.run(run, capture_output=True, text=True, timeout=60, check=True).stdout
+    assert str(tmp_path / name) in said and ("folder" if kind == "folder" else "no regular file") in said
 
 
 def test_a_line_number_is_that_of_the_defect(tmp_path):

@@ -308,6 +308,19 @@ def test_arguments_reach_the_robot(tmp_path: Path) -> None:
 
 
 @needs_xacro
+def test_an_argument_that_the_file_does_not_ask_for_is_said(tmp_path: Path) -> None:
+    """As a misspelt one is."""
+    used = '<xacro:arg name="tool" default="a"/><xacro:if value="$(arg free)"/>'
+    file = write(tmp_path / "arm.xacro", arm(used))
+    given = {"tool": "b", "free": 1, "tol": "c"}
+    with pytest.warns(RobotWarning, match="no argument 'tol'"):
+        robot = load_robot(file, xacro_args=given)
+    assert [note.where for note in robot.report] == ["xacro_args"]
+    with pytest.raises(RobotError, match="no argument 'tol'"):
+        load_robot(file, xacro_args=given, strict=True)
+
+
+@needs_xacro
 def test_what_it_expands_to_is_checked_as_any_urdf(tmp_path: Path) -> None:
     file = write(tmp_path / "arm.xacro", arm('<link name="tip"/>'))
     with refused(RobotError, "link 'tip'", file=str(file)):

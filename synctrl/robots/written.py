@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from ..checks import LONGEST_LABEL, unprintable
-from ..errors import RobotError
+from ..errors import RobotError, RobotWarning, warn
 from .robot import Robot
-from .urdf.description import describe, urdf_folder
+from .urdf.description import examine, urdf_folder
 from .urdf.packages import data_folder, named_folders
 from .urdf.reader import read_text
+from .urdf.report import Report
 from .urdf.writer import to_xml
+from .urdf.xml import quoted
 
 #: characters; longer descriptions are not kept
 LONGEST = 100_000
@@ -78,16 +80,20 @@ def read_robot(
 
     Raises:
         RobotError: nothing was written, or it makes no such robot.
+
+    Warns:
+        RobotWarning: pictures are missing; all else was said when the robot was loaded.
     """
     if "urdf" not in about:
         raise RobotError("its description was not kept", subject=f"robot '{name}'")
     folders = named_folders(package_dirs)
     called = f"the result's robot '{name}'"
     document = read_text(_trusted(about.get("file"), folders), about["urdf"].encode(), called=called)
-    found = describe(document, folders)
+    found = examine(document, folders)
     robot = Robot(
         found.model, about.get("tip", found.tip), visual=found.visual, name=name, document=found.document
     )
+    _warn_of_pictures(found.report, f"robot {quoted(name)}")
     if robot.joint_names != tuple(joints):
         raise RobotError(
             f"expected the joints {', '.join(joints)}, found {', '.join(robot.joint_names)}",
@@ -95,3 +101,8 @@ def read_robot(
             found=robot.joint_names,
         )
     return robot
+
+
+def _warn_of_pictures(report: Report, source: str) -> None:
+    if missing := report.of_kind("left out"):
+        warn(Report(missing, source).summary(), RobotWarning)

@@ -85,7 +85,7 @@ REFUSED: dict[str, Case] = {
         "<robot", '<!DOCTYPE r [<!ENTITY a "aa"><!ENTITY b "&a;&a;">]><robot', ("<!DOCTYPE>",)
     ),
     "undefined entity": Case('value="2.5"', 'value="&mass;"', ("undefined entity",)),
-    "another encoding": Case('encoding="utf-8"', 'encoding="iso-8859-1"', ("UTF-8", "iso-8859-1")),
+    "another encoding": Case('encoding="utf-8"', 'encoding="utf-7"', ("UTF-8", "utf-7")),
     "a zero character": Case("</robot>", "\0</robot>", ("zero character",)),
     "nested without end": Case("</robot>", _deep(60) + "</robot>", ("nested at most 50",)),
     "another root": Case(GOOD[GOOD.index("<robot") :], "<sdf><model/></sdf>", ("<robot>", "found <sdf>")),
@@ -201,6 +201,11 @@ REFUSED: dict[str, Case] = {
         '<origin xyz="0.4 0 0"/>', '<origin xyz="0.4 0 nan"/>', ("origin", "'nan'")
     ),
     "placement far beyond": Case('<origin xyz="0.4 0 0"/>', '<origin xyz="1e300 0 0"/>', ("at most 1e+16",)),
+    "placement by a quaternion of another order": Case(
+        '<origin xyz="0.4 0 0"/>',
+        '<origin xyz="0.4 0 0" quat_wxyz="1 0 0 0"/>',
+        ("'quat_wxyz'", "did you mean 'quat_xyzw'"),
+    ),
     "two placements": Case('<origin xyz="0.4 0 0"/>', '<origin xyz="0.4 0 0"/><origin/>', ("one <origin>",)),
 }
 
@@ -233,6 +238,9 @@ TAKEN: dict[str, Taken] = {
     "limits infinite": Taken('upper="2.5"', 'upper="inf"', "assumed", "joint 'shoulder', limit"),
     "effort zero": Taken('effort="50"', 'effort="0"', "assumed", "joint 'shoulder', limit"),
     "effort negative": Taken('effort="50"', 'effort="-50"', "assumed", "joint 'shoulder', limit"),
+    "effort not a number": Taken('effort="50"', 'effort="NaN"', "assumed", "joint 'shoulder', limit"),
+    "velocity empty": Taken('velocity="3"', 'velocity=""', "assumed", "joint 'shoulder', limit"),
+    "upper limit with a comma": Taken('upper="2.5"', 'upper="2,5"', "assumed", "joint 'shoulder', limit"),
     "velocity zero": Taken('velocity="3"', 'velocity="0"', "assumed", "joint 'shoulder', limit"),
     "effort of a continuous joint zero": Taken(
         'effort="30"', 'effort="0"', "assumed", "joint 'elbow', limit"

@@ -166,7 +166,8 @@ def _outermost(document: Document, link: str, held: Collection[str]) -> str:
 
 def check_tip(document: Document, tip: str | None, notes: Notes) -> None:
     """Remark a tip that the user asked for, but that no joint moves, or a finger; nothing is held yet."""
-    if tip not in {link.name for link in document.links} | {joint.name for joint in document.joints}:
+    links, joints = ({item.name for item in items} for items in (document.links, document.joints))
+    if tip not in links | joints | {"universe"}:
         return
     branches = Branches(document)
     chain = branches.moving_tip(tip)

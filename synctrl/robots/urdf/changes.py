@@ -41,9 +41,8 @@ def with_inertials(document: Document, inertials: Mapping[str, Inertial | Mappin
     for name in inertials:
         if name not in names:
             found = f"{name!a}{near(str(name), names)}"
-            raise InputError(
-                f"expected links of {document.source}, found {found}", subject="inertials", found=found
-            )
+            expected = f"expected links of {document.source}"
+            raise InputError(f"{expected}, found {found}", subject="inertials", found=found)
     given = {name: _inertial(f"inertials[{name!a}]", value) for name, value in inertials.items()}
     links = (replace(link, inertial=given.get(link.name, link.inertial)) for link in document.links)
     return replace(document, links=tuple(links))
@@ -131,11 +130,8 @@ def _check_position(document: Document, joint: Joint, position: float) -> None:
     if limit is None or limit.lower is None or limit.upper is None or limit.lower >= limit.upper:
         return
     if not limit.lower <= position <= limit.upper:
-        raise document.error(
-            f"expected a position from {limit.lower:g} to {limit.upper:g}, found {position:g}",
-            joint,
-            found=position,
-        )
+        expected = f"expected a position from {limit.lower:g} to {limit.upper:g}"
+        raise document.error(f"{expected}, found {position:g}", joint, found=position)
 
 
 def _fixed(document: Document, positions: Mapping[str, float]) -> Document:
@@ -241,7 +237,10 @@ def _massless(document: Document, tip: str | None) -> Found:
 
 
 def _virtual(document: Document) -> Found:
-    """Joints of a base that is none, as planners need it: sliding bodies without mass or shape."""
+    """Joints of a base that is none, as planners need it: two or more, one of them sliding.
+
+    Their bodies have neither mass nor shape; of a base that turns and then drives, the one that drives may.
+    """
     branches, parameters = Branches(document), body_parameters(document)
     carrier = carriers(document)
     seen = {carrier[link.name][0] for link in document.links if link.visuals or link.collisions}
@@ -249,8 +248,10 @@ def _virtual(document: Document) -> Found:
     on = [name for name, above in branches.chains.items() if len(above) == 1]
     while len(on) == 1 and not parameters[on[0]][0] and on[0] not in seen:
         chain, on = [*chain, on[0]], branches.next[on[0]]
-    slides = any(branches.moving[name].type == "prismatic" for name in chain)
-    if len(chain) < 2 or not slides or not on:
+    slides = {name for name, joint in branches.moving.items() if joint.type == "prismatic"}
+    if len(on) == 1 and on[0] in slides and not slides.intersection(chain):
+        chain, on = [*chain, on[0]], branches.next[on[0]]
+    if len(chain) < 2 or not slides.intersection(chain) or not on:
         return {}
     return {name: (_rest(branches.moving[name]), "it moves a base without mass or shape") for name in chain}
 

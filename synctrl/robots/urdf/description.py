@@ -112,7 +112,18 @@ def read_urdf(
     return describe(document, package_dirs, notes=notes, **options)
 
 
-def describe(
+def describe(document: Document, package_dirs: Iterable[str | Path] = (), **options: Any) -> Description:
+    """`examine` a document, and warn once of what there is to say.
+
+    Raises, warns: as `read_urdf`.
+    """
+    found = examine(document, package_dirs, **options)
+    if found.report.notes:
+        warn(found.report.summary(), RobotWarning)
+    return found
+
+
+def examine(
     document: Document,
     package_dirs: Iterable[str | Path] = (),
     *,
@@ -121,7 +132,7 @@ def describe(
     inertials: Mapping[str, Inertial | Mapping[str, Any]] | None = None,
     notes: Notes | None = None,
 ) -> Description:
-    """Check a document and build its model.
+    """Check a document and build its model; what there is to say is in the report.
 
     Args:
         document: the robot.
@@ -132,7 +143,7 @@ def describe(
         inertials: of links, in the place of what the document says, see `with_inertials`.
         notes: what was remarked so far; a strict one makes every remark an error.
 
-    Raises, warns: as `read_urdf`.
+    Raises: as `read_urdf`.
     """
     notes = notes or Notes(document.file)
     instance("frame", tip, (str, type(None)), "a name")
@@ -146,8 +157,6 @@ def describe(
         tip = default_tip(document, held, notes)
     frame_id(document.name, model, tip)
     report = replace(notes.report(document.source), known=tuple(stated_friction(document)))
-    if report.notes:
-        warn(report.summary(), RobotWarning)
     name = document.name if document.name.isprintable() else quoted(document.name)
     return Description(name, model, visual, tip, document, tuple(held), report)
 
@@ -191,7 +200,7 @@ def existing_file(path: str | Path) -> Path:
     try:
         if file.is_file():
             return file
-        kind = "a folder" if file.is_dir() else "no such file"
+        kind = "a folder" if file.is_dir() else "no regular file" if file.exists() else "no such file"
         beside = sorted(f.name for f in file.parent.glob("*.urdf"))
     except (OSError, ValueError) as error:
         raise RobotError(f"{expected}, found: {error}", file=shown, found=str(error)) from error
@@ -212,7 +221,7 @@ def read_source(
         MissingDependencyError: xacro or MuJoCo is needed, and not installed.
     """
     if file.suffix.lower() == XACRO_SUFFIX:
-        return read_text(file, expand(file, xacro_args, packages).encode(), notes)
+        return read_text(file, expand(file, xacro_args, packages, notes).encode(), notes)
     if xacro_args is not None:
         words = f"expected none for a file that is no xacro file: {file}"
         raise InputError(words, subject="xacro_args", found=tuple(xacro_args))

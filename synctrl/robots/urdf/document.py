@@ -87,6 +87,11 @@ class Inertial:
         return np.array([self.mass, *(self.mass * c), *I[np.tril_indices(3)]])
 
 
+def link_name(name: str) -> str:
+    """What a link of this name is called: "universe" is Pinocchio's name of the world."""
+    return f"{name} (link)" if name == "universe" else name
+
+
 def upper_triangle(inertia: np.ndarray) -> Vector:
     """(ixx, ixy, ixz, iyy, iyz, izz) of a symmetric matrix, (3, 3): the order of a URDF."""
     return tuple(map(float, inertia[np.triu_indices(3)]))

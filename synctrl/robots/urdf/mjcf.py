@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from ...errors import MissingDependencyError, RobotError
-from .document import Document, Geometry, Inertial, Joint, Link, Mimic, Pose, Shape, upper_triangle
+from .document import Document, Geometry, Inertial, Joint, Link, Mimic, Pose, Shape, link_name, upper_triangle
 from .mjcf_files import Whole, read_whole
 from .mjcf_model import check_dynamics, joint_limits
 from .packages import Packages
@@ -46,7 +46,7 @@ def read_mjcf(file: Path, packages: Packages, notes: Notes) -> Document:
         ) from error
     writer = _Writer(mujoco, model, whole, file, notes)
     document = writer.document()
-    check_dynamics(mujoco, model, document, writer.held)
+    check_dynamics(mujoco, model, writer.joint_names, document, writer.held)
     return document
 
 
@@ -71,7 +71,7 @@ class _Writer:
         self.mujoco, self.model, self.whole = mujoco, model, whole
         self.file, self.notes = file, notes
         kinds = mujoco.mjtObj
-        self.bodies = self._names(kinds.mjOBJ_BODY, model.nbody, "body")
+        self.bodies = [*map(link_name, self._names(kinds.mjOBJ_BODY, model.nbody, "body"))]
         self.joint_names = self._names(kinds.mjOBJ_JOINT, model.njnt, "joint")
         self.held: dict[str, float] = {}
         self.taken = {*self.bodies, *self.joint_names}
@@ -185,7 +185,7 @@ class _Writer:
         model, names = self.model, self._names(self.mujoco.mjtObj.mjOBJ_SITE, self.model.nsite, "site")
         sites = []
         for site, body in enumerate(model.site_bodyid):
-            name = unique(names[site], self.taken)
+            name = unique(link_name(names[site]), self.taken)
             place = _place(model.site_pos[site], model.site_quat[site])
             sites.append((Link(name), self._fixed(self.bodies[body], name, place)))
         return sites

@@ -64,12 +64,15 @@ SAME = 1e-9
 """Relative to the largest torque; rounding alone is some 1e-15."""
 
 
-def check_dynamics(mujoco: Any, compiled: Any, document: Document, held: Mapping[str, float]) -> None:
+def check_dynamics(
+    mujoco: Any, compiled: Any, names: list[str], document: Document, held: Mapping[str, float]
+) -> None:
     """Compare inverse dynamics in a few states, the same in every run.
 
     Args:
         mujoco: the library.
         compiled: its model.
+        names: what the document calls its joints; some have no name of their own.
         document: what was written of it.
         held: positions of the joints that are fixed in the document, rad or m.
 
@@ -79,7 +82,7 @@ def check_dynamics(mujoco: Any, compiled: Any, document: Document, held: Mapping
     if not document.moving_joints:
         return
     model = build_model(document)
-    joints = [compiled.joint(name) for name in list(model.names)[1:]]
+    joints = [compiled.joint(names.index(name)) for name in list(model.names)[1:]]
     places = [(int(joint.qposadr[0]), int(joint.dofadr[0])) for joint in joints]
     compiled.opt.gravity[:], compiled.opt.disableflags = model.gravity.linear, 0
     rng = np.random.default_rng(0)
@@ -87,7 +90,7 @@ def check_dynamics(mujoco: Any, compiled: Any, document: Document, held: Mapping
         q, v, a = rng.uniform(-1, 1, (3, model.nv))
         data = mujoco.MjData(compiled)
         for name, position in held.items():
-            data.joint(name).qpos[0] = position
+            data.joint(names.index(name)).qpos[0] = position
         expected = _torque(mujoco, compiled, data, places, (q, v, a))
         found = pin.rnea(model, model.createData(), pin.integrate(model, pin.neutral(model), q), v, a)
         if abs(found - expected).max() > SAME * max(abs(expected).max(), 1e-9):

@@ -67,8 +67,6 @@ def read_limit(joint: Element, kind: str) -> tuple[Limit, tuple[Note, ...]]:
         joint: the `<joint>`.
         kind: its type. A continuous joint has no range, and may have no `<limit>` at all.
 
-    Raises:
-        RobotError: a bound that is no number.
     """
     limit = joint.first("limit")
     if limit is None:
@@ -94,7 +92,12 @@ def _unbounded(key: str, value: float | None) -> str:
     """What is said of an effort or velocity that bounds nothing; empty of a good one."""
     if value is not None and 0 < value < math.inf:
         return ""
-    return f"{key} {'missing' if value is None else format(value, 'g')} is taken as no limit"
+    return _no_limit(f"{key} missing" if value is None else key, value)
+
+
+def _no_limit(key: str, value: float | None) -> str:
+    shown = "" if value is None else ", which is no number," if math.isnan(value) else f" {value:g}"
+    return f"{key}{shown} is taken as no limit"
 
 
 def _range(limit: Element) -> tuple[float | None, float | None, str]:
@@ -106,9 +109,9 @@ def _range(limit: Element) -> tuple[float | None, float | None, str]:
     for key, value in (("lower", lower), ("upper", upper)):
         if value is None:
             said = f"no {key} is stated; it is 0, as in every URDF"
-        elif math.isinf(value):
-            said = f"{key} {value:g} is taken as no limit"
-    lower, upper = (None if math.isinf(end := value or 0.0) else end for value in (lower, upper))
+        elif not math.isfinite(value):
+            said = _no_limit(key, value)
+    lower, upper = (end if math.isfinite(end := value or 0.0) else None for value in (lower, upper))
     return lower, upper, said
 
 

@@ -10,10 +10,22 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...errors import near
-from .document import INERTIA, MOVING_TYPES, NO_INERTIA, Document, Inertial, Joint, Link, Mimic, Vector
+from ...renamed import tell
+from .document import (
+    INERTIA,
+    MOVING_TYPES,
+    NO_INERTIA,
+    Document,
+    Inertial,
+    Joint,
+    Link,
+    Mimic,
+    Vector,
+    link_name,
+)
 from .parts import Material, read_limit, read_materials, read_origin, read_shapes
 from .report import Notes
-from .xml import Element, parse_xml, quoted, shown_tag
+from .xml import Element, parse_xml, quoted, read_bytes, shown_tag
 
 JOINT_TYPES = (*MOVING_TYPES, "fixed")
 JOINT_PARTS = (
@@ -21,7 +33,6 @@ JOINT_PARTS = (
     *("calibration", "safety_controller"),
 )
 
-WORLD = "universe"
 _NO_AXIS = 1e-6
 _UNIT_AXIS = 1e-3
 
@@ -51,6 +62,12 @@ def read_text(file: Path, data: bytes, notes: Notes | None = None, called: str =
     )
 
 
+def read_document(file: Path) -> Document:
+    """A URDF file as a document, as in version 0.1; `load_robot` and `read_urdf` take its place."""
+    tell(f"{__name__}.read_document", f"{__name__}.read_text(file, file.read_bytes())")
+    return read_text(file, read_bytes(file))
+
+
 def _robot_name(root: Element, file: Path) -> str:
     if root.attributes.get("name", "").strip():
         return root.name()
@@ -65,7 +82,7 @@ def _link(element: Element, materials: dict[str, Material]) -> Link:
     element.know(("inertial", "visual", "collision", *LINK_EXTENSIONS), ("name", "type"))
     inertial = element.optional("inertial")
     return Link(
-        name=_link_name(element, "name"),
+        name=link_name(element.name()),
         inertial=None if inertial is None else _inertial(inertial),
         visuals=read_shapes(element, "visual", materials),
         collisions=read_shapes(element, "collision", {}),
@@ -117,13 +134,7 @@ def _joint(element: Element) -> Joint:
 def _end(element: Element, role: str) -> str:
     end = element.required(role)
     end.know((), ("link",))
-    return _link_name(end, "link")
-
-
-def _link_name(element: Element, attribute: str) -> str:
-    """The name of a link; what engines call the world cannot be one."""
-    name = element.name(attribute)
-    return f"{name} (link)" if name == WORLD else name
+    return link_name(end.name("link"))
 
 
 def _moving(element: Element, joint: Joint) -> Joint:

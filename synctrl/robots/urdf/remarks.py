@@ -58,6 +58,8 @@ def _of_link(inertial: Inertial) -> Iterator[str]:
     distance = math.hypot(*inertial.origin.xyz)
     if fault := triangle_fault(inertial):
         yield f"{fault}; no body has them, and physically consistent adaptation cannot use them"
+    if (least := min(np.diag(inertial.matrix))) < 0:
+        yield f"a moment of {least:g} kg·m^2 is taken for rounding"
     if mass <= 0:
         return
     if distance > FARTHEST_COM:

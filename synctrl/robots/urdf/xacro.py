@@ -18,6 +18,8 @@ from ...checks import instance
 from ...errors import InputError, MissingDependencyError, RobotError
 from . import xacro_child
 from .packages import Packages
+from .report import Notes
+from .xml import quoted
 
 SUFFIX = ".xacro"
 TIME_LIMIT = 30.0
@@ -52,8 +54,11 @@ def expand_xacro(
     return expand(Path(file), args, Packages(Path(file), package_dirs))
 
 
-def expand(file: Path, args: Mapping[str, object] | None, packages: Packages) -> str:
-    """`expand_xacro` among packages that are known."""
+def expand(
+    file: Path, args: Mapping[str, object] | None, packages: Packages, notes: Notes | None = None
+) -> str:
+    """`expand_xacro` among packages that are known; `notes` takes arguments that the file has not."""
+    notes = notes or Notes(file)
     request = {
         "file": str(file.absolute()),
         "args": _mappings(args or {}),
@@ -63,6 +68,8 @@ def expand(file: Path, args: Mapping[str, object] | None, packages: Packages) ->
     answer = _conversation(file, request, packages)
     if "text" not in answer:
         raise _failure(file, answer)
+    for name in answer.get("unused", ()):
+        notes.add("left out", "xacro_args", f"the file asks for no argument {quoted(str(name))}")
     return str(answer["text"])
 
 

@@ -7,8 +7,9 @@ nothing pass but what expanding takes. That is a fence and no sandbox: it is bui
 
 It reads one line of JSON, {"file", "args", "roots", "libraries"}, from the standard input, and writes lines
 of JSON: {"find": name} for each package it needs, answered by a line with its folder or null, and in the end
-{"text": ...} or {"error": ..., "found": ...}, the reason in words and in one word: what the fence does not
-let pass, or else the kind of the error. It imports nothing of this package, and runs with `python -I -S`.
+{"text": ..., "unused": names} or {"error": ..., "found": ...}, the reason in words and in one word: what the
+fence does not let pass, or else the kind of the error. It imports nothing of this package, and runs with
+`python -I -S`.
 """
 
 from __future__ import annotations
@@ -51,14 +52,16 @@ def main() -> None:
     _limit_resources()
     sys.addaudithook(_fence(roots))
     try:
-        _send(answer, text=_expanded(xacro, request["file"], request["args"]))
+        args = _Arguments(request["args"])
+        text = _expanded(xacro, request["file"], args)
+        _send(answer, text=text, unused=sorted(set(request["args"]) - args.asked))
     except BaseException as error:
         cause = _cause(error)
         found = getattr(cause, "event", type(cause).__name__)
         _send(answer, error=_reason(xacro, error, cause), found=found)
 
 
-def _send(answer: TextIO, **message: str) -> None:
+def _send(answer: TextIO, **message: str | list[str]) -> None:
     answer.write(json.dumps(message) + "\n")
     answer.flush()
 
@@ -140,6 +143,22 @@ def _refuse(what: str, value: Any, doing: str = "") -> NoReturn:
 
 
 # -- expanding ---------------------------------------------------------------------------------------------
+
+
+class _Arguments(dict[str, str]):
+    """Values of arguments; `asked` has the names that the file asked for."""
+
+    def __init__(self, values: dict[str, str]) -> None:
+        super().__init__(values)
+        self.asked: set[object] = set()
+
+    def __contains__(self, name: object) -> bool:
+        self.asked.add(name)
+        return super().__contains__(name)
+
+    def __getitem__(self, name: str) -> str:
+        self.asked.add(name)
+        return super().__getitem__(name)
 
 
 def _expanded(xacro: Any, file: str, args: dict[str, str]) -> str:

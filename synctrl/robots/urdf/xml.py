@@ -18,6 +18,7 @@ from xml.parsers import expat
 
 from ...checks import unprintable
 from ...errors import RobotError
+from .encodings import as_utf8
 from .packages import Unusable, read_regular
 from .report import Notes
 
@@ -33,7 +34,7 @@ _LONGEST_NAME = 900
 _MISSPELT = 0.75
 MECHANISM = (
     *("inertial", "mass", "inertia", "origin", "parent", "child", "axis", "mimic", "value", "link", "joint"),
-    *("xyz", "rpy", "multiplier", "offset"),
+    *("xyz", "rpy", "quat_xyzw", "multiplier", "offset"),
 )
 """Elements and attributes without which a file would mean another mechanism, or one that stands elsewhere."""
 
@@ -166,12 +167,12 @@ class Element:
         return value
 
     def bound(self, attribute: str) -> float | None:
-        """An attribute that bounds something: a number, infinite where it is beyond measure, or None."""
+        """An attribute that bounds something: infinite if it is beyond measure, NaN if no number, or None."""
         if attribute not in self.attributes:
             return None
         word = self.attributes[attribute].strip()
         if not _INFINITE.fullmatch(word) and not _NUMBER.fullmatch(word):
-            self.refuse(f"{attribute} of 1 number", quoted(word))
+            return math.nan
         value = float(word)
         return value if abs(value) <= MAX_NUMBER else math.copysign(math.inf, value)
 
@@ -206,28 +207,13 @@ def parse_xml(file: str, data: bytes, notes: Notes | None = None) -> Element:
 
     Args:
         file: what messages call it.
-        data: the document, in UTF-8.
+        data: the document, in an encoding of `ENCODINGS`, or UTF-16 with a mark.
         notes: where its elements take their notes.
 
     Raises:
-        RobotError: not UTF-8, not well-formed, a document type declaration, or nested or filled without end.
+        RobotError: another encoding, not well-formed, a document type, or nested or filled without end.
     """
-    return _Reader(file, notes or Notes(file)).read(_utf8(file, data))
-
-
-def _utf8(file: str, data: bytes) -> bytes:
-    if b"\0" in data:
-        line = data.count(b"\n", 0, data.index(b"\0")) + 1
-        found = "a zero character, as in UTF-16"
-        raise RobotError(f"expected text in UTF-8, found {found}", file=file, line=line, found=found)
-    try:
-        data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        found = f"byte {data[error.start]:#04x}"
-        words = f"expected text in UTF-8, found {found}"
-        raise RobotError(words, file=file, line=line, found=found) from error
-    return data
+    return _Reader(file, notes or Notes(file)).read(as_utf8(file, data))
 
 
 class _Reader:
@@ -243,7 +229,6 @@ class _Reader:
         self.parser.EndElementHandler = lambda tag: self.open.pop()
         self.parser.CharacterDataHandler = self._text
         self.parser.StartDoctypeDeclHandler = self._doctype
-        self.parser.XmlDeclHandler = self._declaration
 
     def read(self, data: bytes) -> Element:
         try:
@@ -276,10 +261,6 @@ class _Reader:
 
     def _doctype(self, *_: Any) -> None:
         self._refuse("a document without <!DOCTYPE> and entities", "<!DOCTYPE>")
-
-    def _declaration(self, _version: str, encoding: str | None, _standalone: int) -> None:
-        if encoding is not None and encoding.lower() not in ("utf-8", "utf8", "us-ascii", "ascii"):
-            self._refuse("text in UTF-8", f"a declaration of {quoted(encoding)}")
 
     def _refuse(self, expected: str, found: str, line: int = 0) -> NoReturn:
         line = line or self.parser.CurrentLineNumber
