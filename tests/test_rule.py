@@ -412,6 +412,21 @@ def test_places_so_far_away_that_digits_are_lost_are_refused(x, tmp_path):
         loaded(tmp_path, robot_text(ARM.replace('xyz="0.5 0 0"', f'xyz="{x} 0 0"', 1)))
 
 
+def test_turns_of_which_digits_are_lost_are_refused(tmp_path):
+    with refused(RobotError, "joint 'ja', origin"):
+        loaded(tmp_path, robot_text(ARM.replace('xyz="0.5 0 0"', 'rpy="0 1e16 0"', 1)))
+
+
+@pytest.mark.parametrize("offset", ["1e12", "-1e12"])
+def test_a_joint_that_would_be_held_so_far_away_is_refused(offset, tmp_path):
+    follower = joint("jd", "c", "d", f'<mimic joint="ja" offset="{offset}"/>', type="prismatic")
+    with refused(RobotError, "joint 'jd'"):
+        loaded(tmp_path, robot_text(ARM, link("d"), follower))
+    free = robot_text(ARM.replace('lower="-2" upper="2"', "").replace("revolute", "prismatic"))
+    with refused(RobotError, "joint 'jc'"):
+        loaded(tmp_path, free, locked={"jc": float(offset)})
+
+
 # -- the mechanism -----------------------------------------------------------------------------------------
 
 

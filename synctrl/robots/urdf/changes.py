@@ -18,6 +18,7 @@ from ...errors import InputError, near
 from .branches import Branches
 from .checks import body_parameters, carriers
 from .document import INERTIA, Document, Inertial, Joint, Limit, Link, Pose, upper_triangle
+from .parts import FARTHEST
 from .report import Notes
 from .xml import quoted
 
@@ -135,6 +136,9 @@ def _check_position(document: Document, joint: Joint, position: float) -> None:
 
 
 def _fixed(document: Document, positions: Mapping[str, float]) -> Document:
+    for joint in document.moving_joints:
+        if abs(position := positions.get(joint.name, 0.0)) > FARTHEST:
+            raise document.error(f"expected to be held at {FARTHEST:g} at most, found {position:g}", joint)
     joints = (j.fixed(positions[j.name]) if j.name in positions else j for j in document.joints)
     return replace(document, joints=tuple(joints))
 
@@ -187,10 +191,7 @@ def _followers(document: Document, held: Mapping[str, float]) -> Found:
 
 
 def _followed(
-    joint: Joint,
-    joints: Mapping[str, Joint],
-    held: Mapping[str, float],
-    seen: tuple[str, ...],
+    joint: Joint, joints: Mapping[str, Joint], held: Mapping[str, float], seen: tuple[str, ...]
 ) -> float:
     """Where a joint is, in rad or m, if what it follows is held or rests."""
     if joint.name in held or joint.mimic is None or joint.name in seen:
@@ -241,8 +242,7 @@ def _virtual(document: Document) -> Found:
 
     Their bodies have neither mass nor shape; of a base that turns and then drives, the one that drives may.
     """
-    branches, parameters = Branches(document), body_parameters(document)
-    carrier = carriers(document)
+    branches, parameters, carrier = Branches(document), body_parameters(document), carriers(document)
     seen = {carrier[link.name][0] for link in document.links if link.visuals or link.collisions}
     chain: list[str] = []
     on = [name for name, above in branches.chains.items() if len(above) == 1]

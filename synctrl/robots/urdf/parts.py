@@ -19,7 +19,7 @@ from .report import Note
 from .xml import Element, quoted
 
 FARTHEST = 1e6
-"""In m: double precision places what is farther away to no better than a nanometre, and no arm is there."""
+"""In m, or rad: double precision places what is farther away to no better than 1e-10, and no arm is there."""
 _UNIT = 1e-3
 
 
@@ -33,14 +33,20 @@ def read_origin(element: Element) -> Pose:
     if origin is None:
         return Pose()
     origin.know((), ("xyz", "rpy", "quat_xyzw"))
-    xyz = origin.numbers("xyz", 3, ZERO)
-    if max(map(abs, xyz)) > FARTHEST:
-        origin.refuse(f"xyz of at most {FARTHEST:g} m", " ".join(f"{x:g}" for x in xyz))
+    xyz = _near(origin, "xyz", "m")
     if "quat_xyzw" not in origin.attributes:
-        return Pose(xyz, origin.numbers("rpy", 3, ZERO))
+        return Pose(xyz, _near(origin, "rpy", "rad"))
     if "rpy" in origin.attributes:
         origin.refuse("rpy or quat_xyzw", "both")
     return Pose(xyz, _turned(origin))
+
+
+def _near(origin: Element, key: str, unit: str) -> Vector:
+    """Three numbers that are so small that no digits are lost."""
+    found = origin.numbers(key, 3, ZERO)
+    if max(map(abs, found)) > FARTHEST:
+        origin.refuse(f"{key} of at most {FARTHEST:g} {unit}", " ".join(f"{x:g}" for x in found))
+    return found
 
 
 def _turned(origin: Element) -> Vector:
