@@ -265,10 +265,8 @@ def _check_output(where: str, output: Any, lengths: Mapping[str, int]) -> None:
     except (TypeError, ValueError, AttributeError, IndexError):
         sound = False
     if not sound:
-        raise InputError.expected(
-            f"an array of floats over {lengths['time']} instants, its unit, and the names of its "
-            f"axes, of which the first is 'time'",
-            output,
-            where,
-            shown=f"{output!r:.80}",
+        raise InputError(
+            f"expected an array of floats over {lengths['time']} instants, its unit, and the names of its "
+            f"axes, of which the first is 'time', found {output!r:.80}",
+            subject=where,
         )
