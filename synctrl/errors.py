@@ -64,7 +64,7 @@ class SynctrlError(Portable, Exception):
         line: int | None = None,
     ):
         file = None if file is None else str(file)
-        data = {"subject": subject, "found": plain(found), "file": file, "line": line or None}
+        data = {"subject": subject, "found": plain_data(found), "file": file, "line": line or None}
         vars(self).update({name: value for name, value in data.items() if value is not None})
         self.problem = message
         super().__init__(self._whole(message))
@@ -88,7 +88,7 @@ class SynctrlError(Portable, Exception):
 
     def about(self, subject: str | None = None, **data: Any) -> Self:
         """This error with more data, for one whose message says in words of its own what it is about."""
-        found = plain(data.pop("found", self.found))
+        found = plain_data(data.pop("found", self.found))
         vars(self).update(subject=subject, found=found, **data)
         return self
 
@@ -280,7 +280,7 @@ def _remade(kind: type[BaseException], args: tuple) -> BaseException:
     return error
 
 
-def plain(value: Any, depth: int = 8) -> Any:
+def plain_data(value: Any, depth: int = 8) -> Any:
     """`value` as data that hold nothing of the caller's: a number, a text, None, or a tuple of them.
 
     Arrays and lists become tuples. Of anything else, and below this depth, only the name of its type is left.
@@ -288,7 +288,7 @@ def plain(value: Any, depth: int = 8) -> Any:
     if isinstance(value, (np.generic, np.ndarray)):
         value = value.tolist()
     if isinstance(value, (list, tuple)) and depth:
-        return tuple(plain(each, depth - 1) for each in value)
+        return tuple(plain_data(each, depth - 1) for each in value)
     return value if value is None or isinstance(value, (int, float, complex, str)) else type(value).__name__
 
 

@@ -414,7 +414,7 @@ def test_20_equations_21_and_22_print_y_transposed() -> None:
     tilde = run.cell.theta - run.cell.theta_hat0
     assert s.Y.shape == (4, 2, 20)
     np.vdot(s.s_q, np.matvec(s.Y, tilde))  # r^T c^-T Y tilde is a number
-    with pytest.raises(ValueError, match="mismatch"):
+    with pytest.raises(ValueError, match="mismatch"):  # numpy's words
         s.s_q[0] @ s.Y[0].T @ tilde[0]  # r^T c^-T Y^T tilde is not
 
 

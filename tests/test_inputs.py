@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +9,7 @@ import pytest
 from cells import SMALL_GAINS, small_cell
 from hypothesis import given
 from hypothesis import strategies as st
+from refusals import refused
 
 from synctrl import (
     CartesianSpace,
@@ -59,10 +59,10 @@ def pair(*members: Member, **options) -> Cell:
     return Cell(members, options.pop("coupling", Coupling.pair()), **options)
 
 
-def refused(make, says: str, kind: type[SynctrlError] = SynctrlError) -> None:
-    with pytest.raises(kind) as caught:
+def refuses(make, subject: str | None, kind: type[SynctrlError] = SynctrlError, **data) -> None:
+    """What is made is refused by an error about this subject."""
+    with refused(kind, subject, **data):
         make()
-    assert re.search(says, str(caught.value), re.DOTALL), str(caught.value)
 
 
 # -- numbers ----------------------------------------------------------------------------------------------
@@ -70,12 +70,12 @@ def refused(make, says: str, kind: type[SynctrlError] = SynctrlError) -> None:
 
 @pytest.mark.parametrize("value", NO_NUMBERS, ids=repr)
 def test_what_is_no_number_is_no_array_of_numbers(value):
-    refused(lambda: finite_array("K", value), r"^K: expected", InputError)
+    refuses(lambda: finite_array("K", value), "K", InputError)
 
 
 @pytest.mark.parametrize("value", NOT_FINITE, ids=repr)
 def test_numbers_have_to_be_finite(value):
-    refused(lambda: finite_array("K", value), r"^K: expected finite numbers, found (nan|-?inf)", InputError)
+    refuses(lambda: finite_array("K", value), "K", InputError)
 
 
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), max_size=5))
@@ -89,12 +89,12 @@ def test_good_numbers_arrive_unchanged_read_only_and_apart(values):
 @pytest.mark.parametrize("check", [finite_number, positive_number, non_negative_number])
 @pytest.mark.parametrize("value", [*NO_NUMBERS, *NOT_FINITE, True, [1.0], np.ones((1, 1))], ids=repr)
 def test_a_single_number_is_a_single_number(check, value):
-    refused(lambda: check("dt", value), "^dt: expected", InputError)
+    refuses(lambda: check("dt", value), "dt", InputError)
 
 
 def test_signs_are_checked():
-    refused(lambda: positive_number("dt", 0.0), "above 0, found 0")
-    refused(lambda: non_negative_number("k", -1e-9), "at least 0, found -1e-09")
+    refuses(lambda: positive_number("dt", 0.0), "dt", found=0.0)
+    refuses(lambda: non_negative_number("k", -1e-9), "k", found=-1e-9)
     assert (positive_number("dt", np.float32(0.5)), non_negative_number("k", 0)) == (0.5, 0.0)
 
 
@@ -108,15 +108,13 @@ GAINS = {"Lambda": 4.0, "beta": 4.0, "K_r": 1.0, "K_eps": 2.0, "Gamma": 0.2}
 def test_a_gain_that_is_no_gain_is_named(name, value):
     if name == "Gamma" and value is None:
         return  # which says that an adaptation is given instead
-    refused(lambda: Gains(**{**GAINS, name: value}), f"^{name}: expected", InputError)
-    refused(lambda: Gains(**GAINS).replace(**{name: value}), f"^{name}: expected", InputError)
+    refuses(lambda: Gains(**{**GAINS, name: value}), name, InputError)
+    refuses(lambda: Gains(**GAINS).replace(**{name: value}), name, InputError)
 
 
 def test_lambda_and_k_r_have_to_be_above_zero_and_the_others_need_not():
     for name in ("Lambda", "K_r"):
-        refused(
-            lambda name=name: Gains(**{**GAINS, name: 0.0}), f"^{name}: expected entries above 0, found 0"
-        )
+        refuses(lambda name=name: Gains(**{**GAINS, name: 0.0}), name, found=0.0)
     Gains(**{**GAINS, "beta": 0.0, "K_eps": 0.0, "Gamma": 0.0})
 
 
@@ -140,20 +138,21 @@ def test_lambda_and_k_r_have_to_be_above_zero_and_the_others_need_not():
 )
 def test_a_gain_of_the_wrong_size_is_named_with_the_right_ones(name, shape):
     gains = Gains(**{**GAINS, name: np.ones(shape)})
-    refused(
+    refuses(
         lambda: Experiment(pair(), gains, 1.0),
-        rf"^{name}: expected a shape of .*found {re.escape(str(shape))}",
+        name,
+        found=shape,
     )
 
 
 def test_unknown_gains_are_named():
-    refused(lambda: SMALL_GAINS.replace(K_epsilon=1.0), "K_epsilon")
+    refuses(lambda: SMALL_GAINS.replace(K_epsilon=1.0), "gains", found="K_epsilon")
 
 
 @pytest.mark.parametrize("gains", [None, 3.0, GAINS, "paper"])
 def test_gains_are_gains(gains):
-    refused(lambda: Experiment(pair(), gains, 1.0), "gains: expected Gains", InputError)
-    refused(lambda: simulate(pair(), gains, 1.0), "gains: expected Gains", InputError)
+    refuses(lambda: Experiment(pair(), gains, 1.0), "gains", InputError)
+    refuses(lambda: simulate(pair(), gains, 1.0), "gains", InputError)
 
 
 # -- initial states, members, cells -----------------------------------------------------------------------
@@ -164,65 +163,65 @@ def test_gains_are_gains(gains):
     "value", ["here", [np.nan] * 2, [1.0], [[0.0, 1.0]], np.zeros(3), 1.0, [np.inf, 0]], ids=repr
 )
 def test_a_wrong_initial_state_is_named_with_its_robot(name, value):
-    refused(
-        lambda: pair(Member(ARM, GOOD), Member(ARM, GOOD, **{name: value})), f"^robot 2, {name}: ", InputError
+    refuses(
+        lambda: pair(Member(ARM, GOOD), Member(ARM, GOOD, **{name: value})), f"robot 2, {name}", InputError
     )
     named = Member(ARM, GOOD, name="left", **{name: value})
-    refused(lambda: pair(Member(ARM, GOOD), named), f"^left, {name}: ", InputError)
+    refuses(lambda: pair(Member(ARM, GOOD), named), f"left, {name}", InputError)
 
 
 @pytest.mark.parametrize(
-    ("make", "says"),
+    ("make", "subject"),
     [
-        (lambda: Cell([], Coupling.pair()), "coupling: made for 2 robots, but the cell has 0"),
-        (lambda: Cell([Member(ARM, GOOD)], Coupling.pair()), "made for 2 robots, but the cell has 1"),
-        (lambda: Cell([Member(ARM, GOOD)] * 3, Coupling.pair()), "made for 2 robots, but the cell has 3"),
-        (lambda: Cell([ARM, ARM], Coupling.pair()), "members: expected Member objects, found Robot"),
+        (lambda: Cell([], Coupling.pair()), "coupling"),
+        (lambda: Cell([Member(ARM, GOOD)], Coupling.pair()), "coupling"),
+        (lambda: Cell([Member(ARM, GOOD)] * 3, Coupling.pair()), "coupling"),
+        (lambda: Cell([ARM, ARM], Coupling.pair()), "members"),
         (lambda: Cell(None, Coupling.pair()), "members"),
         (lambda: Cell(5, Coupling.pair()), "members"),
-        (lambda: pair(coupling="pair"), "coupling: expected a Coupling, found str"),
-        (lambda: pair(coupling=None), "coupling: expected a Coupling"),
+        (lambda: pair(coupling="pair"), "coupling"),
+        (lambda: pair(coupling=None), "coupling"),
         (lambda: pair(space="joint"), "space"),
         (lambda: pair(space=JointSpace), "space"),
-        (lambda: pair(Member("planar2r", GOOD), Member(ARM, GOOD)), "robot 1, robot|robot: expected a Robot"),
-        (lambda: pair(Member(None, GOOD), Member(ARM, GOOD)), "robot: expected a Robot"),
+        (lambda: pair(Member("planar2r", GOOD), Member(ARM, GOOD)), "robot"),
+        (lambda: pair(Member(None, GOOD), Member(ARM, GOOD)), "robot"),
         (lambda: pair(Member(ARM, None), Member(ARM, GOOD)), "robot 1, trajectory"),
         (lambda: pair(Member(ARM, [0.0, 1.0]), Member(ARM, GOOD)), "robot 1, trajectory"),
         (lambda: pair(Member(ARM, GOOD), Member(ARM, np.sin, [0, 0])), "robot 2, trajectory"),
-        (lambda: pair(Member(ARM, GOOD), Member(ARM, Hold([0.0]))), "robot 2"),
+        (lambda: pair(Member(ARM, GOOD), Member(ARM, Hold([0.0]))), "robot 2, trajectory"),
         (
             lambda: pair(Member(ARM, GOOD), Member(ARM, Hold([0.0] * 3), [0, 1])),
-            "robot 2, trajectory: expected 2",
+            "robot 2, trajectory",
         ),
         (lambda: pair(Member(ARM, GOOD), Member(ARM, GOOD, friction=0.5)), "robot 2, friction"),
         (
             lambda: pair(Member(ARM, GOOD), Member(ARM, GOOD, friction=Friction([1, 2, 3]))),
-            "robot 2, friction",
+            "robot 2, friction, viscous",
         ),
         (
             lambda: pair(Member(ARM, GOOD), Member(ARM, GOOD, friction=Friction(0, [[1, 2]]))),
-            "robot 2, friction",
+            "robot 2, friction, coulomb",
         ),
         (lambda: pair(Member(ARM, GOOD), Member(ARM, GOOD, parameters="most")), "robot 2, parameters"),
-        (lambda: pair(Member(ARM, GOOD, name=5), Member(ARM, GOOD)), "name: expected a text"),
-        (lambda: pair(Member(ARM, GOOD), Member(ARM, GOOD), name=7), "name: expected a text"),
-        (lambda: pair(Member(ARM, GOOD, name="a"), Member(ARM, GOOD, name="a")), "found 'a' twice"),
-        (lambda: pair(Member(ARM, GOOD, name="robot 2"), Member(ARM, GOOD)), "found 'robot 2' twice"),
+        (lambda: pair(Member(ARM, GOOD, name=5), Member(ARM, GOOD)), "name"),
+        (lambda: pair(Member(ARM, GOOD), Member(ARM, GOOD), name=7), "name"),
+        (lambda: pair(Member(ARM, GOOD, name="a"), Member(ARM, GOOD, name="a")), "name"),
+        (lambda: pair(Member(ARM, GOOD, name="robot 2"), Member(ARM, GOOD)), "name"),
         (
             lambda: Cell([Member(ARM, Hold([9.0, 0.0]))] * 2, Coupling.pair(), CartesianSpace("xy")),
-            "robot 1, trajectory: 'planar2r' cannot reach",
+            "robot 1, trajectory",
         ),
     ],
 )
-def test_cells_that_do_not_fit_together_are_refused(make, says):
-    refused(make, says)
+def test_cells_that_do_not_fit_together_are_refused(make, subject):
+    refuses(make, subject)
 
 
 def test_parameters_of_another_robot_are_refused():
     from synctrl import FullParameters
 
     other = FullParameters(load_robot("a460"))
-    refused(lambda: pair(Member(ARM, GOOD), Member(ARM, GOOD, parameters=other)), "robot 2, parameters")
+    refuses(lambda: pair(Member(ARM, GOOD), Member(ARM, GOOD, parameters=other)), "robot 2, parameters")
 
 
 @pytest.mark.parametrize("bad", [np.nan, "x"])
@@ -235,7 +234,7 @@ def test_own_trajectories_are_looked_at_before_anything_runs(bad):
             return SimpleNamespace(x=zeros, x_dot=zeros, x_ddot=zeros + bad) if bad != "x" else zeros
 
     told: list[float] = []
-    refused(
+    refuses(
         lambda: simulate(
             pair(Member(ARM, GOOD), Member(ARM, Own(), [0.0, 1.0])), SMALL_GAINS, 0.1, progress=told.append
         ),
@@ -245,103 +244,103 @@ def test_own_trajectories_are_looked_at_before_anything_runs(bad):
 
 
 @pytest.mark.parametrize(
-    ("make", "says"),
+    ("make", "subject"),
     [
-        (lambda: Friction(viscous=-1.0), "viscous: .*at least 0"),
-        (lambda: Friction(coulomb=[1.0, -0.1]), "coulomb: .*at least 0"),
-        (lambda: Friction(viscous=np.nan), "viscous: expected finite"),
-        (lambda: Friction(coulomb="some"), "coulomb: expected numbers"),
-        (lambda: Friction(smoothing=0.0), "smoothing: .*above 0"),
-        (lambda: Friction(smoothing=-1.0), "smoothing: .*above 0"),
+        (lambda: Friction(viscous=-1.0), "viscous"),
+        (lambda: Friction(coulomb=[1.0, -0.1]), "coulomb"),
+        (lambda: Friction(viscous=np.nan), "viscous"),
+        (lambda: Friction(coulomb="some"), "coulomb"),
+        (lambda: Friction(smoothing=0.0), "smoothing"),
+        (lambda: Friction(smoothing=-1.0), "smoothing"),
         (lambda: Friction(smoothing=[0.1, 0.2]), "smoothing"),
     ],
 )
-def test_friction_that_drives_is_refused(make, says):
-    refused(make, says, InputError)
+def test_friction_that_drives_is_refused(make, subject):
+    refuses(make, subject, InputError)
 
 
 # -- runs -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("options", "says"),
+    ("options", "subject"),
     [
-        ({"dt": 0.0}, "dt: .*above 0, found 0"),
-        ({"dt": -1e-3}, "dt: .*above 0"),
-        ({"dt": np.nan}, "dt: expected finite"),
-        ({"dt": "fast"}, "dt: expected"),
-        ({"dt": None}, "dt: expected"),
-        ({"dt": [1e-3, 1e-3]}, "dt: expected"),
-        ({"dt": True}, "dt: expected"),
-        ({"dt": 2.0}, "dt: expected at most the duration"),
-        ({"dt": 1e-9}, "more than 100000000 steps"),
-        ({"duration": 0.0}, "duration: .*above 0"),
-        ({"duration": -1.0}, "duration: .*above 0"),
-        ({"duration": np.inf}, "duration: expected finite"),
-        ({"duration": "long"}, "duration: expected"),
-        ({"integrator": "euler"}, "integrator: expected one of 'rk4', .*'DOP853'.*found 'euler'"),
+        ({"dt": 0.0}, "dt"),
+        ({"dt": -1e-3}, "dt"),
+        ({"dt": np.nan}, "dt"),
+        ({"dt": "fast"}, "dt"),
+        ({"dt": None}, "dt"),
+        ({"dt": [1e-3, 1e-3]}, "dt"),
+        ({"dt": True}, "dt"),
+        ({"dt": 2.0}, "dt"),
+        ({"dt": 1e-9}, "dt"),
+        ({"duration": 0.0}, "duration"),
+        ({"duration": -1.0}, "duration"),
+        ({"duration": np.inf}, "duration"),
+        ({"duration": "long"}, "duration"),
+        ({"integrator": "euler"}, "integrator"),
         ({"integrator": "dop853"}, "integrator"),
         ({"integrator": None}, "integrator"),
         ({"integrator": ["rk4"]}, "integrator"),
         ({"integrator": np.array(["rk4", "rk4"])}, "integrator"),
-        ({"integrator": "LSODA", "rtol": 0.0}, "rtol: .*above 0"),
-        ({"integrator": "LSODA", "atol": -1.0}, "atol: .*above 0"),
-        ({"integrator": "LSODA", "rtol": "tight"}, "rtol: expected"),
+        ({"integrator": "LSODA", "rtol": 0.0}, "rtol"),
+        ({"integrator": "LSODA", "atol": -1.0}, "atol"),
+        ({"integrator": "LSODA", "rtol": "tight"}, "rtol"),
         ({"progress": "bar"}, "progress"),
     ],
 )
-def test_a_run_that_cannot_be_is_refused(options, says):
-    refused(lambda: Experiment(small_cell(), SMALL_GAINS, 1.0).simulate(**options), says, InputError)
+def test_a_run_that_cannot_be_is_refused(options, subject):
+    refuses(lambda: Experiment(small_cell(), SMALL_GAINS, 1.0).simulate(**options), subject, InputError)
 
 
 @pytest.mark.parametrize(
-    ("options", "says"),
+    ("options", "subject"),
     [
         ({"duration": 0.0}, "duration"),
         ({"duration": "long"}, "duration"),
         ({"duration": None}, "duration"),
-        ({"cell": None}, "cell: expected a Cell"),
-        ({"cell": [Member(ARM, GOOD)]}, "cell: expected a Cell"),
-        ({"disturbances": [1.0]}, "disturbances: expected Disturbance objects"),
-        ({"disturbances": Disturbance(0, 1.0, 0.0, 1.0)}, "disturbances: expected"),
-        ({"disturbances": None}, "disturbances: expected"),
-        ({"disturbances": [Disturbance(2, 1.0, 0.0, 1.0)]}, "index from 0 to 1, found 2"),
-        ({"disturbances": [Disturbance(-1, 1.0, 0.0, 1.0)]}, "index from 0 to 1, found -1"),
-        ({"disturbances": [Disturbance(0.0, 1.0, 0.0, 1.0)]}, "index from 0 to 1, found 0.0"),
-        ({"disturbances": [Disturbance(True, 1.0, 0.0, 1.0)]}, "index from 0 to 1, found True"),
-        ({"disturbances": [Disturbance("arm 1", 1.0, 0.0, 1.0)]}, "index from 0 to 1, found 'arm 1'"),
+        ({"cell": None}, "cell"),
+        ({"cell": [Member(ARM, GOOD)]}, "cell"),
+        ({"disturbances": [1.0]}, "disturbances"),
+        ({"disturbances": Disturbance(0, 1.0, 0.0, 1.0)}, "disturbances"),
+        ({"disturbances": None}, "disturbances"),
+        ({"disturbances": [Disturbance(2, 1.0, 0.0, 1.0)]}, "disturbance, robot"),
+        ({"disturbances": [Disturbance(-1, 1.0, 0.0, 1.0)]}, "disturbance, robot"),
+        ({"disturbances": [Disturbance(0.0, 1.0, 0.0, 1.0)]}, "disturbance, robot"),
+        ({"disturbances": [Disturbance(True, 1.0, 0.0, 1.0)]}, "disturbance, robot"),
+        ({"disturbances": [Disturbance("arm 1", 1.0, 0.0, 1.0)]}, "disturbance, robot"),
         (
             {"disturbances": [Disturbance(0, (1.0, 1.0, 1.0), 0.0, 1.0)]},
-            r"torque: .*shape \(2,\), found \(3,\)",
+            "disturbance, torque",
         ),
-        ({"disturbances": [Disturbance(0, [[1.0, 1.0]], 0.0, 1.0)]}, "torque"),
-        ({"payloads": Payload(0, 1.0)}, "payloads: expected a sequence"),
-        ({"payloads": 5}, "payloads: expected a sequence"),
-        ({"title": 3}, "title: expected a text"),
-        ({"reference_acceleration": "fast"}, "reference_acceleration: expected one of 'exact', 'paper'"),
-        ({"k_r_space": "world"}, "k_r_space: expected one of 'joint', 'task'"),
+        ({"disturbances": [Disturbance(0, [[1.0, 1.0]], 0.0, 1.0)]}, "disturbance, torque"),
+        ({"payloads": Payload(0, 1.0)}, "payloads"),
+        ({"payloads": 5}, "payloads"),
+        ({"title": 3}, "title"),
+        ({"reference_acceleration": "fast"}, "reference_acceleration"),
+        ({"k_r_space": "world"}, "k_r_space"),
     ],
 )
-def test_an_experiment_that_cannot_be_is_refused_when_it_is_made(options, says):
+def test_an_experiment_that_cannot_be_is_refused_when_it_is_made(options, subject):
     whole = {"cell": small_cell(), "gains": SMALL_GAINS, "duration": 1.0, **options}
-    refused(lambda: Experiment(**whole), says, InputError)
+    refuses(lambda: Experiment(**whole), subject, InputError)
 
 
 @pytest.mark.parametrize(
-    ("window", "says"),
+    ("window", "subject"),
     [
-        ((0, 1.0, 0.5, 0.5), "0 <= start < stop"),
-        ((0, 1.0, 0.6, 0.5), "0 <= start < stop"),
-        ((0, 1.0, -0.1, 0.5), "0 <= start < stop"),
-        ((0, 1.0, np.nan, 0.5), "start"),
-        ((0, 1.0, 0.1, np.inf), "stop"),
-        ((0, 1.0, "now", 0.5), "start"),
-        ((0, np.nan, 0.0, 0.5), "torque"),
-        ((0, "much", 0.0, 0.5), "torque"),
+        ((0, 1.0, 0.5, 0.5), "disturbance"),
+        ((0, 1.0, 0.6, 0.5), "disturbance"),
+        ((0, 1.0, -0.1, 0.5), "disturbance"),
+        ((0, 1.0, np.nan, 0.5), "disturbance, start"),
+        ((0, 1.0, 0.1, np.inf), "disturbance, stop"),
+        ((0, 1.0, "now", 0.5), "disturbance, start"),
+        ((0, np.nan, 0.0, 0.5), "disturbance, torque"),
+        ((0, "much", 0.0, 0.5), "disturbance, torque"),
     ],
 )
-def test_disturbances_without_a_window_are_refused(window, says):
-    refused(lambda: Disturbance(*window), says, InputError)
+def test_disturbances_without_a_window_are_refused(window, subject):
+    refuses(lambda: Disturbance(*window), subject, InputError)
 
 
 # -- couplings --------------------------------------------------------------------------------------------
@@ -357,17 +356,17 @@ def run_with(c, n: int = 2) -> None:
 
 
 @pytest.mark.parametrize(
-    ("c", "says"),
+    ("c", "robot"),
     [
-        ((1.0, 0.0), "index 1 has no inverse"),
-        ([[1.0, 1.0], [1.0, 0.0]], "index 1 has no inverse"),
-        ([np.eye(2), np.ones((2, 2))], "index 1 has no inverse"),
-        ([np.eye(2), [[1.0, 1.0], [1.0, 1.0 + 1e-14]]], "index 1 has no inverse"),
-        ([[[1.0, 2.0], [2.0, 4.0]], np.eye(2)], "index 0 has no inverse"),
+        ((1.0, 0.0), 1),
+        ([[1.0, 1.0], [1.0, 0.0]], 1),
+        ([np.eye(2), np.ones((2, 2))], 1),
+        ([np.eye(2), [[1.0, 1.0], [1.0, 1.0 + 1e-14]]], 1),
+        ([[[1.0, 2.0], [2.0, 4.0]], np.eye(2)], 0),
     ],
 )
-def test_weights_without_an_inverse_are_refused_before_anything_runs(c, says):
-    refused(lambda: run_with(c), says, CouplingError)
+def test_weights_without_an_inverse_are_refused_before_anything_runs(c, robot):
+    refuses(lambda: run_with(c), "c", CouplingError, robot=robot)
 
 
 def moving(*functions):
@@ -383,53 +382,53 @@ BESIDE = (lambda t: 1 - t / 0.0333, lambda t: -1 / 0.0333, lambda t: 0.0)
 
 @pytest.mark.parametrize("weight", [THROUGH_ZERO, BESIDE], ids=["at an instant", "between two"])
 def test_weights_that_lose_their_inverse_on_the_way_are_refused_before_anything_runs(weight):
-    refused(lambda: run_with(moving(ONE, weight)), r"index 1 .*inverse.*t = 0\.0[345]", CouplingError)
+    refuses(lambda: run_with(moving(ONE, weight)), "c", CouplingError, robot=1)
 
 
 @pytest.mark.parametrize(
-    ("c", "says"),
+    ("c", "subject"),
     [
-        (3.0, "c: expected"),
-        ((1.0, 1.0, 1.0), "c: expected|2 robots"),
-        ([[1.0, 1.0, 1.0]] * 2, "c: expected"),
-        ([np.eye(3)] * 2, "c: expected"),
-        ((1.0, np.nan), "c: expected finite"),
-        (("a", "b"), "c: expected numbers"),
+        (3.0, "c"),
+        ((1.0, 1.0, 1.0), "c"),
+        ([[1.0, 1.0, 1.0]] * 2, "c"),
+        ([np.eye(3)] * 2, "c"),
+        ((1.0, np.nan), "c"),
+        (("a", "b"), "c"),
         (lambda t: np.eye(2), "c"),
         (lambda t: None, "c"),
         (lambda t: (1.0, 2.0, 3.0), "c"),
-        (lambda t: ([np.eye(2) * np.nan] * 2, np.zeros((2, 2, 2)), np.zeros((2, 2, 2))), "finite"),
+        (lambda t: ([np.eye(2) * np.nan] * 2, np.zeros((2, 2, 2)), np.zeros((2, 2, 2))), "c"),
     ],
 )
-def test_weights_of_the_wrong_kind_are_refused_before_anything_runs(c, says):
-    refused(lambda: run_with(c), says)
+def test_weights_of_the_wrong_kind_are_refused_before_anything_runs(c, subject):
+    refuses(lambda: run_with(c), subject)
 
 
 @pytest.mark.parametrize("n", [0, 1, -3, 2.0, "4", None, True])
 def test_a_coupling_needs_two_robots_at_least(n):
-    refused(lambda: Coupling.ring(n), "robots")
+    refuses(lambda: Coupling.ring(n), "robots")
 
 
 @pytest.mark.parametrize(
-    ("edges", "signs", "says"),
+    ("edges", "signs", "subject"),
     [
-        ([(0, 0)], [(1, 1)], "different robots"),
-        ([(0, 2)], [(1, 1)], "0 to 1"),
-        ([(0, -1)], [(1, 1)], "0 to 1"),
+        ([(0, 0)], [(1, 1)], "edge 0, of robots [0, 0]"),
+        ([(0, 2)], [(1, 1)], "edge 0, of robots [0, 2]"),
+        ([(0, -1)], [(1, 1)], "edge 0, of robots [0, -1]"),
         ([(0, 0.5)], [(1, 1)], "edges"),
-        ([(0, 1)], [(1, 0)], "0|zero"),
-        ([(0, 1)], [(1, 1, 1)], "edges|signs"),
+        ([(0, 1)], [(1, 0)], "edge 0, of robots [0, 1]"),
+        ([(0, 1)], [(1, 1, 1)], "edges"),
         ([(0, 1)], [(1, np.nan)], "signs"),
         ([], np.zeros((0, 2)), "edges"),
         ("01", [(1, 1)], "edges"),
     ],
 )
-def test_edges_that_are_none_are_refused(edges, signs, says):
-    refused(lambda: Coupling(2, edges, signs, (1.0, 1.0)), says)
+def test_edges_that_are_none_are_refused(edges, signs, subject):
+    refuses(lambda: Coupling(2, edges, signs, (1.0, 1.0)), subject)
 
 
 def test_groups_that_nothing_connects_are_refused():
-    refused(lambda: Coupling(4, [(0, 1), (2, 3)], [(1, 1)] * 2, np.ones(4)), "not connected", CouplingError)
+    refuses(lambda: Coupling(4, [(0, 1), (2, 3)], [(1, 1)] * 2, np.ones(4)), "edges", CouplingError)
 
 
 # -- robots -----------------------------------------------------------------------------------------------
@@ -437,31 +436,38 @@ def test_groups_that_nothing_connects_are_refused():
 
 @pytest.mark.parametrize("name", [None, 3, ["planar2r"], b"planar2r"])
 def test_a_robot_has_a_name_or_a_path(name):
-    refused(lambda: load_robot(name), "robot: expected a name or a path", InputError)
+    refuses(lambda: load_robot(name), "robot", InputError, found=type(name).__name__)
 
 
-@pytest.mark.parametrize("name", ["planar3r", "", "nowhere/robot.urdf", "/", "a\0b"])
-def test_a_robot_that_is_not_there_is_an_error_of_the_toolkit(name):
-    refused(lambda: load_robot(name), ".", RobotError)
+@pytest.mark.parametrize(
+    ("name", "subject", "found"),
+    [
+        ("planar3r", "robot", "planar3r"),
+        ("", "robot", ""),
+        ("nowhere/robot.urdf", None, "no such file"),
+        ("/", None, "a folder"),
+        ("a\0b", "robot", "a\0b"),
+    ],
+)
+def test_a_robot_that_is_not_there_is_an_error_of_the_toolkit(name, subject, found):
+    refuses(lambda: load_robot(name), subject, RobotError, found=found)
 
 
 def test_parameters_of_the_wrong_size_are_refused():
-    refused(
-        lambda: ARM.with_parameters(np.ones(10)), r"pi: expected shape \(20,\), found \(10,\)", InputError
-    )
-    refused(lambda: ARM.with_parameters(np.full(20, np.nan)), "pi: expected finite", InputError)
-    refused(lambda: ARM.placed(rpy="up"), "rpy: expected numbers", InputError)
+    refuses(lambda: ARM.with_parameters(np.ones(10)), "pi", InputError, found=(10,))
+    refuses(lambda: ARM.with_parameters(np.full(20, np.nan)), "pi", InputError)
+    refuses(lambda: ARM.placed(rpy="up"), "rpy", InputError, found="up")
 
 
 def test_a_robot_is_made_of_a_model():
-    refused(lambda: Robot("planar2r", "tip"), "model", InputError)
-    refused(lambda: load_robot("planar2r", tip=3), "frame: expected a name", InputError)
-    refused(lambda: FullParameters("planar2r"), "robot: expected a Robot", InputError)
+    refuses(lambda: Robot("planar2r", "tip"), "model", InputError)
+    refuses(lambda: load_robot("planar2r", tip=3), "frame", InputError, found="int")
+    refuses(lambda: FullParameters("planar2r"), "robot", InputError, found="str")
 
 
 def test_a_controller_is_made_of_a_cell_and_gains():
-    refused(lambda: Controller(ARM, SMALL_GAINS), "cell: expected a Cell", InputError)
-    refused(lambda: Controller(small_cell(), 3.0), "gains: expected Gains", InputError)
+    refuses(lambda: Controller(ARM, SMALL_GAINS), "cell", InputError, found="Robot")
+    refuses(lambda: Controller(small_cell(), 3.0), "gains", InputError)
 
 
 # -- together ---------------------------------------------------------------------------------------------

@@ -24,21 +24,21 @@ from synctrl.robots.urdf import Description
 from synctrl.robots.urdf.packages import Unusable
 from synctrl.show import scene_of
 from synctrl.show.meshes import MeshLibrary, read_mesh
-from synctrl.show.shapes import Shape, corners
+from synctrl.show.shapes import Solid, corners
 
 
-def drawn(file: Path, content: bytes) -> list[tuple[Shape, tuple[float, ...] | None]]:
+def drawn(file: Path, content: bytes) -> list[tuple[Solid, tuple[float, ...] | None]]:
     file.write_bytes(content)
     return read_mesh(file)
 
 
-def box(shapes: list[Shape]) -> np.ndarray:
+def box(shapes: list[Solid]) -> np.ndarray:
     """Lowest and highest corner of shapes, (2, 3), m."""
     points = np.vstack([corners(shape) for shape in shapes])
     return np.array([points.min(axis=0), points.max(axis=0)])
 
 
-def triangles(shapes: list[Shape]) -> int:
+def triangles(shapes: list[Solid]) -> int:
     return sum(len(shape.geometry["data"]["index"]["array"]) for shape in shapes if "data" in shape.geometry)
 
 

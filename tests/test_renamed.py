@@ -44,6 +44,9 @@ RENAMED = [
     ("synctrl.sweep.distributions", "Distribution", "synctrl.sweep.distributions", "Values"),
     ("synctrl.compiled.engine", "Block", "synctrl.compiled.engine", "DesiredStretch"),
     ("synctrl.show.report", "Row", "synctrl.paper.report", "SideBySide"),
+    ("synctrl.show.shapes", "Shape", "synctrl.show.shapes", "Solid"),
+    ("synctrl.robots.mechanism", "Joint", "synctrl.robots.mechanism", "MechanismJoint"),
+    ("synctrl.simulation.recorder", "describe", "synctrl.simulation.recorder", "describe_run"),
 ]
 #: what version 0.1 exported
 EXPORTED = {
@@ -109,7 +112,9 @@ def test_a_document_is_read_from_its_file_as_before():
 
 @pytest.mark.parametrize("old", MOVED)
 def test_other_names_are_as_unknown_as_before(old):
-    with pytest.raises(AttributeError, match=f"module '{old}' has no attribute 'nothing'"):
+    with pytest.raises(
+        AttributeError, match=f"module '{old}' has no attribute 'nothing'"
+    ):  # as Python says it
         import_module(old).nothing  # noqa: B018
 
 
@@ -172,7 +177,7 @@ def test_the_warning_has_the_line_of_whoever_asks():
 def test_an_argument_under_both_of_its_names_is_refused(seen):
     controller, asked = seen
     z = controller.adaptation.start()
-    with pytest.raises(TypeError, match="under two names, 'theta_hat' and 'z'"):
+    with pytest.raises(TypeError, match="under two names, 'theta_hat' and 'z'"):  # a TypeError has no data
         controller.evaluate(z=z, theta_hat=z, **asked)
 
 

@@ -89,7 +89,7 @@ def test_it_says_how_it_came_about(result):
 
 def test_it_cannot_be_changed(result):
     for name in LAYOUT:
-        with pytest.raises(ValueError, match="read-only"):
+        with pytest.raises(ValueError, match="read-only"):  # numpy's words
             getattr(result, name)[0] = 1.0
         with pytest.raises(AttributeError):
             setattr(result, name, np.zeros(3))
@@ -166,7 +166,7 @@ def test_outputs_have_units_are_frozen_and_survive_the_disk(result, with_output,
     loaded = Result.load(with_output.save(tmp_path / "run.npz"))
     assert loaded == with_output and loaded != result
     np.testing.assert_array_equal(loaded.outputs["applied_torque"], with_output.outputs["applied_torque"])
-    with pytest.raises(ValueError, match="read-only"):
+    with pytest.raises(ValueError, match="read-only"):  # numpy's words
         loaded.outputs["applied_torque"][0] = 1.0
     with pytest.raises(TypeError):
         loaded.outputs["more"] = np.zeros(21)

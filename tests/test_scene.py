@@ -710,7 +710,7 @@ def test_the_browser_reports_what_a_page_does_wrong(tmp_path: Path) -> None:
         assert hosts == {"pictures.invalid", "data.invalid", "socket.invalid"}
         for part in ("seen", "dialog: hello", "thrown"):
             assert any(part in error for error in page.errors), (part, page.errors)
-        with pytest.raises(AssertionError, match="viewer"):
+        with pytest.raises(AssertionError, match="viewer"):  # the browser's words
             page.wait_for("viewer.animator.playing", timeout=1)
 
 

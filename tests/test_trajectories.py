@@ -137,7 +137,7 @@ def test_a_motion_cannot_be_changed_from_outside():
     path = Cubic(start, [0.0, 0.0], 1.0)
     start[:] = 7.0
     np.testing.assert_array_equal(path(0.0).x, [1.0, 2.0])
-    with pytest.raises(ValueError, match="read-only"):
+    with pytest.raises(ValueError, match="read-only"):  # numpy's words
         path.start[0] = 7.0
 
 

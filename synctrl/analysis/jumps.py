@@ -16,7 +16,7 @@ from ..simulation.closed_loop import ClosedLoop
 from ..simulation.schedules import DisturbanceSchedule
 
 
-class Piece(NamedTuple):
+class SmoothPart(NamedTuple):
     """A part of the log in which nothing jumps: instants `first` to `last`, and their rows."""
 
     first: int
@@ -65,7 +65,7 @@ def tolerance(t: np.ndarray) -> float:
     return 1e-9 * float(np.diff(t).max(initial=0.0))
 
 
-def pieces(logged: np.ndarray, jumps: list[int], crossed: list[int]) -> tuple[Piece, ...]:
+def pieces(logged: np.ndarray, jumps: list[int], crossed: list[int]) -> tuple[SmoothPart, ...]:
     """The parts of a log between jumps.
 
     Args:
@@ -75,7 +75,7 @@ def pieces(logged: np.ndarray, jumps: list[int], crossed: list[int]) -> tuple[Pi
     starts = sorted([0, *jumps, *(k + 1 for k in crossed)])
     ends = sorted([*jumps, *crossed, len(logged) - 1])
     return tuple(
-        Piece(a, b, slice(int(logged[a]), int(logged[b]) + 1 - (b in jumps)))
+        SmoothPart(a, b, slice(int(logged[a]), int(logged[b]) + 1 - (b in jumps)))
         for a, b in zip(starts, ends, strict=True)
         if b > a
     )

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..simulation.closed_loop import ClosedLoop
-from ..simulation.recorder import describe, own_states
+from ..simulation.recorder import describe_run, own_states
 from ..simulation.result import LAYOUT, Result
 
 #: parts that a result's info may describe
@@ -44,7 +44,7 @@ def check_settings(result: Result, loop: ClosedLoop) -> None:
     Raises:
         InputError: gains, law, adaptation or network are others.
     """
-    ours, its = (_settings(info) for info in (describe(loop), result.info))
+    ours, its = (_settings(info) for info in (describe_run(loop), result.info))
     for name in its:
         if not _alike(ours[name], its[name]):
             raise another(f"it has {name}: {ours[name]!r:.200}, the result {its[name]!r:.200}", name)

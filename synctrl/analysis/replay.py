@@ -19,7 +19,7 @@ from ..simulation.recorder import ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE
 from ..simulation.result import Result
 from ..simulation.schedules import DisturbanceSchedule
 from ..simulation.simulate import Experiment
-from .jumps import Piece, jumps_in, pieces, tolerance
+from .jumps import SmoothPart, jumps_in, pieces, tolerance
 from .origin import another, check_numbers, check_settings, check_sizes
 
 #: instants whose references are evaluated together
@@ -107,7 +107,7 @@ class Replay:
     loop: ClosedLoop
     rows: Moment
     logged: np.ndarray
-    pieces: tuple[Piece, ...]
+    pieces: tuple[SmoothPart, ...]
     events: tuple[int, ...]
     learning: tuple[str, ...]
 

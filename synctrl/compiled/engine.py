@@ -15,7 +15,7 @@ from ..renamed import names_elsewhere
 from ..simulation.advance import up_to_a_failure
 from ..simulation.clock import Clock, Stretch
 from ..simulation.engines import Run, before_the_start, finish
-from ..simulation.guard import Alarm, Progress, checks, limits_of, stopped, tell
+from ..simulation.guard import Alarm, Progress, checks, limits_of, report_time, stopped
 from ..simulation.recorder import Recorder
 from ..simulation.result import Result
 from . import structs
@@ -152,7 +152,7 @@ class Compiled:
                     steps.advance(block, first, last)
                     pace.learn(last - first, perf_counter() - start)
                     recorder.reached = float(block.steps.times[last])
-                    tell(progress, recorder.reached)
+                    report_time(progress, recorder.reached)
             steps.finish()
 
         return finish(run, recorder, log)

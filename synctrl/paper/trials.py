@@ -101,10 +101,10 @@ def measure(name: str, result: Result) -> Trial:
     rms = [float(np.sqrt(np.square(error.rms).mean())) for error in (e, epsilon)]
     peaks = [float(array.max()) for array in (e.peak, epsilon.peak, found.peak_torque)]
     gains = dict(result.info["gains"])
-    return Trial(name, peaks[0], rms[0], peaks[1], rms[1], peaks[2], gravity_torque(result), gains)
+    return Trial(name, peaks[0], rms[0], peaks[1], rms[1], peaks[2], largest_gravity_torque(result), gains)
 
 
-def gravity_torque(result: Result) -> float:
+def largest_gravity_torque(result: Result) -> float:
     """Largest torque that gravity alone asks of a joint along a run, N·m, from up to fifty instants of it."""
     robots, every = result.experiment.cell.robots, max(1, len(result.t) // 50)
     return max(

@@ -136,7 +136,7 @@ def load_description(
     instance("robot", source, (str, Path), "a name or a path")
     options: dict[str, Any] = {"inertials": inertials, "strict": strict, "xacro_args": xacro_args}
     if isinstance(source, str) and source.startswith(PREFIX):
-        source, folders, own_args = described(source.removeprefix(PREFIX))
+        source, folders, own_args = downloaded(source.removeprefix(PREFIX))
         package_dirs = (*named_folders(package_dirs), *folders)
         options["xacro_args"] = xacro_args if own_args is None else {**own_args, **(xacro_args or {})}
     if isinstance(source, Path) or _looks_like_path(source):
@@ -186,7 +186,7 @@ _FILES = ("URDF_PATH", "XACRO_PATH", "MJCF_PATH")
 _FOLDERS = ("PACKAGE_PATH", "REPOSITORY_PATH")
 
 
-def described(name: str) -> tuple[Path, tuple[str | Path, ...], Mapping[str, object] | None]:
+def downloaded(name: str) -> tuple[Path, tuple[str | Path, ...], Mapping[str, object] | None]:
     """Where a robot of robot_descriptions is; it is downloaded if it is not there yet.
 
     Args:

@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from ..errors import RobotError
+from ..renamed import names_elsewhere
 from .model import subspace
 from .robot import Robot
 
@@ -22,7 +23,7 @@ SNAP = 1e-15
 
 
 @dataclass(frozen=True, eq=False)
-class Joint:
+class MechanismJoint:
     """One joint: parent body (-1: the base), fixed placement in it, axis, and whether it turns or slides."""
 
     parent: int
@@ -37,7 +38,7 @@ class Joint:
 class Mechanism:
     """What of a robot's model does not depend on where it stands."""
 
-    joints: tuple[Joint, ...]
+    joints: tuple[MechanismJoint, ...]
     tip_parent: int
     tip_translation: np.ndarray
     tip_rotation: np.ndarray
@@ -82,11 +83,11 @@ def _mechanism(robot: Robot) -> tuple[Mechanism, pin.SE3]:
     return fixed, pin.SE3(_snap(base.rotation), base.translation)
 
 
-def _joint(model: pin.Model, j: int, first: bool) -> Joint:
+def _joint(model: pin.Model, j: int, first: bool) -> MechanismJoint:
     motion = subspace(model, j)
     turns = bool(np.any(motion[3:]))
     placement = pin.SE3.Identity() if first else model.jointPlacements[j]
-    return Joint(
+    return MechanismJoint(
         model.parents[j] - 1,
         _snap(placement.rotation),
         _snap(placement.translation),
@@ -133,3 +134,6 @@ def joint_limits(robot: Robot) -> JointLimits:
             upper[joint.idx_v] = model.upperPositionLimit[joint.idx_q]
     limits = (lower, upper, np.array(model.velocityLimit), np.array(model.effortLimit))
     return JointLimits(*(np.where(np.abs(x) < UNLIMITED, x, np.copysign(np.inf, x)) for x in limits))
+
+
+__getattr__ = names_elsewhere(__name__, ".mechanism", Joint="MechanismJoint")

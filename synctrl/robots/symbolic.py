@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .mechanism import Joint, Mechanism
+from .mechanism import Mechanism, MechanismJoint
 
 
 class Symbols:
@@ -167,7 +167,7 @@ class Symbols:
                 forces[joint.parent] = _add(forces[joint.parent], self._up(i, forces[i]))
         return self.ca.vertcat(*tau)
 
-    def _project(self, joint: Joint, force: Sequence) -> Any:
+    def _project(self, joint: MechanismJoint, force: Sequence) -> Any:
         return self.ca.dot(self.ca.SX(joint.axis), force[1] if joint.turns else force[0])
 
     def _up(self, i: int, force: Sequence) -> tuple[Any, Any]:
@@ -194,7 +194,7 @@ def _moved(ca: Any, moments: Sequence, R: Any, p: Any) -> tuple[Any, Any, Any]:
     return mass, turned + mass * p, ca.tril2symm(ca.tril(whole))
 
 
-def _momentum(ca: Any, moments: Sequence, joint: Joint) -> tuple[Any, Any]:
+def _momentum(ca: Any, moments: Sequence, joint: MechanismJoint) -> tuple[Any, Any]:
     """Linear and angular momentum of a body about its joint, of which the velocity is one."""
     mass, first, second = moments
     axis = ca.SX(joint.axis)

@@ -16,7 +16,7 @@ from ..errors import RobotError
 from ..robots.urdf.mesh_files import MAX_MESH_BYTES, check_mesh
 from ..robots.urdf.meshes import mean_of
 from ..robots.urdf.packages import Packages, Unusable, read_regular
-from .shapes import Color, Shape, box, capsule, cylinder, ellipsoid, mesh
+from .shapes import Color, Solid, box, capsule, cylinder, ellipsoid, mesh
 
 if TYPE_CHECKING:
     import pinocchio as pin
@@ -25,7 +25,7 @@ CREASE = np.radians(35)  # faces that meet at less than this are shaded as one
 FARTHEST = 1e6  # m: no robot reaches there, and a camera that shows it shows nothing else
 
 
-def read_mesh(path: Path) -> list[tuple[Shape, Color | None]]:
+def read_mesh(path: Path) -> list[tuple[Solid, Color | None]]:
     """One shape for each colour of a mesh file; the colour is None where the file gives none.
 
     Coordinates are taken as those of the link, whatever axis the file calls up, as RViz and Pinocchio do.
@@ -43,7 +43,7 @@ def read_mesh(path: Path) -> list[tuple[Shape, Color | None]]:
     return [(merged(parts), color) for color, parts in groups.items()]
 
 
-def merged(parts: list[Any]) -> Shape:
+def merged(parts: list[Any]) -> Solid:
     """One mesh whose faces share vertices, and so are shaded as one, where they meet at less than CREASE."""
     import trimesh
 
@@ -132,9 +132,9 @@ class MeshLibrary:
 
     def __init__(self) -> None:
         self.faults: dict[Path, str] = {}
-        self._files: dict[Path, list[tuple[Shape, Color | None]]] = {}
+        self._files: dict[Path, list[tuple[Solid, Color | None]]] = {}
 
-    def shapes(self, visual: pin.GeometryObject) -> list[Shape]:
+    def shapes(self, visual: pin.GeometryObject) -> list[Solid]:
         """What to draw for one visual of a robot, in the frame of the joint that carries it.
 
         A mesh gives one shape for each colour of its file, and none if it cannot be shown, see `faults`. The
@@ -155,7 +155,7 @@ class MeshLibrary:
             for shape, own in self._read(path)
         ]
 
-    def _read(self, path: Path) -> list[tuple[Shape, Color | None]]:
+    def _read(self, path: Path) -> list[tuple[Solid, Color | None]]:
         if path not in self._files:
             try:
                 self._files[path] = read_mesh(path)
@@ -164,11 +164,11 @@ class MeshLibrary:
         return self._files[path]
 
 
-def _placed(shape: Shape, placement: np.ndarray) -> Shape:
+def _placed(shape: Solid, placement: np.ndarray) -> Solid:
     return replace(shape, matrix=placement @ shape.matrix)
 
 
-def _primitive(visual: pin.GeometryObject, color: Color) -> Shape:
+def _primitive(visual: pin.GeometryObject, color: Color) -> Solid:
     shape = visual.geometry
     match type(shape).__name__:
         case "Box":
@@ -193,7 +193,7 @@ def _primitive(visual: pin.GeometryObject, color: Color) -> Shape:
     )
 
 
-def _triangles(shape: Any, color: Color) -> Shape:
+def _triangles(shape: Any, color: Color) -> Solid:
     """A mesh that was built in memory, already scaled."""
     import trimesh
 

@@ -16,7 +16,7 @@ import numpy as np
 from ..checks import instance
 from ..errors import InputError
 from ..tasks.rotations import from_quaternion
-from .shapes import Color, Shape, corners
+from .shapes import Color, Solid, corners
 
 ROOT = "/meshcat/<object>"  # where MeshCat puts the object of the path /meshcat
 STILL = 1e-6  # m, and so on: motion below this is not seen
@@ -44,7 +44,7 @@ class Node:
     quaternion: np.ndarray = field(default_factory=lambda: np.array([[0.0, 0, 0, 1]]))
     scale: np.ndarray = field(default_factory=lambda: np.ones((1, 3)))
     rgb: np.ndarray | None = None
-    shapes: list[Shape] = field(default_factory=list)
+    shapes: list[Solid] = field(default_factory=list)
     children: list[Node] = field(default_factory=list)
 
 
@@ -75,7 +75,7 @@ def _node_box(node: Node) -> np.ndarray | None:
     inner = [corners(shape) for shape in node.shapes]
     children = bounding_box(node.children)
     if children is not None:
-        inner.append(corners(Shape({}, children, np.eye(4))))
+        inner.append(corners(Solid({}, children, np.eye(4))))
     if not inner:
         return None
     points = np.vstack(inner) * node.scale[:, None]  # (T, k, 3)
@@ -141,7 +141,7 @@ class _Export:
             "children": shapes + [self.node(child) for child in node.children],
         }
 
-    def _mesh(self, shape: Shape, number: int, rgb: np.ndarray | None) -> JSON:
+    def _mesh(self, shape: Solid, number: int, rgb: np.ndarray | None) -> JSON:
         uuid = self._uuid()
         material = _material(shape.color)
         if rgb is not None:

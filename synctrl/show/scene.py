@@ -18,7 +18,7 @@ from . import shapes
 from .html import fit_camera, frame, page, view_commands, viewer_axes
 from .meshes import MeshLibrary
 from .nodes import TINY, Node, bounding_box, continuous, label, pack, paint, scene_commands, towards, unit
-from .shapes import Shape
+from .shapes import Solid
 from .style import ColorLike, hex_color, read_color, within_unit
 
 if TYPE_CHECKING:
@@ -256,7 +256,7 @@ class Scene:
         self,
         kind: str,
         name: str,
-        solid: Shape,
+        solid: Solid,
         position: ArrayLike,
         quaternion: ArrayLike,
         scale: np.ndarray,

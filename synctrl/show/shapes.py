@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from ..renamed import names_elsewhere
+
 Color = tuple[float, float, float, float]
 
 GREY: Color = (0.7, 0.7, 0.7, 1.0)
@@ -17,7 +19,7 @@ TUBE_SIDES = 12
 
 
 @dataclass(frozen=True)
-class Shape:
+class Solid:
     """One drawable body.
 
     Attributes:
@@ -33,44 +35,44 @@ class Shape:
     color: Color = GREY
 
 
-def box(size: np.ndarray, color: Color = GREY) -> Shape:
+def box(size: np.ndarray, color: Color = GREY) -> Solid:
     """A box about the origin; `size` along x, y, z, (3,), m."""
     geometry = {"type": "BoxGeometry", "width": 1, "height": 1, "depth": 1}
-    return Shape(geometry, _around(0.5, 0.5), _stretch(*size), color)
+    return Solid(geometry, _around(0.5, 0.5), _stretch(*size), color)
 
 
-def ellipsoid(radii: np.ndarray, color: Color = GREY) -> Shape:
+def ellipsoid(radii: np.ndarray, color: Color = GREY) -> Solid:
     """An ellipsoid about the origin; half axes `radii`, (3,), m."""
     geometry = {"type": "SphereGeometry", "radius": 1, "widthSegments": 32, "heightSegments": 20}
-    return Shape(geometry, _around(1, 1), _stretch(*radii), color)
+    return Solid(geometry, _around(1, 1), _stretch(*radii), color)
 
 
-def cylinder(radius: float, length: float, color: Color = GREY, top: float = 1.0) -> Shape:
+def cylinder(radius: float, length: float, color: Color = GREY, top: float = 1.0) -> Solid:
     """A cylinder about the origin along z, m; `top` = 0 makes it a cone that points up."""
     geometry = {"type": "CylinderGeometry", "radiusTop": top, "radiusBottom": 1, "height": 1}
     geometry["radialSegments"] = 40
-    return Shape(geometry, _around(1, 0.5), _stretch(radius, radius, length) @ _UPRIGHT, color)
+    return Solid(geometry, _around(1, 0.5), _stretch(radius, radius, length) @ _UPRIGHT, color)
 
 
-def capsule(radius: float, length: float, color: Color = GREY) -> Shape:
+def capsule(radius: float, length: float, color: Color = GREY) -> Solid:
     """A cylinder of `length` along z, m, with a half ball at each end."""
     quarter = np.linspace(0, np.pi / 2, 9)
     angles = np.concatenate([-quarter[::-1], quarter])
     heights = radius * np.sin(angles) + np.repeat([-length / 2, length / 2], len(quarter))
     points = [{"x": float(x), "y": float(y)} for x, y in zip(radius * np.cos(angles), heights, strict=True)]
     geometry = {"type": "LatheGeometry", "points": points, "segments": 32}
-    return Shape(geometry, _around(radius, radius + length / 2), _UPRIGHT, color)
+    return Solid(geometry, _around(radius, radius + length / 2), _UPRIGHT, color)
 
 
-def mesh(vertices: np.ndarray, faces: np.ndarray, color: Color = GREY) -> Shape:
+def mesh(vertices: np.ndarray, faces: np.ndarray, color: Color = GREY) -> Solid:
     """A triangle mesh: `vertices` (k, 3) in m, `faces` (f, 3) counting from 0."""
     index = np.asarray(faces, dtype=np.uint16 if len(vertices) < 2**16 else np.uint32)
     attributes = {"position": _attribute(np.asarray(vertices, dtype=np.float32), 3)}
     geometry = {"type": "BufferGeometry", "data": {"attributes": attributes, "index": _attribute(index, 1)}}
-    return Shape(geometry, np.array([np.min(vertices, axis=0), np.max(vertices, axis=0)]), np.eye(4), color)
+    return Solid(geometry, np.array([np.min(vertices, axis=0), np.max(vertices, axis=0)]), np.eye(4), color)
 
 
-def tube(points: np.ndarray, radius: float, color: Color = GREY) -> Shape:
+def tube(points: np.ndarray, radius: float, color: Color = GREY) -> Solid:
     """A round line through `points`, (k, 3), m; a ball where they all coincide.
 
     WebGL draws lines one pixel wide whatever width is asked for.
@@ -86,7 +88,7 @@ def tube(points: np.ndarray, radius: float, color: Color = GREY) -> Shape:
     return mesh((points[:, None] + radius * rings).reshape(-1, 3), _quads(len(points)), color)
 
 
-def corners(shape: Shape) -> np.ndarray:
+def corners(shape: Solid) -> np.ndarray:
     """Corners of the shape's bounding box in the node that carries it, (8, 3), m."""
     picks = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, 8)
     local = np.stack([shape.bounds[picks[axis], axis] for axis in range(3)], axis=1)
@@ -143,3 +145,6 @@ def _quads(rings: int) -> np.ndarray:
     first = np.stack([here, beside, here + TUBE_SIDES], axis=1)
     second = np.stack([beside, beside + TUBE_SIDES, here + TUBE_SIDES], axis=1)
     return np.vstack([first, second])
+
+
+__getattr__ = names_elsewhere(__name__, ".shapes", Shape="Solid")

@@ -23,7 +23,7 @@ from .clock import Clock
 from .closed_loop import ClosedLoop
 from .controls import Continuous, Sampled
 from .diagnosis import diagnosed
-from .guard import Guard, Progress, date, tell, user_failure
+from .guard import Guard, Progress, date, report_time, user_failure
 from .integrators import RungeKutta, Scipy
 from .recorder import NOTHING, Recorder
 from .result import Result
@@ -109,7 +109,7 @@ def collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> R
             recorder.reached = sample.t
             if sample.logged:
                 recorder.add(sample)
-                tell(progress, sample.t)
+                report_time(progress, sample.t)
 
     return finish(run, recorder, log)
 

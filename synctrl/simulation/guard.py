@@ -186,7 +186,7 @@ def date(error: SynctrlError, t: float) -> None:
         error.time, error.args = t, (f"{error}, in the step from t = {t:g} s",)
 
 
-def tell(progress: Progress | None, t: float) -> None:
+def report_time(progress: Progress | None, t: float) -> None:
     """Report the time reached to whoever wants to know.
 
     Raises:

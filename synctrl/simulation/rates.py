@@ -40,7 +40,7 @@ HELD, HELD_SPRING = 2.0, 1.0
 HUGE = 1e200
 
 
-class Rate(NamedTuple):
+class LoopRate(NamedTuple):
     """A rate of a robot and where it comes from.
 
     Attributes:
@@ -60,7 +60,7 @@ class Rate(NamedTuple):
 
 def loop_rates(
     loop: ClosedLoop, t: float, motion: np.ndarray, sampled: bool = False, driven: bool = False
-) -> list[Rate]:
+) -> list[LoopRate]:
     """Rates of every robot of a closed loop at one instant.
 
     Args:
@@ -129,14 +129,17 @@ def _regressors(
 
 def _dampers(
     loop: ClosedLoop, reference: Reference, i: int, J: np.ndarray, M: np.ndarray
-) -> tuple[np.ndarray, list[Rate]]:
+) -> tuple[np.ndarray, list[LoopRate]]:
     """What resists the velocities of a robot, (nv, nv), and the rates of all that damps it."""
     controller, plant, nv = loop.controller, loop.plant, J.shape[1]
     K_r = np.minimum(controller.K_r[i], HUGE)
     damping = np.diag(K_r[:nv]) if controller.k_r_space == "joint" else J.T @ np.diag(K_r) @ J
     friction = np.diag((plant.viscous + plant.coulomb / plant.smoothing)[i, :nv])  # slope at rest
     beta = min(float(controller.beta.max()), HUGE) * _largest_share(loop)
-    found = [Rate("Lambda", i, None, min(float(controller.Lambda.max()), HUGE)), Rate("beta", i, None, beta)]
+    found = [
+        LoopRate("Lambda", i, None, min(float(controller.Lambda.max()), HUGE)),
+        LoopRate("beta", i, None, beta),
+    ]
     found += [_rate("K_r", i, M, damping), _rate("friction", i, M, friction)]
     if type(controller.law) is not BoundSunMills:
         force = J.T @ _answers(loop, reference, i)[0] @ J
@@ -201,13 +204,13 @@ def _learned(loop: ClosedLoop, i: int, Y: np.ndarray) -> np.ndarray:
 
 def _rate(
     gain: str, i: int, M: np.ndarray, A: np.ndarray, spring: bool = False, sampled: bool = False
-) -> Rate:
+) -> LoopRate:
     """The largest eigenvalue of M^-1 A, or its root for a spring, with the joint that its mode moves most.
 
     It is 0 at a singular configuration, and against an M that drives a robot rather than resists it, as a law
     may: nothing is known of either.
     """
-    unknown = Rate(gain, i, None, 0.0, spring)
+    unknown = LoopRate(gain, i, None, 0.0, spring)
     if np.isnan(A).any():
         return unknown
     try:
@@ -217,4 +220,4 @@ def _rate(
     values, vectors = np.linalg.eigh(L_inv @ np.clip(A, -HUGE, HUGE) @ L_inv.T)
     value = max(float(values[-1]), 0.0)
     joint = int(np.abs(L_inv.T @ vectors[:, -1]).argmax())
-    return Rate(gain, i, joint, np.sqrt(value) if spring and not sampled else value, spring)
+    return LoopRate(gain, i, joint, np.sqrt(value) if spring and not sampled else value, spring)

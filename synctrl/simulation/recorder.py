@@ -17,6 +17,7 @@ import numpy as np
 from ..checks import printable
 from ..coupling.cell import Cell
 from ..errors import InputError
+from ..renamed import names_elsewhere
 from ..robots.mechanism import joint_limits
 from ..robots.written import write_robot
 from .advance import Sample
@@ -104,7 +105,7 @@ class Recorder:
         """
         loop, nothing = self._loop, np.zeros((self.count, 0))
         hidden, lengths = self.logged().get(PLANT_STATE, nothing), {"time": self.count, **sizes(loop)}
-        taken = {*info, *describe(loop), *LAYOUT, *_STATE_AXES, *OF_EVERY_RUN}
+        taken = {*info, *describe_run(loop), *LAYOUT, *_STATE_AXES, *OF_EVERY_RUN}
         found = Account(loop.plant.report(hidden), loop.plant.outputs(hidden))
         for what, entries in found._asdict().items():
             _check_names(f"plant {type(loop.plant).__qualname__}, {what}", entries, taken)
@@ -118,7 +119,7 @@ class Recorder:
         """What was logged until now, with what the plant says of it."""
         arrays = {name: _taken(array, self.count) for name, array in self._arrays.items()}
         states = {name: arrays.pop(name) for name in own_states(self._loop)}
-        described = {"status": printable(status), **describe(self._loop), **info}
+        described = {"status": printable(status), **describe_run(self._loop), **info}
         described["damping"] = self._damping.report(arrays["t"])
         seen = (arrays[name] for name in ("t", "q", "v", "tau"))
         described["limits"] = limit_report(self._loop.cell, *seen)
@@ -192,7 +193,7 @@ def sizes(loop: ClosedLoop) -> dict[str, int]:
     }
 
 
-def describe(loop: ClosedLoop) -> dict[str, Any]:
+def describe_run(loop: ClosedLoop) -> dict[str, Any]:
     """Names, units, gains and options, as plain data."""
     cell, controller = loop.cell, loop.controller
     about = {
@@ -270,3 +271,6 @@ def _check_output(where: str, output: Any, lengths: Mapping[str, int]) -> None:
             f"axes, of which the first is 'time', found {output!r:.80}",
             subject=where,
         )
+
+
+__getattr__ = names_elsewhere(__name__, ".recorder", describe="describe_run")

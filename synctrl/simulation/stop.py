@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import SimulationError
 from ..robots.model import unit_for
 from .closed_loop import ClosedLoop
-from .rates import HELD, HELD_SPRING, RUNGE_KUTTA, SWING, Rate, loop_rates
+from .rates import HELD, HELD_SPRING, RUNGE_KUTTA, SWING, LoopRate, loop_rates
 from .schedules import DisturbanceSchedule
 
 #: a joint that moves farther than this in one step is not followed any more, rad
@@ -31,7 +31,7 @@ class Excess(NamedTuple):
         held: whether it is the control period.
     """
 
-    rate: Rate
+    rate: LoopRate
     longest: float
     used: float
     held: bool
@@ -145,7 +145,7 @@ class Stop:
 
     def _excesses_at(self, k: int, h: float, driven: bool) -> Iterable[Excess]:
         """Of every robot: what damps counts together, every spring for itself."""
-        groups: dict[Hashable, list[Rate]] = {}
+        groups: dict[Hashable, list[LoopRate]] = {}
         for rate in loop_rates(self.loop, *self._moment(k), self.period is not None, driven):
             key = rate.robot, rate.spring and rate.gain, self._held(rate)
             groups.setdefault(key, []).append(rate)
@@ -156,11 +156,11 @@ class Stop:
                 largest = max(together, key=lambda rate: rate.rate)
                 yield Excess(largest, limit / total, used or h, self._held(largest))
 
-    def _held(self, rate: Rate) -> bool:
+    def _held(self, rate: LoopRate) -> bool:
         """Whether a rate acts through torque that is held for a period."""
         return self.period is not None and rate.gain != "friction"
 
-    def _limit(self, rate: Rate) -> float:
+    def _limit(self, rate: LoopRate) -> float:
         """Largest stable product of rate and step, or of rate and period."""
         if self._held(rate):
             return HELD_SPRING if rate.spring else HELD

@@ -15,7 +15,7 @@ from ..analysis.metrics import ERRORS, Band, checked_band
 from ..checks import count, instance, positive_number
 from ..errors import InputError, ResultError
 from ..files import read_regular
-from ..simulation.recorder import describe
+from ..simulation.recorder import describe_run
 from ..simulation.schedules import DisturbanceSchedule
 from .distributions import Values, described
 from .factors import Setup
@@ -41,7 +41,7 @@ def describe_base(setup: Setup) -> dict[str, Any]:
     loop, cell = experiment.closed_loop(), experiment.cell
     schedule = DisturbanceSchedule(cell, experiment.disturbances)
     times = np.linspace(0, setup.duration, INSTANTS)
-    described = {key: value for key, value in describe(loop).items() if key != "versions"}
+    described = {key: value for key, value in describe_run(loop).items() if key != "versions"}
     table = cell.reference_table(times)
     return {
         **described,

@@ -16,7 +16,7 @@ import pinocchio as pin
 from ...errors import MissingDependencyError, RobotError
 from .document import Document, Geometry, Inertial, Joint, Link, Mimic, Pose, Shape, link_name, upper_triangle
 from .mjcf_files import Whole, read_whole
-from .mjcf_model import check_dynamics, joint_limits
+from .mjcf_model import check_dynamics, read_limits
 from .packages import Packages
 from .report import Notes
 from .xml import quoted
@@ -75,7 +75,7 @@ class _Writer:
         self.joint_names = self._names(kinds.mjOBJ_JOINT, model.njnt, "joint")
         self.held: dict[str, float] = {}
         self.taken = {*self.bodies, *self.joint_names}
-        self.limits = joint_limits(mujoco, model, self.joint_names, notes)
+        self.limits = read_limits(mujoco, model, self.joint_names, notes)
 
     def document(self) -> Document:
         self._refuse()

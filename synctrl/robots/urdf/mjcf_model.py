@@ -14,7 +14,7 @@ from .document import Document, Limit
 from .report import Notes
 
 
-def joint_limits(mujoco: Any, model: Any, names: list[str], notes: Notes) -> list[Limit]:
+def read_limits(mujoco: Any, model: Any, names: list[str], notes: Notes) -> list[Limit]:
     """The limits of each joint. MJCF knows no limit of speed."""
     effort = _efforts(mujoco, model, names, notes)
     limits = []
