@@ -14,11 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
+from synctrl.analysis import Comparison
+from synctrl.analysis.consistency import Consistency
 from synctrl.analysis.convergence import Identification, identify
 from synctrl.analysis.metrics import as_data, metrics, settling_bands, write_metrics
 from synctrl.errors import SynctrlError
+from synctrl.paper.bodies import bodies_are_left, bodies_of, bodies_section
 from synctrl.paper.claims import Claim
 from synctrl.paper.claims_of_cells import a460_claims, own_findings, planar_four_claims
+from synctrl.paper.fairness import another_law_does_better, fair_section
 from synctrl.paper.judge import judge_section
 from synctrl.paper.paper_sections import (
     a460_section,
@@ -35,7 +39,7 @@ from synctrl.paper.plant_sections import (
 )
 from synctrl.paper.report import Links, Section, write_page
 from synctrl.paper.reproduction import PLANNED, PlannedRun, judge_runs, judged, run_all
-from synctrl.paper.theory import baseline_section, certificate_section, examine
+from synctrl.paper.theory import certificate_section, examine
 from synctrl.show.animation import payload_pair_scene, planar_scene
 from synctrl.show.style import display
 from synctrl.simulation.result import Result
@@ -49,6 +53,8 @@ ANIMATED = (
     "planar_four_independent_disturbed",
 )
 TRIAL = 1.0  # s
+#: the run whose estimated bodies are drawn
+BODIES = "a460_pair_synchronized"
 SCENES = {"a460_pair": payload_pair_scene, "planar_four": planar_scene}
 
 
@@ -61,8 +67,9 @@ def main() -> int:
     planned = {**PLANNED, **judge_runs()}
     if options.quick:
         planned = {name: run.shortened(TRIAL) for name, run in planned.items()}
+    limit = 0.1 * TRIAL if options.quick else float("inf")
     try:
-        page = reproduce(options.out, options.workers, planned)
+        page = reproduce(options.out, options.workers, planned, limit)
     except SynctrlError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
@@ -80,19 +87,26 @@ def count(text: str) -> int:
     return int(text)
 
 
-def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun]) -> Path:
-    """Run everything and write it into a folder; returns the path of the page."""
+def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun], limit: float) -> Path:
+    """Run everything and write it into a folder; returns the path of the page.
+
+    Controllers are compared over at most `limit` seconds.
+    """
     every = run_all(out / "runs", workers, planned)
     runs = {name: every[name] for name in PLANNED}
     print("\nchecking the proof along every run, comparing controllers, drawing ...", flush=True)
     with ThreadPoolExecutor(1) as background:
-        examined = background.submit(examine, out / "runs", out / "figures", workers)
-        claims, sections = tell(runs, out)
-        learned = identified(runs)
-        certificates, comparisons = examined.result()
-    sections += [
+        examined = background.submit(examine, out / "runs", out / "figures", workers, limit=limit)
+        sections, bodies, learned = drawn(runs, out), bodies_of(runs), identified(runs)
+        certificates, compared = examined.result()
+    claims, own = papers_claims(runs), our_findings(runs, bodies[BODIES], compared["planar_four"][0])
+    sections = [
+        introduction([*claims, *own]),
+        *sections,
+        honesty_section(own),
+        bodies_section(bodies, BODIES, out / "figures" / "bodies"),
         identification_section(learned),
-        baseline_section(comparisons),
+        *(fair_section(*pair, out / "figures" / f"fair_{name}") for name, pair in compared.items()),
         certificate_section(certificates, out / "figures"),
         judge_section(judged(every), out / "figures"),
         step_section(runs),
@@ -100,31 +114,42 @@ def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun]) -> Pat
     write_metrics(
         out / "metrics.json",
         {n: as_data(run, metrics(run, settling_bands(*peers(every, n)))) for n, run in every.items()},
-        [asdict(claim) for claim in claims],
+        [asdict(claim) for claim in (*claims, *own)],
         certificates={name: certificate.as_dict() for name, certificate in certificates.items()},
-        comparisons=[comparison.as_dict() for comparison in comparisons],
+        comparisons={name: [each.as_dict() for each in pair] for name, pair in compared.items()},
+        consistency={name: each.as_dict() for name, each in bodies.items()},
         identification={title: [robot.as_dict() for robot in robots] for title, robots in learned.items()},
     )
-    longest = max(run.t[-1] for run in runs.values())
-    if longest <= TRIAL:
-        sections.insert(0, trial_section(longest))
-    page = write_page(out / "index.html", "Adaptive synchronized control, reproduced", sections)
     print_table(runs)
-    held = sum(claim.holds for claim in claims)
-    print(f"\n{held} of {len(claims)} claims hold; the page says which do not, and why.")
-    return page
+    held = sum(claim.holds for claim in (*claims, *own))
+    print(f"\n{held} of {len(claims) + len(own)} claims hold; the page says which do not, and why.")
+    return write(out / "index.html", sections, max(run.t[-1] for run in runs.values()))
 
 
-def tell(runs: Mapping[str, Result], out: Path) -> tuple[list[Claim], list[Section]]:
-    """The claims, and the sections that need nothing but the runs."""
+def write(path: Path, sections: list[Section], longest: float) -> Path:
+    """The page, which says if no run was longer than a trial."""
+    trial = [trial_section(longest)] if longest <= TRIAL else []
+    return write_page(path, "Adaptive synchronized control, reproduced", [*trial, *sections])
+
+
+def papers_claims(runs: Mapping[str, Result]) -> list[Claim]:
+    """What the paper claims of its experiments."""
+    return [*a460_claims(select(runs, "a460_pair_")), *planar_four_claims(select(runs, "planar_four_"))]
+
+
+def our_findings(runs: Mapping[str, Result], bodies: Consistency, laws: Comparison) -> list[Claim]:
+    """What the paper leaves unsaid."""
+    found = own_findings(select(runs, "planar_four_"))
+    return [*found, bodies_are_left(BODIES, bodies), another_law_does_better(laws, "ChungSlotine")]
+
+
+def drawn(runs: Mapping[str, Result], out: Path) -> list[Section]:
+    """The sections of the experiments."""
     a460, planar = select(runs, "a460_pair_"), select(runs, "planar_four_")
-    claims = [*a460_claims(a460), *planar_four_claims(planar), *own_findings(planar)]
     layout, figures = PLANNED["planar_four_synchronized"].make(), out / "figures"
-    return claims, [
-        introduction(claims),
+    return [
         a460_section(a460, figures, animations(runs, out, "a460_pair")),
         planar_section(planar, layout, figures, animations(runs, out, "planar_four")),
-        honesty_section(planar),
         full_a460_section(a460, figures),
         friction_section(a460, figures),
     ]

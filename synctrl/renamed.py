@@ -18,13 +18,14 @@ T = TypeVar("T")
 _MOVES = {
     "tasks coupling": "cell coupling desired expansion graphs member_checks reachability "
     "synchronization weights",
-    "analysis paper": "baselines claims judge trials",
+    "analysis paper": "claims judge",
     "experiments paper": "reproduction theory",
     "show paper": "paper_sections plant_sections report",
 }
 _URDF = "checks", "document", "meshes", "reader", "writer", "xml"
 #: modules of today, and those that are a part of them now
 _PARTS = {
+    "analysis.comparison": "analysis.baselines analysis.matching analysis.trials",
     "analysis.convergence": "analysis.identification",
     "tasks.measurement": "tasks.tips",
     "coupling.desired": "tasks.weight_checks",
@@ -38,7 +39,6 @@ _PARTS = {
     "paper.report": "show.formulas",
     "paper.reproduction": "experiments.batch",
     "paper.theory": "show.theory_sections",
-    "paper.trials": "analysis.matching",
     "robots.mechanism": "robots.limits",
     "robots.model": "robots.kinematics robots.model_checks",
     "robots.parameters": "robots.friction_parameters",

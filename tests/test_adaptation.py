@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 from machines import rate
 from refusals import refused
 
-from synctrl import load_robot
+from synctrl import Cell, load_robot
 from synctrl.control.adaptation import Gradient, Natural, Seen
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, planar_four
+from synctrl.paper.judge import joint_pair
 from synctrl.robots import pseudo_inertia as pi
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -105,8 +106,6 @@ def test_the_storage_is_zero_at_the_truth_and_positive_elsewhere(name):
 
 def replace_estimates(share: float):
     """The A460 cell with another first estimate."""
-    from synctrl import Cell
-
     members = [replace(m, theta_hat0=share * m.robot.inertial_parameters) for m in CELL.members]
     return Cell(members, CELL.coupling, CELL.space, CELL.name)
 
@@ -155,6 +154,33 @@ def test_no_sample_of_natural_adaptation_leaves_the_cone(seed, h):
     assert np.isfinite(after).all()
     eigenvalues = np.linalg.eigvalsh(pi.pseudo_inertia(bound.estimate(after).reshape(2, 3, 10)))
     assert (eigenvalues[..., 0] >= -1e-13 * eigenvalues[..., -1]).all()
+
+
+@pytest.mark.parametrize("name", ["planar2r", "a460", "ur5", "panda"])
+@given(seed=SEEDS, gamma=st.floats(1e-3, 1e3), h=st.floats(1e-4, 1.0))
+def test_no_step_leaves_the_cone_whatever_the_robot_the_gain_and_the_step(name, seed, gamma, h):
+    cell, rng = joint_pair(name).cell, np.random.default_rng(seed)
+    bound, now = Natural(gamma).bind(cell), seen(rng)
+    z = bound.start()
+    rate = bound.rate(z, replace(now, gradient=rng.standard_normal(cell.theta.shape)))
+    h = min(h, 20 / np.abs(rate).max())
+    for after in (z + h * rate, bound.leap(z, rate, h)):
+        eigenvalues = np.linalg.eigvalsh(pi.pseudo_inertia(bound.estimate(after).reshape(-1, 10)))
+        assert (eigenvalues[:, 0] >= -1e-12 * eigenvalues[:, -1]).all()
+
+
+@given(seed=SEEDS, gamma=st.floats(1e-3, 10))
+def test_the_rate_of_natural_estimates_is_gamma_p_b_p(seed, gamma):
+    rng = np.random.default_rng(seed)
+    bound, now = Natural(gamma).bind(CELL), seen(rng)
+    z = some_state(bound, rng)
+    rates = bound.rate(z, now)
+    scale = 1e-3 / np.abs(rates).max()
+    P, B = (rows.reshape(2, 3, 10) for rows in (bound.estimate(z), now.gradient))
+    P, B = pi.pseudo_inertia(P), pi.dual(B)
+    found = rate(lambda s: pi.pseudo_inertia(bound.estimate(z + s * scale * rates).reshape(2, 3, 10)))
+    expected = scale * gamma * P @ B @ P
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-8 * np.abs(expected).max())
 
 
 @given(SEEDS)

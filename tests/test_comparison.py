@@ -11,14 +11,14 @@ from refusals import refused
 from theory_cells import coupling, experiment
 
 from synctrl import Disturbance, Friction
-from synctrl.analysis import Comparison, compare
+from synctrl.analysis import Comparison, compare, side_by_side
 from synctrl.analysis.comparison import sizes_of, undisturbed
 from synctrl.analysis.free_gain import factor_for, free_gain, scaled, slowest_rate, under
 from synctrl.analysis.trial_rows import Row
-from synctrl.analysis.verdict import verdict
+from synctrl.analysis.verdict import about_gravity, sentences, summary
 from synctrl.control.laws import ChungSlotine, PDGravity, SlotineLi
 from synctrl.errors import InputError
-from synctrl.experiments import a460_pair
+from synctrl.experiments import a460_pair, planar_four
 
 RUN = {"duration": 0.1, "dt": 2e-3}
 PUSH = Disturbance(robot=0, torque=[0.5], start=0.02, stop=0.08)
@@ -123,11 +123,51 @@ def test_the_verdict_follows_the_numbers(found: Comparison) -> None:
     worse = replace(row.quiet, tracking_rms=4 * ours.quiet.tracking_rms, sync_rms=8 * ours.quiet.sync_rms)
     better = replace(row.quiet, tracking_rms=ours.quiet.tracking_rms / 4, sync_rms=ours.quiet.sync_rms / 8)
     for sizes, word in ((worse, "larger"), (better, "smaller")):
-        first, *_, last = verdict([ours, replace(row, quiet=sizes)], ["quiet"])
+        changed = [ours, replace(row, quiet=sizes)]
+        (first,) = sentences(changed, ["quiet"])
         assert f"e 4 times {word}" in first and f"ε 8 times {word}" in first
-        assert last.startswith("Better") == (word == "smaller")
-    *_, last = verdict([ours, rows(found, "not damped")["equal peak torque"]], ["quiet"])
-    assert not last.startswith("Better")  # what could not be run is not better
+        assert summary(changed, ["quiet"]).startswith("Better") == (word == "smaller")
+    missing = [ours, rows(found, "not damped")["equal peak torque"]]
+    assert not summary(missing, ["quiet"]).startswith("Better")  # what could not be run is not better
+
+
+def test_rules_that_are_left_out_have_no_rows_and_unknown_ones_are_refused() -> None:
+    few = compare(small(), [SlotineLi()], ["equal pole"], **RUN)
+    assert [row.rule for row in few.rows] == ["as given", "equal pole"]
+    with refused(InputError, "rules"):
+        compare(small(), [SlotineLi()], ["equal luck"], **RUN)
+
+
+def test_experiments_side_by_side_are_rows_of_what_each_does(found: Comparison) -> None:
+    whole = small(disturbances=[PUSH])
+    loose = replace(whole, gains=whole.gains.replace(K_eps=0.0))
+    rows = side_by_side({"whole": whole, "without K_eps": loose, "again": whole}, **RUN).rows
+    assert [row.law for row in rows] == ["whole", "without K_eps", "again"]
+    assert (rows[0].quiet, rows[0].disturbed) == (found.rows[0].quiet, found.rows[0].disturbed)
+    assert rows[1].disturbed == sizes_of(loose.simulate(**RUN))
+    assert replace(rows[2], law="whole") == rows[0] != rows[1]
+
+
+def test_no_experiments_and_what_is_none_are_refused_side_by_side() -> None:
+    with refused(InputError, "experiments"):
+        side_by_side({}, **RUN)
+    with refused(InputError, "experiments, law"):
+        side_by_side({"law": SlotineLi()}, **RUN)
+
+
+def test_it_is_said_where_gravity_takes_most_of_a_torque_that_is_made_equal(found: Comparison) -> None:
+    (sentence,) = about_gravity(found.rows, 0.8)
+    assert "80%" in sentence
+    assert not about_gravity(found.rows, 0.2)
+    assert not about_gravity(found.rows[:1], 0.8)
+
+
+def test_gravity_takes_most_of_the_peak_torque_of_the_a460_and_nothing_of_the_planar_arms() -> None:
+    loaded, level = (
+        side_by_side({"whole": run}, duration=0.01) for run in (a460_pair(friction=False), planar_four())
+    )
+    assert loaded.gravity > 0.5
+    assert level.gravity == 0
 
 
 def test_a_comparison_is_plain_data_and_a_table(found: Comparison) -> None:

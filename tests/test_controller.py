@@ -24,12 +24,13 @@ from synctrl import (
     Result,
     load_robot,
 )
+from synctrl.analysis import side_by_side
 from synctrl.analysis.convergence import identify
 from synctrl.analysis.gain_condition import gain_condition
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.coupling.weights import Weights
 from synctrl.errors import InputError, SimulationError
-from synctrl.paper.baselines import compare
+from synctrl.paper.fairness import taken_apart
 from synctrl.simulation.closed_loop import ClosedLoop
 from synctrl.simulation.plant import Plant
 from synctrl.sweep.variations import with_gain, with_scaled_gain
@@ -95,7 +96,7 @@ def test_what_makes_use_of_gains_takes_rows() -> None:
     assert lyapunov(result).V.shape == result.t.shape
     assert gain_condition(result).K_r_min in (15.0, 20.0)
     assert len(identify(result)) == 2
-    assert compare(experiment, ("K_r",), duration=0.01).findings()
+    assert len(side_by_side(taken_apart(experiment), duration=0.01).rows) == 9
 
 
 def test_damping_in_task_space_has_as_many_entries_for_every_robot() -> None:

@@ -24,20 +24,22 @@ from synctrl import (
     SynchronizationFunction,
     load_robot,
 )
+from synctrl.analysis import compare, side_by_side
 from synctrl.analysis.certify import certify
 from synctrl.analysis.convergence import convergence, identify
 from synctrl.analysis.gain_condition import gain_condition, gain_condition_in_box
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.analysis.metrics import as_data, metrics, row_names, settling_bands
 from synctrl.analysis.replay import replay
+from synctrl.control.laws import SlotineLi
 from synctrl.errors import NonFiniteError
-from synctrl.paper.baselines import compare
 from synctrl.paper.claims import errors_converge, sync_error_is_much_smaller
+from synctrl.paper.fairness import fair_section, taken_apart
 from synctrl.paper.judge import compare_runs
 from synctrl.paper.paper_sections import metrics_tables
 from synctrl.paper.plant_sections import identification_section
 from synctrl.paper.report import Section, Text, Verdicts, write_page
-from synctrl.paper.theory import baseline_section, certificate_section, draw_certificate
+from synctrl.paper.theory import certificate_section, draw_certificate
 from synctrl.show import scene_of
 from synctrl.show.animation import formation_scene, planar_scene
 from synctrl.show.layout import cell_layout
@@ -165,9 +167,11 @@ def identified(name: str, folder: Path) -> None:
 
 
 def compared(name: str, folder: Path) -> None:
-    comparison = compare(experiment(name), duration=5 * DT, dt=DT)
-    assert comparison.findings()
-    baseline_section([comparison])
+    made, options = experiment(name), {"duration": 5 * DT, "dt": DT}
+    laws = compare(made, [SlotineLi()], ["equal pole"], **options)
+    parts = side_by_side(taken_apart(made), **options)
+    assert len(laws.verdict) >= 2
+    fair_section(laws, parts, folder / "fair")
 
 
 def saved(name: str, folder: Path) -> None:

@@ -166,6 +166,38 @@ def test_estimates_stay_where_they_may_be_through_a_run_and_are_held_there(name)
     assert np.abs(free.theta_hat - result.theta_hat).max() > 1e-3
 
 
+@pytest.mark.parametrize("name", ["box", "ball"])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_step_is_of_second_order_where_estimates_are_held_and_of_fourth_where_they_are_not(name, seed):
+    assert 2.0 < order(TIGHT[name], seed) < 3.7
+    assert order(Gradient(0.3), seed) == pytest.approx(4.0, abs=0.1)
+
+
+def order(adaptation, seed: int) -> float:
+    """With which power of the step the error falls, by a line through five halvings."""
+    steps = 2 ** np.arange(4, 10)
+    exact = learned(adaptation, seed, 4096)
+    errors = [np.abs(learned(adaptation, seed, number) - exact).max() for number in steps]
+    return float(-np.polyfit(np.log(steps), np.log(errors), 1)[0])
+
+
+def learned(adaptation, seed: int, steps: int) -> np.ndarray:
+    """What RK4 makes of a gradient that swings for a second."""
+    bound, rng, h = adaptation.bind(CELL), np.random.default_rng(seed), 1 / steps
+    one, other = 0.3 * rng.standard_normal((2, 2, P))
+    now, z = seen(rng), bound.start()
+
+    def rate(t: float, z: np.ndarray) -> np.ndarray:
+        return bound.rate(z, replace(now, gradient=one * np.sin(5 * t) + other * np.cos(3 * t)))
+
+    for t in h * np.arange(steps):
+        k1 = rate(t, z)
+        k2 = rate(t + h / 2, z + h / 2 * k1)
+        k3 = rate(t + h / 2, z + h / 2 * k2)
+        z = bound.settle(z + h / 6 * (k1 + 2 * k2 + 2 * k3 + rate(t + h, z + h * k3)))
+    return z
+
+
 # -- runs -------------------------------------------------------------------------------------------------
 
 

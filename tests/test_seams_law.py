@@ -118,6 +118,21 @@ def test_without_damping_between_robots_it_is_independent_control():
         np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=0, atol=1e-9)
 
 
+@given(seed=SEEDS)
+@settings(max_examples=10)
+def test_of_two_robots_it_is_k_1_of_ones_own_velocity_error_less_k_2_of_the_others(seed):
+    """The form in which Chung and Slotine print it, with K_1 = K_r + K_2."""
+    gains, rng = GAINS.independent(), np.random.default_rng(seed)
+    made = experiment(coupling("pair", 2, 2), gains).cell
+    controller = Controller(made, gains, law=ChungSlotine(0.4))
+    motion = np.stack((made.q0, made.v0)) + 0.1 * rng.standard_normal((2, made.n, made.nv))
+    memory = np.zeros((made.coupling.pairs, made.m))
+    s = controller.evaluate(made.references(np.array([0.3]))[0], motion, made.theta_hat0, memory)
+    s_q = np.matvec(s.reference.c_inv, s.r)
+    printed = (gains.K_r + 0.4) * s_q - 0.4 * s_q[::-1]
+    np.testing.assert_allclose(gains.K_r * s_q + s.force, printed, atol=1e-12)
+
+
 def test_damping_between_robots_keeps_them_together():
     alone = planar_four(synchronized=False)
     found = [replace(alone, law=ChungSlotine(K_2)).simulate(1.0) for K_2 in (0.0, 0.3, 1.0)]

@@ -8,7 +8,8 @@ compared with in one respect, of the quiet run:
     equal peak torque   the largest torque of any joint is the same
     equal tracking      the RMS of e, over all robots and axes, is the same
 
-With the same gains each runs once more with whatever disturbs the experiment.
+With the same gains each runs once more with whatever disturbs the experiment. `side_by_side` puts experiments
+as they are into such rows: what a part of a law contributes, or what other gains do.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
-from ..checks import instance
+from ..checks import choice, instance
 from ..control.laws import Law, SunMills
 from ..coupling.cell import Cell
 from ..errors import InputError, SimulationError, StepWarning
@@ -30,8 +31,8 @@ from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .free_gain import LARGEST_FACTOR, factor_for, free_gain, scaled, under, with_pole
 from .metrics import metrics
-from .trial_rows import Row, Sizes
-from .verdict import table, verdict
+from .trial_rows import AS_GIVEN, Row, Sizes
+from .verdict import about_gravity, sentences, summary, table
 
 #: what is made equal, and by which size of the quiet run
 RULES = {"equal pole": None, "equal peak torque": "peak_torque", "equal tracking": "tracking_rms"}
@@ -45,8 +46,10 @@ class Comparison:
         title: of the experiment.
         duration: of every run, s.
         units: of e, of epsilon and of torque.
-        rows: the law of the experiment as it was given, then up to three rows for each of the others.
+        rows: the first as it was given, then those that are compared with it.
         disturbed: whether there were runs with disturbances.
+        gravity: the largest torque that gravity alone asks for in the first row's quiet run, as a share of
+            its peak torque.
     """
 
     title: str
@@ -54,6 +57,7 @@ class Comparison:
     units: tuple[str, str, str]
     rows: tuple[Row, ...]
     disturbed: bool
+    gravity: float
 
     @property
     def situations(self) -> tuple[str, ...]:
@@ -61,23 +65,40 @@ class Comparison:
         return ("quiet", "disturbed") if self.disturbed else ("quiet",)
 
     @property
+    def summary(self) -> tuple[str, ...]:
+        """Which rows are better in both errors, and where a rule says little."""
+        return (summary(self.rows, self.situations), *about_gravity(self.rows, self.gravity))
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What the numbers of each row say beside the first, a sentence each."""
+        return tuple(sentences(self.rows, self.situations))
+
+    @property
     def verdict(self) -> tuple[str, ...]:
-        """What the numbers say, a sentence each."""
-        return tuple(verdict(self.rows, self.situations))
+        """What the numbers say: the summary, then each row."""
+        return (*self.summary, *self.sentences)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
         units = dict(zip(("tracking", "sync", "torque"), self.units, strict=True))
         rows = [asdict(row) for row in self.rows]
         found = {"title": self.title, "duration": self.duration, "units": units, "rows": rows}
-        return {**found, "verdict": list(self.verdict)}
+        return {**found, "gravity": self.gravity, "verdict": list(self.verdict)}
 
     def __str__(self) -> str:
         head = f"{self.title}, {self.duration:g} s"
-        return "\n".join([head, *table(self.rows, self.situations, self.units), "", *self.verdict])
+        return "\n".join(
+            [head, *self.summary, "", *table(self.rows, self.situations, self.units), "", *self.sentences]
+        )
 
 
-def compare(experiment: Experiment, laws: Sequence[Law] | Mapping[str, Law], **options: Any) -> Comparison:
+def compare(
+    experiment: Experiment,
+    laws: Sequence[Law] | Mapping[str, Law],
+    rules: Sequence[str] = tuple(RULES),
+    **options: Any,
+) -> Comparison:
     """Other laws beside that of an experiment, at equal gain, equal torque, and equal tracking.
 
     The quiet runs, in which the free gains are solved for, have no disturbances, payloads, or friction that
@@ -86,23 +107,43 @@ def compare(experiment: Experiment, laws: Sequence[Law] | Mapping[str, Law], **o
     Args:
         experiment: the cell with its law and gains.
         laws: the others, by names of one's own if a mapping is given.
+        rules: what is made equal, some of `RULES`, a row each.
         options: for `Experiment.simulate`; the compiled engine is faster, and where it refuses a law the
             reference engine takes its place.
 
     Raises:
-        InputError: no laws, two of one name, or a law that does not fit the cell.
+        InputError: no laws, two of one name, a law that does not fit the cell, or rules that are none.
         SimulationError: the quiet run of the experiment's own law had to stop.
     """
     instance("experiment", experiment, Experiment, "an Experiment")
+    asked = [choice("rules", rule, tuple(RULES)) for rule in rules]
     bench = _Bench(experiment, options)
     named = {name: under(bench.calm, law) for name, law in _named(laws).items()}
-    own = _name(experiment.law or SunMills())
     run = bench.simulate(bench.calm)
-    ours = bench.row(own, "as given", bench.calm)
-    rows = [ours, *(row for name, other in named.items() for row in bench.rows(name, other, sizes_of(run)))]
-    units = (run.unit("tracking_error"), run.unit("sync_error"), run.unit("tau"))
-    title, stirred = experiment.title or experiment.cell.name, bench.calm is not experiment
-    return Comparison(title, float(run.info["duration"]), units, tuple(rows), stirred)
+    ours = bench.row(_name(experiment.law or SunMills()), AS_GIVEN, bench.calm)
+    others = (row for name, law in named.items() for row in bench.rows(name, law, sizes_of(run), asked))
+    return _told(bench, run, [ours, *others])
+
+
+def side_by_side(experiments: Mapping[str, Experiment], **options: Any) -> Comparison:
+    """Experiments on one cell, each as it is given, beside the first.
+
+    Args:
+        experiments: by name; the first is what the others are compared with.
+        options: for `Experiment.simulate`, as those of `compare`.
+
+    Raises:
+        InputError: no experiments, or something that is none.
+        SimulationError: the quiet run of the first had to stop.
+    """
+    for name, experiment in experiments.items():
+        instance(f"experiments, {name}", experiment, Experiment, "an Experiment")
+    if not experiments:
+        raise InputError("expected at least one experiment, found none", subject="experiments")
+    benches = {name: _Bench(experiment, options) for name, experiment in experiments.items()}
+    first = next(iter(benches.values()))
+    run = first.simulate(first.calm)
+    return _told(first, run, [bench.row(name, AS_GIVEN, bench.calm) for name, bench in benches.items()])
 
 
 def undisturbed(experiment: Experiment) -> Experiment:
@@ -120,6 +161,16 @@ def undisturbed(experiment: Experiment) -> Experiment:
         ]
         cell = Cell(smooth, cell.coupling, cell.space, cell.name)
     return replace(experiment, cell=cell, disturbances=(), payloads=())
+
+
+def gravity_torque(cell: Cell, result: Result) -> float:
+    """Largest torque that gravity alone asks of a joint along a run, N·m, from up to fifty instants of it."""
+    every = max(1, len(result.t) // 50)
+    return max(
+        float(np.abs(robot.gravity(q)).max())
+        for i, robot in enumerate(cell.robots)
+        for q in result.q[::every, i, : robot.nv]
+    )
 
 
 def sizes_of(result: Result) -> Sizes:
@@ -156,10 +207,11 @@ class _Bench:
         except SimulationError as error:
             return error
 
-    def rows(self, name: str, base: Experiment, ours: Sizes) -> Iterator[Row]:
-        """Up to three rows of a law; `base` is the quiet experiment under it."""
+    def rows(self, name: str, base: Experiment, ours: Sizes, rules: Sequence[str]) -> Iterator[Row]:
+        """A row of a law for each rule; `base` is the quiet experiment under it."""
         pole = with_pole(base, float(np.min(self.experiment.gains.Lambda)))
-        for rule, size in RULES.items():
+        for rule in rules:
+            size = RULES[rule]
             found = pole if size is None else self.solved(pole or base, size, getattr(ours, size))
             yield self.missing(name, rule, pole or base) if found is None else self.row(name, rule, found)
 
@@ -191,6 +243,16 @@ class _Bench:
         gain, value = free_gain(base)
         remark = f"no {gain} from 1/{LARGEST_FACTOR:g} to {LARGEST_FACTOR:g} times {value.tolist()} gives it"
         return Row(name, rule, gain, None, None, None, remark)
+
+
+def _told(bench: _Bench, run: Result, rows: Sequence[Row]) -> Comparison:
+    """Rows with what their first quiet run says of all."""
+    made = bench.experiment
+    units = (run.unit("tracking_error"), run.unit("sync_error"), run.unit("tau"))
+    peak = sizes_of(run).peak_torque
+    gravity = gravity_torque(made.cell, run) / peak if peak else 0.0
+    title, stirred = made.title or made.cell.name, bench.calm is not made
+    return Comparison(title, float(run.info["duration"]), units, tuple(rows), stirred, gravity)
 
 
 def _named(laws: Sequence[Law] | Mapping[str, Law]) -> dict[str, Law]:

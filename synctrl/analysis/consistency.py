@@ -50,6 +50,11 @@ class Consistency:
                 found[name] = (float(self.t[int(outside.argmax())]), body, float(values[:, body].min()))
         return found
 
+    @property
+    def until(self) -> float | None:
+        """The first instant at which an estimate was that of no body, s; None if there is none."""
+        return min((t for t, _, _ in self.left.values()), default=None)
+
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers: whether it holds, by robot its smallest value, and when it was lost."""
         worst = {name: float(v.min()) for name, v in zip(self.names, self.smallest, strict=True)}

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+#: the rule of a row that makes nothing equal
+AS_GIVEN = "as given"
+
 
 @dataclass(frozen=True)
 class Sizes:

@@ -2,34 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from .trial_rows import Row
+from .trial_rows import AS_GIVEN, Row
 
 #: relative difference up to which two sizes count as the same
 SAME = 0.02
 COLUMNS = ("tracking_peak", "tracking_rms", "sync_peak", "sync_rms", "peak_torque")
 ERRORS = {"tracking_rms": "e", "sync_rms": "ε"}
+#: share of the peak torque that gravity takes, beyond which equal peak torque says little
+HEAVY = 0.5
 
 
-def verdict(rows: Sequence[Row], situations: Sequence[str]) -> Iterator[str]:
-    """A sentence for each row beside the first, and which of them are better in both errors."""
+def sentences(rows: Sequence[Row], situations: Sequence[str]) -> list[str]:
+    """Each row beside the first, a sentence each."""
     ours, *others = rows
-    better: list[str] = []
-    for row in others:
-        yield _sentence(ours, row, situations)
-        better += [
-            f"{row.law} at {row.rule}, {situation}"
-            for situation in situations
-            if max(_ratios(ours, row, situation), default=1.0) < 1 - SAME
-        ]
+    return [_sentence(ours, row, situations) for row in others]
+
+
+def summary(rows: Sequence[Row], situations: Sequence[str]) -> str:
+    """Which rows are better than the first in both errors."""
+    ours, *others = rows
+    better = [
+        f"{_at_rule(row)}, {situation}"
+        for row in others
+        for situation in situations
+        if max(_ratios(ours, row, situation), default=1.0) < 1 - SAME
+    ]
     if better:
-        yield f"Better than {ours.law} in both errors: {'; '.join(better)}."
-    else:
-        yield f"In no row is both the RMS of e and that of ε smaller than with {ours.law}."
+        return f"Better than {ours.law} in both errors: {'; '.join(better)}."
+    return f"In no row is both the RMS of e and that of ε smaller than with {ours.law}."
+
+
+def about_gravity(rows: Sequence[Row], share: float) -> list[str]:
+    """A sentence where gravity takes most of the first row's peak torque and rows have as much as that."""
+    if share <= HEAVY or not any(row.rule == "equal peak torque" for row in rows):
+        return []
+    return [
+        f"Gravity alone asks for {share:.0%} of the quiet peak torque of {rows[0].law}, so equal peak torque "
+        "hardly tells gentle from stiff control here."
+    ]
 
 
 def table(rows: Sequence[Row], situations: Sequence[str], units: tuple[str, str, str]) -> list[str]:
@@ -60,9 +75,14 @@ def gain_text(row: Row) -> str:
 
 def _sentence(ours: Row, row: Row, situations: Sequence[str]) -> str:
     if row.value is None:
-        return f"{row.law} at {row.rule}: {row.remark}."
+        return f"{_at_rule(row)}: {row.remark}."
     parts = [_compared(ours, row, situation) for situation in situations]
-    return f"{row.law} at {row.rule} ({gain_text(row)}), beside {ours.law}: {'; '.join(parts)}."
+    return f"{_at_rule(row)} ({gain_text(row)}), beside {ours.law}: {'; '.join(parts)}."
+
+
+def _at_rule(row: Row) -> str:
+    """A row by its law and by what is equal."""
+    return row.law if row.rule == AS_GIVEN else f"{row.law} at {row.rule}"
 
 
 def _compared(ours: Row, row: Row, situation: str) -> str:

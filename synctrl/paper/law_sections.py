@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..analysis.comparison import Comparison
@@ -11,7 +11,7 @@ from ..analysis.verdict import COLUMNS, gain_text
 from ..show.law_figures import comparison_figure
 from ..show.style import display
 from .adaptation_trials import AdaptationTrial
-from .report import Block, Section, Table, Text, as_picture, number
+from .report import Block, Points, Section, Table, Text, as_picture, number
 
 
 def comparison_section(comparison: Comparison, stem: Path, note: str = "") -> Section:
@@ -20,19 +20,25 @@ def comparison_section(comparison: Comparison, stem: Path, note: str = "") -> Se
         "Synchronization error against tracking error. The mark is the rule, the number the law, the colour "
         "the peak torque."
     )
-    blocks: list[Block] = [Text(note)] if note else []
-    blocks.append(_rows(comparison))
-    blocks.append(as_picture(comparison_figure(comparison), stem, caption))
-    blocks += map(Text, comparison.verdict)
+    blocks: list[Block] = [Text(each) for each in (*comparison.summary, note) if each]
+    blocks += [rows_table(comparison), as_picture(comparison_figure(comparison), stem, caption)]
+    blocks.append(Points(comparison.sentences))
     return Section(f"Laws: {comparison.title}, {comparison.duration:g} s", tuple(blocks))
+
+
+def cost_table(costs: Mapping[str, float | None]) -> Table:
+    """What a step of each law costs, s; None where the engine does not have the law."""
+    shown = (("–" if cost is None else number(1e6 * cost)) for cost in costs.values())
+    caption = "Processor time of a step with the plant and all evaluations of the method, on this machine."
+    return Table(("", *costs), (("µs per step", *shown),), caption)
 
 
 def adaptation_section(title: str, trials: Sequence[AdaptationTrial], units: tuple[str, str, str]) -> Section:
     """Adaptations side by side; units of e, of epsilon and of torque."""
     (e_unit, e), (s_unit, s) = (display(unit) for unit in units[:2])
     head = (
-        "adaptation", f"peak e, {e_unit}", "late e", f"peak ε, {s_unit}", f"peak torque, {units[2]}",
-        "torque error", "µs per step", "estimates are those of bodies that can exist",
+        "adaptation", f"peak e, {e_unit}", "late e", f"peak ε, {s_unit}", f"torque, {units[2]}",
+        "torque error", "µs per step", "bodies",
     )  # fmt: skip
     rows = tuple(
         (
@@ -41,22 +47,43 @@ def adaptation_section(title: str, trials: Sequence[AdaptationTrial], units: tup
             number(s * trial.sync_peak),
             number(trial.peak_torque),
             number(trial.torque_error),
-            number(1e6 * trial.cost, 2),
-            trial.consistency,
+            number(1e6 * trial.cost),
+            trial.bodies,
         )
         for trial in trials
     )
-    return Section(f"Adaptations: {title}", (Text(_ADAPTATIONS), Table(head, rows)))
+    blocks = (Text(adaptation_verdict(trials)), Table(head, rows), Text(_ADAPTATIONS))
+    return Section(f"Adaptations: {title}", blocks)
+
+
+def adaptation_verdict(trials: Sequence[AdaptationTrial]) -> str:
+    """What the numbers say: where errors and estimates end best, and which estimates are those of bodies."""
+    late = min(trials, key=lambda trial: trial.tracking_late)
+    torque = min(trials, key=lambda trial: trial.torque_error)
+    best = (
+        f"Late tracking errors are smallest with {late.name}, torque errors of the estimates with "
+        f"{torque.name}."
+    )
+    bodies = [trial for trial in trials if trial.bodies != "none"]
+    left = [f"{trial.name}, {trial.bodies}" for trial in bodies if trial.bodies != "yes"]
+    if not bodies:
+        return best
+    if not left:
+        return f"{best} All estimates are those of bodies that can exist, throughout."
+    return f"{best} Estimates do not stay those of bodies that can exist with {'; '.join(left)}."
 
 
 _ADAPTATIONS = (
-    "Late is the last quarter of the run. The torque error is that of the estimates at the end, relative, "
-    "over 60 random states. A step is timed in the compiled engine, by the processor's clock, with the plant "
-    "and all evaluations of the method; other work of the machine shows in it."
+    "Late is the last quarter of the run. Torque is the largest of any joint. The torque error is that of "
+    "the estimates at the end, relative, over 60 random states. A step is timed by the processor's clock, "
+    "with the plant and all evaluations of the method; other work of the machine shows in it, and it depends "
+    "on the machine. Bodies: whether the estimates are those of bodies that can exist; none where what is "
+    "adapted are not the parameters of bodies."
 )
 
 
-def _rows(comparison: Comparison) -> Table:
+def rows_table(comparison: Comparison) -> Table:
+    """Every row of a comparison, with what its runs measured."""
     (e_unit, e), (s_unit, s) = (display(unit) for unit in comparison.units[:2])
     names = (f"peak e, {e_unit}", "RMS e", f"peak ε, {s_unit}", "RMS ε", f"torque, {comparison.units[2]}")
     factors = dict(zip(COLUMNS, (e, e, s, s, 1.0), strict=True))

@@ -52,6 +52,17 @@ class Text:
 
 
 @dataclass(frozen=True)
+class Points:
+    """Sentences as a list."""
+
+    sentences: tuple[str, ...]
+
+    def html(self) -> str:
+        """A list of small print."""
+        return f'<ul class="points">{"".join(f"<li>{words(each)}</li>" for each in self.sentences)}</ul>'
+
+
+@dataclass(frozen=True)
 class Formulas:
     """Formulas one below the other; each in TeX as matplotlib reads it, what it is, and its number."""
 

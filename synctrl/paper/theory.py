@@ -1,32 +1,23 @@
-"""What the theory says about the runs of the paper: certificates and fair comparisons, and their sections."""
+"""What the theory says about the runs of the paper: certificates, and their section."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
 from ..analysis.certify import Certificate, certify
-from ..experiments.a460_pair import a460_pair
-from ..experiments.planar_four import planar_four
+from ..analysis.comparison import Comparison
 from ..show.lyapunov_plots import growth_mark, lyapunov_figure
 from ..show.plots import save
-from ..show.style import display
 from ..simulation.result import Result
-from ..simulation.simulate import Experiment
-from .baselines import Comparison, compare
-from .report import Block, Picture, Section, SideBySide, Table, Text, number
+from .fairness import FAIR, compare_laws, compare_parts
+from .report import Picture, Section, SideBySide, Table, Text, number
 from .reproduction import PLANNED
-from .trials import Trial
 
 #: all runs but a longer one, and those with six joints, for which the step of the page is too long
 CERTIFIED = tuple(name for name in PLANNED if not name.endswith(("friction_unknown", "full", "full_alone")))
-#: cell and the time over which its controllers are compared, s: the peaks of all torques lie within
-COMPARED: Mapping[str, tuple[Callable[[], Experiment], float]] = {
-    "A460 pair": (a460_pair, 0.8),
-    "four planar arms": (planar_four, 0.25),
-}
 PROOF = """\
 V  = Σ_i ½ s_iᵀ M s_i + ½ d_iᵀ Γ⁻¹ d_i + ½ E_iᵀ K_ε Λ β E_i + Σ_k ½ ε_kᵀ K_ε ε_k
 V' = - Σ_i s_iᵀ K_r s_i - Σ_k ε_kᵀ K_ε Λ ε_k - Σ_i σ_iᵀ K_ε β σ_i
@@ -35,15 +26,20 @@ with d = θ - θ̂, E = Sᵀ ∫ε, σ = Sᵀ ε"""
 
 
 def examine(
-    folder: Path, figures: Path, workers: int = 2, names: Iterable[str] = CERTIFIED
-) -> tuple[dict[str, Certificate], list[Comparison]]:
-    """Certify saved runs and draw their certificates, and compare the controllers of both cells.
+    folder: Path,
+    figures: Path,
+    workers: int = 2,
+    names: Iterable[str] = CERTIFIED,
+    limit: float = float("inf"),
+) -> tuple[dict[str, Certificate], dict[str, tuple[Comparison, Comparison]]]:
+    """Certify saved runs and draw their certificates, and compare laws, and parts of a law, on both cells.
 
     Args:
         folder: where `run_all` has saved the runs.
         figures: where the figures of the certificates go.
         workers: number of processes.
         names: runs to certify.
+        limit: longest run that is compared, s.
 
     Raises:
         ResultError: a run is missing or damaged, or a figure cannot be written.
@@ -52,20 +48,17 @@ def examine(
     for name in names:
         Result.load(folder / f"{name}.npz")
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-        compared = [pool.submit(_compare, name) for name in COMPARED]
+        laws = {name: pool.submit(compare_laws, name, limit) for name in FAIR}
+        parts = {name: pool.submit(compare_parts, name, limit) for name in FAIR}
         certified = {name: pool.submit(_certify, name, folder, figures) for name in names}
-        return {name: f.result() for name, f in certified.items()}, [f.result() for f in compared]
+        compared = {name: (laws[name].result(), parts[name].result()) for name in FAIR}
+        return {name: future.result() for name, future in certified.items()}, compared
 
 
 def _certify(name: str, folder: Path, figures: Path) -> Certificate:
     certificate = certify(Result.load(folder / f"{name}.npz"), PLANNED[name].make())
     draw_certificate(name, certificate, figures)
     return certificate
-
-
-def _compare(name: str) -> Comparison:
-    make, duration = COMPARED[name]
-    return compare(make(), duration=duration)
 
 
 def certificate_section(certificates: Mapping[str, Certificate], folder: Path) -> Section:
@@ -94,17 +87,6 @@ def draw_certificate(name: str, certificate: Certificate, folder: Path) -> Path:
     return svg
 
 
-def baseline_section(comparisons: Sequence[Comparison]) -> Section:
-    """Synchronized control beside independent controllers with as much gain, and part by part."""
-    blocks: list[Block] = [Text(_FAIRNESS)]
-    for c in comparisons:
-        what = f"{c.title}, the first {c.duration:g} s"
-        parts = f"{what}: β, K_ε and the adaptation, each alone and together."
-        blocks += [_trials(c, c.trials, f"{what}."), _trials(c, c.ablation, parts)]
-        blocks += map(Text, c.findings())
-    return Section("Fair comparisons", tuple(blocks))
-
-
 _INTRODUCTION = (
     "The function of the convergence proof, computed along every run, and its derivative by the chain rule "
     "with the accelerations of the plant. A run is certified if every assumption of the theorem holds along "
@@ -114,12 +96,6 @@ _INTRODUCTION = (
     "left out: with the step of these runs friction of a joint at rest is at the limit of what the method "
     "follows, and their balance does not close. With half the step it does; their certificate then names the "
     "friction, and the forces of wrists that the model takes for locked."
-)
-_FAIRNESS = (
-    "The paper compares with β = K_ε = 0 and all else unchanged, which takes gain away. Beside that stand an "
-    "independent controller with Λ + β for Λ, and one whose gains are multiplied by a common factor until "
-    "its peak torque is that of the synchronized one. The sentences under the tables are made from their "
-    "numbers."
 )
 
 
@@ -146,18 +122,3 @@ def _verdicts(certificates: Mapping[str, Certificate]) -> Table:
 def _bodies(c: Certificate) -> str:
     """Whether the estimated bodies can exist, in words."""
     return "not estimated" if c.consistency is None else str(c.consistency)
-
-
-def _trials(c: Comparison, trials: Sequence[Trial], caption: str) -> Table:
-    (e_unit, e), (s_unit, s) = (display(unit) for unit in c.units)
-    head = ("controller", f"peak e, {e_unit}", f"RMS e, {e_unit}", f"peak ε, {s_unit}", f"RMS ε, {s_unit}")
-    rows = tuple(
-        (
-            t.name,
-            *(number(e * v) for v in (t.tracking_peak, t.tracking_rms)),
-            *(number(s * v) for v in (t.sync_peak, t.sync_rms)),
-            number(t.peak_torque, 4),
-        )
-        for t in trials
-    )
-    return Table((*head, "peak torque, N·m"), rows, caption)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..analysis.comparison import RULES, Comparison
+from ..analysis.trial_rows import AS_GIVEN
 from .plots import new_figure, style
 from .style import display
 
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: how a row is drawn, by its rule
-MARKERS = dict(zip(("as given", *RULES), ("*", "o", "s", "^"), strict=True))
+MARKERS = dict(zip((AS_GIVEN, *RULES), ("*", "o", "s", "^"), strict=True))
 #: laws are numbered in the panels, for their names would cover each other
 _SIZE = {"*": 150, "o": 60, "s": 52, "^": 62}
 
@@ -46,6 +47,8 @@ def comparison_figure(comparison: Comparison) -> Figure:
 
 
 def _panel(panel: Axes, comparison: Comparison, situation: str, numbers: dict[str, int], norm: Any) -> Any:
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     (e_unit, e), (s_unit, s) = (display(unit) for unit in comparison.units[:2])
     for row in comparison.rows:
         sizes = getattr(row, situation)
@@ -61,7 +64,9 @@ def _panel(panel: Axes, comparison: Comparison, situation: str, numbers: dict[st
     if panel.get_subplotspec().is_first_col():  # type: ignore[union-attr]
         panel.set_ylabel(f"RMS ε, {s_unit}")
     for axis in (panel.xaxis, panel.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
         axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
     return dots
 
 

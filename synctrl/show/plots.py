@@ -180,9 +180,9 @@ class _Part(NamedTuple):
 
 def _errors(result: Result, kind: str, what: str, limits: tuple[float, float] | None, width: float) -> Figure:
     parts = _parts(result, kind, limits)
-    handles = [*legends.row_handles(result, kind), *legends.axis_handles(result)]
-    handles += legends.disturbance_handles(result)
     with style():
+        handles = [*legends.row_handles(result, kind), *legends.axis_handles(result)]
+        handles += legends.disturbance_handles(result)
         room = [GAP if part.times == 1 else TITLE for part in parts]
         above = [LEGEND * legends.legend_rows(handles, width) + GAP, *room[1:]]
         heights = [PANEL if part.times == 1 else MAGNIFIED for part in parts]

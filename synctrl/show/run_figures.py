@@ -113,11 +113,11 @@ def paths(result: Result, *, width: float = WIDTH) -> Figure:
 
     check_run(result, "x", "x_desired")
     names = result.info["axes"]
-    handles: list[Any] = [
-        Line2D([], [], color=robot_color(i), label=plain(name)) for i, name in enumerate(result.names)
-    ]
-    handles.append(Line2D([], [], color=DESIRED, linestyle="-.", linewidth=1.1, label="desired"))
     with plots.style():
+        handles: list[Any] = [
+            Line2D([], [], color=robot_color(i), label=plain(name)) for i, name in enumerate(result.names)
+        ]
+        handles.append(Line2D([], [], color=DESIRED, linestyle="-.", linewidth=1.1, label="desired"))
         above = [LEGEND * legend_rows(handles, width) + TITLE, *[TITLE] * (len(names) - 1)]
         figure, panels = stacked_panels([COORDINATE] * len(names), above, width)
         for k, panel in enumerate(panels):
