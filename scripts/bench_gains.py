@@ -36,7 +36,7 @@ from synctrl import (
 from synctrl.control.excursion import POINTS, excursion
 from synctrl.robots.catalog import catalog_names
 from synctrl.robots.mechanism import joint_limits
-from synctrl.robots.payload import Load, carrying
+from synctrl.robots.payload import carrying
 
 #: rad/s; s; s, of the motion there and back; share of the true parameters that is known; kg
 BANDWIDTH, DURATION, RETURN, KNOWN, LOAD = 8.0, 3.0, 4.0, 0.7, 2.0
@@ -168,7 +168,7 @@ def _common(motion: np.ndarray, what: Cell) -> np.ndarray:
 
 def exact_torque(what: Cell, load: float) -> float:
     """The largest torque, N·m, with which the first robot and its load follow the path exactly."""
-    robot = carrying(what.robots[0], Load(load)) if load else what.robots[0]
+    robot = carrying(what.robots[0], Payload(0, load)) if load else what.robots[0]
     path = (part[:POINTS, 0] for part in excursion(what, DURATION)[:3])
     return max(float(np.abs(robot.inverse_dynamics(*state)).max()) for state in zip(*path, strict=True))
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from synctrl import Result
 from synctrl.experiments import mobile_robot, quadratic_analysis, rigid_object
 from synctrl.experiments.mobile_robot import TRACK, WHEEL_RADIUS
-from synctrl.show.vehicle import vehicle_animation
+from synctrl.show.animation import vehicle_animation
 
 
 def main() -> None:

@@ -20,11 +20,10 @@ from .simulation.schedules import Disturbance, Payload
 from .simulation.simulate import Experiment, simulate
 from .tasks.inverse_kinematics import inverse_kinematics
 from .tasks.pose import PoseSpace
-from .tasks.poses import Attached, AxisRotation, FunctionOrientation, PoseTrajectory
+from .tasks.poses import Attached, AxisRotation, FunctionOrientation, PoseTrajectory, SmoothOrientation
 from .tasks.redundancy import Damping, Redundancy
-from .tasks.smooth import SmoothOrientation, SmoothTrajectory
 from .tasks.spaces import CartesianSpace, JointSpace
-from .tasks.trajectories import Circle, Cubic, ExponentialApproach, FunctionTrajectory, Hold
+from .tasks.trajectories import Circle, Cubic, ExponentialApproach, FunctionTrajectory, Hold, SmoothTrajectory
 
 __all__ = [
     "Attached",

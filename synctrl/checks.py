@@ -41,10 +41,9 @@ def numbers(name: str, value: ArrayLike, shape: tuple[int | None, ...] | None = 
             raise TypeError
         array = np.array(value, dtype=float)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"expected numbers, found {value!r}", subject=name, found=value) from error
+        raise InputError.expected("numbers", value, name) from error
     if shape is not None and not _fits(array.shape, shape):
-        expected, found = _show(shape), _show(array.shape)
-        raise InputError(f"expected shape {expected}, found {found}", subject=name, found=array.shape)
+        raise InputError.expected(f"shape {_show(shape)}", array.shape, name)
     return array
 
 
@@ -56,8 +55,7 @@ def per_joint(name: str, value: ArrayLike, nv: int) -> np.ndarray:
     """
     array = finite_array(name, value)
     if array.shape not in ((), (nv,)):
-        expected, found = f"a number or shape ({nv},)", _show(array.shape)
-        raise InputError(f"expected {expected}, found {found}", subject=name, found=array.shape)
+        raise InputError.expected(f"a number or shape ({nv},)", array.shape, name)
     return np.broadcast_to(array, (nv,))
 
 
@@ -65,14 +63,14 @@ def symmetric_matrix(name: str, value: ArrayLike, size: int) -> np.ndarray:
     """`value` as a read-only symmetric float array, (size, size)."""
     array = finite_array(name, value, (size, size))
     if not np.allclose(array, array.T, rtol=1e-12, atol=0):
-        raise InputError(f"expected a symmetric matrix, found {array.tolist()}", subject=name, found=array)
+        raise InputError.expected("a symmetric matrix", array, name)
     return array
 
 
 def finite_number(name: str, value: object) -> float:
     """`value` as a finite float."""
     if isinstance(value, (bool, np.bool_)):
-        raise InputError(f"expected a number, found {value!r}", subject=name, found=value)
+        raise InputError.expected("a number", value, name)
     return float(finite_array(name, value, ()))  # type: ignore[arg-type]
 
 
@@ -80,7 +78,7 @@ def positive_number(name: str, value: object) -> float:
     """`value` as a finite float above zero."""
     number = finite_number(name, value)
     if number <= 0:
-        raise InputError(f"expected a number above 0, found {number:g}", subject=name, found=number)
+        raise InputError.expected("a number above 0", number, name)
     return number
 
 
@@ -88,7 +86,7 @@ def non_negative_number(name: str, value: object) -> float:
     """`value` as a finite float that is not below zero."""
     number = finite_number(name, value)
     if number < 0:
-        raise InputError(f"expected a number of at least 0, found {number:g}", subject=name, found=number)
+        raise InputError.expected("a number of at least 0", number, name)
     return number
 
 
@@ -96,9 +94,7 @@ def count(name: str, value: object, least: int = 1) -> int:
     """`value` as a whole number of at least `least`."""
     instance(name, value, (int, np.integer), "a whole number")
     if isinstance(value, bool) or value < least:  # type: ignore[operator]
-        raise InputError(
-            f"expected a whole number of at least {least}, found {value!r}", subject=name, found=value
-        )
+        raise InputError.expected(f"a whole number of at least {least}", value, name)
     return int(value)  # type: ignore[call-overload]
 
 
@@ -106,8 +102,7 @@ def index(name: str, value: object, count: int) -> int:
     """`value` as the index of one of so many things, counted from 0."""
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not whole or not 0 <= value < count:  # type: ignore[operator]
-        expected = f"expected an index from 0 to {count - 1}"
-        raise InputError(f"{expected}, found {value!r}", subject=name, found=value)
+        raise InputError.expected(f"an index from 0 to {count - 1}", value, name, shown=repr(value))
     return int(value)  # type: ignore[call-overload]
 
 
@@ -139,7 +134,7 @@ def limits(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> np.nda
 def boolean(name: str, value: object) -> bool:
     """`value` if it is True or False."""
     if not isinstance(value, (bool, np.bool_)):
-        raise InputError(f"expected True or False, found {value!r}", subject=name, found=value)
+        raise InputError.expected("True or False", value, name)
     return bool(value)
 
 
@@ -150,8 +145,8 @@ def instance(name: str, value: object, kind: type | tuple[type, ...], expected: 
         InputError: `value` is no instance of `kind`.
     """
     if not isinstance(value, kind):
-        found = type(value).__name__
-        raise InputError(f"expected {expected}, found {found}", subject=name, found=found)
+        its_kind = type(value).__name__
+        raise InputError.expected(expected, its_kind, name, shown=its_kind)
 
 
 def offers(name: str, value: Any, parts: tuple[str, ...], expected: str) -> None:
@@ -161,7 +156,7 @@ def offers(name: str, value: Any, parts: tuple[str, ...], expected: str) -> None
         InputError: `value` is a class, or lacks one.
     """
     if isinstance(value, type) or not all(hasattr(value, part) for part in parts):
-        raise InputError(f"expected {expected}, found {value!r}", subject=name, found=value)
+        raise InputError.expected(expected, value, name)
 
 
 def shaped(name: str, value: Any, shape: tuple[int, ...]) -> None:
@@ -171,15 +166,13 @@ def shaped(name: str, value: Any, shape: tuple[int, ...]) -> None:
         InputError: `value` has another shape.
     """
     if np.shape(value) != shape:
-        found = np.shape(value)
-        raise InputError(f"expected an array of shape {shape}, found {found}", subject=name, found=found)
+        raise InputError.expected(f"an array of shape {shape}", np.shape(value), name)
 
 
 def choice(name: str, value: object, known: tuple[str, ...]) -> str:
     """`value` if it is one of the known words."""
     if not isinstance(value, str) or value not in known:
-        expected = f"expected one of {', '.join(map(repr, known))}"
-        raise InputError(f"{expected}, found {value!r}", subject=name, found=value)
+        raise InputError.expected(f"one of {', '.join(map(repr, known))}", value, name)
     return str(value)
 
 
@@ -188,8 +181,9 @@ def label(name: str, value: object) -> str:
     instance(name, value, str, "a text")
     line = str(value)
     if len(line) > LONGEST_LABEL or unprintable(line):
-        expected = f"expected a text of one line, up to {LONGEST_LABEL} characters"
-        raise InputError(f"{expected}, found {line!a:.80}", subject=name, found=line)
+        raise InputError.expected(
+            f"a text of one line, up to {LONGEST_LABEL} characters", line, name, shown=f"{line!a:.80}"
+        )
     return line
 
 

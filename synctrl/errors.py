@@ -69,6 +69,23 @@ class SynctrlError(Portable, Exception):
         self.problem = message
         super().__init__(self._whole(message))
 
+    @classmethod
+    def expected(
+        cls, what: str, found: Any, subject: str | None = None, shown: str = "", **place: Any
+    ) -> Self:
+        """The error about something else than what is expected.
+
+        Args:
+            what: is expected, in words.
+            found: what is there instead.
+            subject: see `SynctrlError`.
+            shown: how the message shows it; by default as Python writes it, and a float with six digits.
+            place: `file` and `line`.
+        """
+        value = found.tolist() if isinstance(found, (np.generic, np.ndarray)) else found
+        shown = shown or (f"{value:g}" if isinstance(value, float) else repr(value))
+        return cls(f"expected {what}, found {shown}", subject=subject, found=found, **place)
+
     def about(self, subject: str | None = None, **data: Any) -> Self:
         """This error with more data, for one whose message says in words of its own what it is about."""
         found = plain_data(data.pop("found", self.found))

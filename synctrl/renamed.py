@@ -42,7 +42,7 @@ _PARTS = {
     "robots.mechanism": "robots.limits",
     "robots.model": "robots.kinematics robots.model_checks",
     "robots.parameters": "robots.friction_parameters",
-    "show.animation": "show.real_cells",
+    "show.animation": "show.real_cells show.vehicle",
     "show.html": "show.view",
     "show.nodes": "show.rotations",
     "show.style": "show.colors",

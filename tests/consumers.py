@@ -21,12 +21,12 @@ from synctrl.show.animation import (
     payload_pair_scene,
     payload_scene,
     planar_scene,
+    vehicle_animation,
 )
 from synctrl.show.layout import cell_layout
 from synctrl.show.lyapunov_plots import lyapunov_figure
 from synctrl.show.plots import common_limits, joint_trajectories, sync_errors, tracking_errors
 from synctrl.show.run_figures import estimates, paths, torques
-from synctrl.show.vehicle import vehicle_animation
 
 FIGURES: dict[str, Callable[[Any, Any], Any]] = {
     "joint_trajectories": lambda r, e: joint_trajectories(r, 0),

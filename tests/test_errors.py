@@ -99,6 +99,18 @@ def test_what_was_found_is_plain_whatever_it_was():
     assert "list" in repr(InputError("no", found=endless).found)
 
 
+@pytest.mark.parametrize(
+    ("found", "shown"),
+    [(0.1 + 0.2, "0.3"), (np.float64(-2.0), "-2"), (np.int64(3), "3"), ("x y", "'x y'"), ((2, 3), "(2, 3)")],
+)
+def test_an_error_about_something_unexpected_says_it_in_its_message_and_its_data(found, shown):
+    error = RobotError.expected("two of them", found, "links", file="a.urdf", line=7)
+    assert type(error) is RobotError and error.found == found
+    assert (error.subject, error.file, error.line) == ("links", "a.urdf", 7)
+    assert str(error) == f"a.urdf:7: links: expected two of them, found {shown}"
+    assert str(RobotError.expected("two", found, shown="none at all")) == "expected two, found none at all"
+
+
 @pytest.mark.parametrize("whole", [3, np.int64(3), np.uint8(3)])
 def test_a_whole_number_of_numpy_counts_as_one(whole):
     assert (checks.count("dt", whole), checks.index("dt", whole, 4)) == (3, 3)

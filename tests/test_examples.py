@@ -19,7 +19,7 @@ from synctrl.errors import InputError
 from synctrl.experiments import mobile_robot, quadratic_analysis, rigid_object
 from synctrl.experiments.mobile_robot import DURATION, TRACK, WHEEL_RADIUS, WheelPath, heading, radius
 from synctrl.experiments.rigid_object import A
-from synctrl.show.vehicle import vehicle_animation, vehicle_path
+from synctrl.show.animation import vehicle_animation, vehicle_path
 from synctrl.tasks.rotations import from_quaternion as matrices
 
 SCRIPT = Path(__file__).resolve().parent.parent / "scripts" / "paper_examples.py"

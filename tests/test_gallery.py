@@ -14,9 +14,8 @@ from test_panels import check_places
 from synctrl import Coupling, Disturbance, Experiment, Result
 from synctrl.errors import InputError
 from synctrl.show.legends import columns_that_fit, pair_colors, shortened, text_width
-from synctrl.show.run_figures import Gallery
+from synctrl.show.run_figures import FIGURES, Gallery
 from synctrl.simulation.result import LAYOUT
-from synctrl.simulation.views import FIGURES
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from synctrl.simulation.views import FIGURES
+from synctrl.show.run_figures import FIGURES
 
 PAGE = (Path(__file__).parents[1] / "docs" / "looking.md").read_text("utf-8")
 

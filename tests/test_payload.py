@@ -11,7 +11,7 @@ from refusals import refused
 from synctrl import Cell, Coupling, Cubic, Experiment, Gains, Member, Payload, Result, Robot, load_robot
 from synctrl.errors import FrameNotFound, InputError
 from synctrl.robots.documents import weld
-from synctrl.robots.payload import Load, carrying
+from synctrl.robots.payload import carrying
 from synctrl.robots.urdf import describe
 
 BOX = np.array([[0.02, 0.003, 0.0], [0.003, 0.03, -0.002], [0.0, -0.002, 0.025]])
@@ -43,7 +43,7 @@ def box(mass: float, **window: float) -> Payload:
 def test_a_loaded_robot_has_the_energy_and_momentum_of_robot_and_load(seed: int) -> None:
     rng = np.random.default_rng(seed)
     robot = random_robot(seed)
-    load = Load(rng.uniform(0.1, 3), rng.normal(size=3), BOX)
+    load = Payload(0, rng.uniform(0.1, 3), rng.normal(size=3), BOX)
     loaded = carrying(robot, load)
     q, v = rng.normal(size=(2, robot.nv))
     pose, J = robot.tip_pose(q), robot.jacobian(q)

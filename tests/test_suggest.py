@@ -35,7 +35,7 @@ from synctrl.control.learning_scale import learning_scale  # noqa: E402
 from synctrl.errors import GainWarning, InputError, UnreachableError  # noqa: E402
 from synctrl.experiments import a460_pair, panda_four, planar_four, ur5_payload  # noqa: E402
 from synctrl.robots.parameters import LinearParameters  # noqa: E402
-from synctrl.robots.payload import Load, carrying  # noqa: E402
+from synctrl.robots.payload import Payload, carrying  # noqa: E402
 from synctrl.robots.pseudo_inertia import pseudo_inertia, pullback  # noqa: E402
 
 UR5, PLANAR = load_robot("ur5"), load_robot("planar2r")
@@ -134,7 +134,7 @@ def test_damping_that_the_period_cuts_below_what_bears_the_load_is_said_with_the
     with pytest.warns(GainWarning, match=r"0.1 rad \(m\) of sag .*: arm 0, joint 4: ") as told:
         gains = Gains.suggest(pair, OMEGA, period=4e-3, payload=load)
     robot, states = pair.robots[0], excursion(pair, 5.0)
-    carried = carrying(robot, Load(load))
+    carried = carrying(robot, Payload(0, load))
     known, whole = ([arm.gravity(q)[3] for q in states.q[:, 0]] for arm in (robot, carried))
     missing = np.max(0.3 * np.abs(known) + np.abs(np.subtract(whole, known)))
     said = re.search(r"arm 0, joint 4: (\S+) rad", str(told[0].message))

@@ -178,13 +178,11 @@ class DiscreteController:
         kept = self.state
         if not isinstance(state, Mapping) or set(state) != set(kept):
             found = list(map(str, state)) if isinstance(state, Mapping) else type(state).__name__
-            raise InputError(
-                f"expected arrays {', '.join(sorted(kept))}, found {found}", subject="state", found=found
-            )
+            raise InputError.expected(f"arrays {', '.join(sorted(kept))}", found, "state", shown=f"{found}")
         new = {name: finite_array(f"state, {name}", state[name], kept[name].shape) for name in kept}
         if new["period"] != self.period:
-            own = f"expected that of the controller, {self.period:g} s"
-            raise InputError(f"{own}, found {new['period']:g}", subject="state, period", found=new["period"])
+            own = f"that of the controller, {self.period:g} s"
+            raise InputError.expected(own, new["period"], "state, period")
         samples, held = (_count(name, float(new[name])) for name in ("samples", "held"))
         self.z, self.memory, self._tau = (new[k].copy() for k in ("z", self._memory_name, "tau"))
         self._t0, self._samples, self.held = float(new["start"]), samples, held
@@ -294,7 +292,5 @@ class DiscreteController:
 
 def _count(name: str, value: float) -> int:
     if not 0 <= value < LONGEST or value != int(value):
-        raise InputError(
-            f"expected a whole number of at least 0, found {value:g}", subject=f"state, {name}", found=value
-        )
+        raise InputError.expected("a whole number of at least 0", value, f"state, {name}")
     return int(value)

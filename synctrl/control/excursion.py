@@ -65,9 +65,7 @@ def _place(cell: Cell, i: int, x: np.ndarray, q: np.ndarray) -> np.ndarray:
         return reach(cell.robots[i], x, q, cell.space)  # type: ignore[arg-type]
     if hasattr(cell.space, "start"):
         return np.asarray(cell.space.start(cell.robots[i], x), dtype=float)
-    raise InputError(
-        f"expected one with `miss` or `start`, found {cell.space!r}", subject="space", found=cell.space
-    )
+    raise InputError.expected("one with `miss` or `start`", cell.space, "space")
 
 
 def _joint_motion(cell: Cell, q: np.ndarray, desired: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -50,7 +50,7 @@ class Gains:
             low = gain.min() if gain.size else 0.0
             if low < 0 or (positive and low == 0):
                 bound = "above 0" if positive else "of at least 0"
-                raise InputError(f"expected entries {bound}, found {low:g}", subject=name, found=float(low))
+                raise InputError.expected(f"entries {bound}", low, name)
             object.__setattr__(self, name, gain)
 
     @classmethod
@@ -106,7 +106,7 @@ class Gains:
         unknown = set(changes) - set(_SIGNS)
         if unknown:
             known, found = ", ".join(_SIGNS), ", ".join(sorted(unknown))
-            raise InputError(f"expected some of {known}, found {found}", subject="gains", found=found)
+            raise InputError.expected(f"some of {known}", found, "gains", shown=found)
         return replace(self, **changes)
 
     def as_dict(self) -> dict[str, Any]:
@@ -151,8 +151,7 @@ def spread(name: str, gain: np.ndarray, shape: tuple[int, ...], otherwise: str =
     fits = zip(gain.shape[::-1], shape[::-1], strict=False)
     if gain.ndim > len(shape) or any(found != expected for found, expected in fits):
         shapes = " or ".join(str(shape[k:]) for k in range(len(shape), -1, -1))
-        expected = f"expected a shape of {shapes}{otherwise}"
-        raise InputError(f"{expected}, found {gain.shape}", subject=name, found=gain.shape)
+        raise InputError.expected(f"a shape of {shapes}{otherwise}", gain.shape, name)
     return np.broadcast_to(gain, shape).copy()
 
 

@@ -28,12 +28,11 @@ def learning_scale(parameters: Parameters, robot: Robot, q: np.ndarray) -> np.nd
     Raises:
         InputError: parameters of another kind than this package's.
     """
-    raise InputError(
-        "expected FullParameters, BaseParameters, LinearParameters or FrictionParameters, found "
-        f"{type(parameters).__name__}",
-        subject="parameters",
-        found=type(parameters).__name__,
+    expected, found = (
+        "FullParameters, BaseParameters, LinearParameters or FrictionParameters",
+        type(parameters),
     )
+    raise InputError.expected(expected, found.__name__, "parameters", shown=found.__name__)
 
 
 @learning_scale.register

@@ -156,9 +156,8 @@ def read_state(path: str | Path, like: Mapping[str, np.ndarray]) -> dict[str, np
 def _arrays(archive: zipfile.ZipFile, like: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     expected, found = sorted(f"{name}.npy" for name in like), sorted(archive.namelist())
     if found != expected:
-        raise ResultError(
-            f"expected the arrays {', '.join(expected)}, found {', '.join(found) or 'none'}",
-            found=tuple(found),
+        raise ResultError.expected(
+            f"the arrays {', '.join(expected)}", tuple(found), shown=", ".join(found) or "none"
         )
     return {name: _array(archive, name, array) for name, array in like.items()}
 

@@ -144,10 +144,8 @@ class Messages:
         slack = ROUNDING * max(abs(start), abs(end))
         inside = bool(((times >= start - slack) & (times <= end + slack)).all())
         if not inside or (np.diff(times) < 0).any():
-            raise InputError(
-                f"expected instants in order with {start:g} <= t < {end:g} s, found {times!s:.80}",
-                subject=where,
-                found=times,
+            raise InputError.expected(
+                f"instants in order with {start:g} <= t < {end:g} s", times, where, shown=f"{times!s:.80}"
             )
         return times.tolist()
 

@@ -18,7 +18,7 @@ from ..coupling.cell import Cell
 from ..errors import GainWarning, warn
 from ..robots.mechanism import joint_limits
 from ..robots.model import unit_for
-from ..robots.payload import Load, carrying
+from ..robots.payload import Payload, carrying
 from ..robots.robot import Robot
 from .excursion import Excursion, excursion
 from .learning_scale import learning_scale
@@ -56,7 +56,7 @@ class Arm:
 
     def __init__(self, cell: Cell, i: int, states: Excursion, payload: float):
         self.robot, self.parameters, self.name = cell.robots[i], cell.parameters[i], cell.names[i]
-        self.loaded = carrying(self.robot, Load(payload)) if payload else self.robot
+        self.loaded = carrying(self.robot, Payload(0, payload)) if payload else self.robot
         nv = self.robot.nv
         self.q, self.v, self.a = (part[:, i, :nv] for part in states[:3])
         self.weighted = states.weighted[:, i, :, :nv]

@@ -112,9 +112,7 @@ class Coupling:
         """Differences of one robot and each other one; by default c = 1. The leader feels all of them."""
         instance("leader", leader, (int, np.integer), "the number of a robot")
         if not 0 <= leader < _count(n):
-            raise CouplingError(
-                f"expected a robot from 0 to {n - 1}, found {leader}", subject="leader", found=leader
-            )
+            raise CouplingError.expected(f"a robot from 0 to {n - 1}", leader, "leader")
         return cls._differences(n, [(leader, k) for k in range(n) if k != leader], c, "star", unit)
 
     @classmethod

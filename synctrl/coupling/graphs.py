@@ -51,11 +51,7 @@ def indices(name: str, value: np.ndarray) -> np.ndarray:
     """
     wrong = (value != np.round(value)) | (np.abs(value) > LARGEST)
     if wrong.any():
-        raise InputError(
-            f"expected whole numbers of robots, found {value[wrong][0]:g}",
-            subject=name,
-            found=value[wrong][0],
-        )
+        raise InputError.expected("whole numbers of robots", value[wrong][0], name)
     return value.astype(int)
 
 
@@ -65,11 +61,7 @@ def check_rows(name: str, n: int, edges: np.ndarray, signs: np.ndarray) -> None:
     Raises, warns: see `Coupling`.
     """
     if not len(edges) or (edges.shape[1] != 2 and edges.shape != (1, n)):
-        raise CouplingError(
-            f"expected shape (p, 2) with p > 0, or (1, {n}), found {edges.shape}",
-            subject="edges",
-            found=edges.shape,
-        )
+        raise CouplingError.expected(f"shape (p, 2) with p > 0, or (1, {n})", edges.shape, "edges")
     _find("robots 0 to {last}", np.any((edges < 0) | (edges >= n), axis=1), edges, n)
     ordered = np.sort(edges, axis=1)
     _find("different robots", (ordered[:, 1:] == ordered[:, :-1]).any(axis=1), edges, n)
@@ -165,7 +157,5 @@ def _networkx_rows(graph: Any) -> tuple[list[tuple[Any, Any, Any]], int]:
 def _row(edge: Any) -> tuple[Any, Any, Any]:
     parts = tuple(edge) if isinstance(edge, Iterable) and not isinstance(edge, str) else ()
     if len(parts) not in (2, 3):
-        raise InputError(
-            f"expected pairs (i, j) or triples (i, j, weight), found {edge!r}", subject="graph", found=edge
-        )
+        raise InputError.expected("pairs (i, j) or triples (i, j, weight)", edge, "graph")
     return (*parts, 1.0)[:3]

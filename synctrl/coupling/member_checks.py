@@ -55,11 +55,7 @@ def check_labels(cell: Any) -> None:
     for unit in cell.units:
         label("space: unit", unit)
     if len(cell.units) != cell.m:
-        raise InputError(
-            f"expected one for each of {cell.m} coordinates, found {len(cell.units)}",
-            subject="space: units",
-            found=len(cell.units),
-        )
+        raise InputError.expected(f"one for each of {cell.m} coordinates", len(cell.units), "space: units")
     label("coupling: name", cell.coupling.name)
     label("coupling: unit", cell.coupling.unit)
     for axis in cell.labels:
@@ -87,15 +83,10 @@ def check_trajectory(name: str, trajectory: Any, labels: tuple[str, ...]) -> Non
     where, m = f"{name}, trajectory", len(labels)
     offers(where, trajectory, ("__call__", "dimension", "breaks"), "a trajectory such as Hold")
     if trajectory.dimension != m:
-        coordinates = f"expected {m} coordinates ({', '.join(labels)})"
-        raise InputError(
-            f"{coordinates}, found {trajectory.dimension}", subject=where, found=trajectory.dimension
-        )
+        raise InputError.expected(f"{m} coordinates ({', '.join(labels)})", trajectory.dimension, where)
     motion = trajectory(np.zeros(1))
     if not isinstance(motion, tuple) or len(motion) != 3:
-        raise InputError(
-            f"expected position, velocity and acceleration, found {motion!r}", subject=where, found=motion
-        )
+        raise InputError.expected("position, velocity and acceleration", motion, where)
     for part, value in zip(MOTION_PARTS, motion, strict=True):
         finite_array(f"{where}, {part} at t = 0 s", value, (1, m))
 
@@ -148,11 +139,11 @@ def first_estimates(name: str, parameters: Parameters, given: Any) -> np.ndarray
     size = len(parameters.theta)
     estimates = finite_array(f"{name}, theta_hat0", np.zeros(size) if given is None else given)
     if estimates.shape != (size,):
-        raise InputError(
-            f"expected shape ({size},), a number for each of what is adapted ({parameters.names[0]} to "
-            f"{parameters.names[-1]}, true values in Member.theta), found {estimates.shape}",
-            subject=f"{name}, theta_hat0",
-            found=estimates.shape,
+        raise InputError.expected(
+            f"shape ({size},), a number for each of what is adapted ({parameters.names[0]} to "
+            f"{parameters.names[-1]}, true values in Member.theta)",
+            estimates.shape,
+            f"{name}, theta_hat0",
         )
     return estimates
 
@@ -190,17 +181,13 @@ def _check_sizes(where: str, parameters: Any, robot: Robot) -> None:
     theta = finite_array(f"{where}, theta", parameters.theta, (None,))
     expected, still = (robot.nv, len(theta)), np.zeros(robot.nv)
     if len(parameters.names) != len(theta):
-        names = f"expected a name for each of {len(theta)} values"
-        raise InputError(
-            f"{names}, found {len(parameters.names)}", subject=where, found=len(parameters.names)
-        )
+        raise InputError.expected(f"a name for each of {len(theta)} values", len(parameters.names), where)
     try:
         found = np.shape(parameters.regressor(still, still, still, still))
     except ValueError as error:
         raise InputError(f"they belong to another robot: {error}", subject=where) from error
     if found != expected:
-        regressor = f"expected a regressor of shape {expected} for '{robot.name}'"
-        raise InputError(f"{regressor}, found {found}", subject=where, found=found)
+        raise InputError.expected(f"a regressor of shape {expected} for '{robot.name}'", found, where)
 
 
 def _check_truth(where: str, parameters: Any, robot: Robot, friction: Friction) -> None:

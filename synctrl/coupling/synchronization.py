@@ -199,9 +199,8 @@ class SynchronizationFunction:
         """Desired positions, (T, n, m)."""
         instance("trajectories", trajectories, Sequence, "one for each robot")
         if len(trajectories) != self.robots:
-            expected = f"expected one for each of {self.robots} robots"
-            raise InputError(
-                f"{expected}, found {len(trajectories)}", subject="trajectories", found=len(trajectories)
+            raise InputError.expected(
+                f"one for each of {self.robots} robots", len(trajectories), "trajectories"
             )
         coordinates = tuple(f"coordinate {k}" for k in range(1, self.dimension + 1))
         for i, trajectory in enumerate(trajectories, start=1):

@@ -70,11 +70,7 @@ class ConstantWeights:
     def __init__(self, c: ArrayLike):
         self.c = finite_array("c", c)
         if self.c.ndim not in (1, 2, 3):
-            raise InputError(
-                f"expected shape (n,), (n, m) or (n, m, m), found {self.c.shape}",
-                subject="c",
-                found=self.c.shape,
-            )
+            raise InputError.expected("shape (n,), (n, m) or (n, m, m)", self.c.shape, "c")
         self.robots = len(self.c)
         self._known: dict[int, Weights] = {}
 
@@ -206,11 +202,7 @@ def as_source(robots: int, c: ArrayLike | WeightFunction | WeightSource) -> Weig
     if not (hasattr(c, "at") and hasattr(c, "scaled")):
         source = FunctionWeights(robots, c) if callable(c) else ConstantWeights(c)
     if source.robots != robots:
-        raise InputError(
-            f"expected one weight for each of {robots} robots, found {source.robots}",
-            subject="c",
-            found=source.robots,
-        )
+        raise InputError.expected(f"one weight for each of {robots} robots", source.robots, "c")
     return source
 
 
@@ -223,9 +215,7 @@ def as_matrices(c: np.ndarray, m: int) -> np.ndarray:
         return c[:, :, None] * np.eye(m)
     if c.shape == (n, m, m):
         return c.copy()
-    raise InputError(
-        f"expected shape ({n},), ({n}, {m}) or ({n}, {m}, {m}), found {c.shape}", subject="c", found=c.shape
-    )
+    raise InputError.expected(f"shape ({n},), ({n}, {m}) or ({n}, {m}, {m})", c.shape, "c")
 
 
 def geometric_mean(c: np.ndarray) -> float:

@@ -105,5 +105,4 @@ def _disturbances(disturbance: str | Disturbance | Sequence[Disturbance] | None)
         return (disturbance,)
     if isinstance(disturbance, Sequence) and not isinstance(disturbance, str):
         return tuple(disturbance)
-    expected = "expected None, 'torque' or Disturbance objects"
-    raise InputError(f"{expected}, found {disturbance!r}", subject="disturbance", found=disturbance)
+    raise InputError.expected("None, 'torque' or Disturbance objects", disturbance, "disturbance")

@@ -128,8 +128,9 @@ class Table:
         """
         for row in self.rows:
             if len(row) != len(self.head):
-                expected = f"expected rows of {len(self.head)} cells"
-                raise InputError(f"{expected}, found {list(row)}", subject="table", found=len(row))
+                raise InputError.expected(
+                    f"rows of {len(self.head)} cells", len(row), "table", shown=f"{list(row)}"
+                )
         head = "".join(f"<th scope='col'>{words(cell)}</th>" for cell in self.head)
         body = "".join(_table_row(row) for row in self.rows)
         caption = f'<p class="caption">{words(self.caption)}</p>' if self.caption else ""
@@ -141,8 +142,7 @@ class Table:
             return ""
         covered = sum(width for _, width in self.groups)
         if covered != len(self.head) - 1:
-            expected = f"expected groups over {len(self.head) - 1} columns"
-            raise InputError(f"{expected}, found {covered}", subject="table", found=covered)
+            raise InputError.expected(f"groups over {len(self.head) - 1} columns", covered, "table")
         titles = (f"<th colspan='{width}'>{words(title)}</th>" for title, width in self.groups)
         return f'<tr class="groups"><th></th>{"".join(titles)}</tr>'
 

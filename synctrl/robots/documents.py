@@ -53,11 +53,7 @@ def planar_arm(lengths: Sequence[float], masses: Sequence[float], name: str = "p
     _check_name("name", name)
     l, m = finite_array("lengths", lengths, (None,)), finite_array("masses", masses, (None,))
     if not len(l) or len(l) != len(m):
-        raise InputError(
-            f"expected as many of each, at least 1, found {len(l)} and {len(m)}",
-            subject="lengths, masses",
-            found=(len(l), len(m)),
-        )
+        raise InputError.expected("as many of each, at least 1", (len(l), len(m)), "lengths, masses")
     rods = [
         _rod(k, positive_number(f"lengths[{k}]", l[k]), positive_number(f"masses[{k}]", m[k]))
         for k in range(len(l))
@@ -139,11 +135,7 @@ def write_urdf(document: Document, path: str | Path) -> Path:
         file.parent.stat()  # a folder of a mistyped name is not made
         write_whole(file, to_xml(document))
     except OSError as error:
-        raise InputError(
-            f"expected a file that can be written, found: {error.strerror}",
-            subject=str(file),
-            found=error.strerror,
-        ) from error
+        raise InputError.expected("a file that can be written", error.strerror, str(file)) from error
     return file
 
 
@@ -198,7 +190,7 @@ def _triple(name: str, value: ArrayLike) -> tuple[float, ...]:
 def _check_name(what: str, name: str) -> None:
     if not isinstance(name, str) or not is_plain(name):
         rule = "1 to 128 letters, digits, '_', '-' or '.', beginning with a letter, a digit or '_'"
-        raise InputError(f"expected {rule}, found {name!r}", subject=what, found=name)
+        raise InputError.expected(rule, name, what)
 
 
 def _check_meshes(document: Document, file: Path) -> None:

@@ -32,11 +32,7 @@ class Friction:
         for name in ("viscous", "coulomb"):
             array = finite_array(name, getattr(self, name))
             if array.size and array.min() < 0:
-                raise InputError(
-                    f"expected coefficients of at least 0, found {array.min():g}",
-                    subject=name,
-                    found=array.min(),
-                )
+                raise InputError.expected("coefficients of at least 0", array.min(), name)
             object.__setattr__(self, name, array)
         object.__setattr__(self, "smoothing", positive_number("smoothing", self.smoothing))
 

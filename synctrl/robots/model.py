@@ -66,15 +66,11 @@ def check_inertia(robot: str, joint: str, row: np.ndarray) -> None:
     """Refuse ten inertial parameters that no body can have."""
     body = f"robot '{robot}', body of '{joint}'"
     if row[0] <= 0:
-        raise RobotError(f"expected a mass above 0 kg, found {row[0]:g}", subject=body, found=row[0])
+        raise RobotError.expected("a mass above 0 kg", row[0], body)
     lowest, _, highest = principal_moments(row)
     if lowest < -NO_MOMENT or highest <= 0:
-        raise RobotError(
-            f"expected a positive definite inertia about the centre of mass, found a smallest eigenvalue of "
-            f"{lowest:g} kg·m^2",
-            subject=body,
-            found=lowest,
-        )
+        positive, shown = "a positive definite inertia about the centre of mass", f"{lowest:g} kg·m^2"
+        raise RobotError.expected(positive, lowest, body, shown=f"a smallest eigenvalue of {shown}")
 
 
 # -- units of joints ---------------------------------------------------------------------------------------

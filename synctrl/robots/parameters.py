@@ -72,11 +72,7 @@ class LinearParameters:
         self.matrix = finite_array("matrix", matrix, (10 * robot.body_count, self.theta.size))
         self.names = tuple(names)
         if len(self.names) != self.theta.size:
-            raise InputError(
-                f"expected {self.theta.size} names, found {len(self.names)}",
-                subject="names",
-                found=len(self.names),
-            )
+            raise InputError.expected(f"{self.theta.size} names", len(self.names), "names")
         _check_torque(robot, self)
 
     def regressor(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:

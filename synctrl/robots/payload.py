@@ -1,4 +1,4 @@
-"""A robot that carries something."""
+"""A body that a robot carries for some time, and the robot with it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from ..checks import finite_array, instance, positive_number, symmetric_matrix
+from ..checks import finite_array, instance, positive_number, symmetric_matrix, window
 from ..errors import InputError
 from .documents import weld
 from .model import frame_id
@@ -19,30 +19,37 @@ from .urdf.document import Document
 
 
 @dataclass(frozen=True, eq=False)
-class Load:
-    """A rigid body fixed to a frame of a robot.
+class Payload:
+    """A rigid body that a robot carries for start <= t < stop.
 
     Args:
+        robot: index of the robot, counted from 0.
         mass: kg.
         com: centre of mass in the frame, (3,), m.
         inertia: about the centre of mass in the frame's axes, (3, 3), or (3,) for its diagonal, kg·m^2; by
             default that of a uniform ball of the density of water.
-        frame: name of the frame; by default the robot's tip.
+        frame: name of the frame that holds it; by default the robot's tip.
+        start, stop: when it is picked up and put down, s; by default it is there from the beginning, and is
+            not put down.
 
     Raises:
-        InputError: numbers that no body can have.
+        InputError: numbers that no body can have, or a window that is empty or starts before 0.
     """
 
+    robot: int
     mass: float
     com: Any = (0.0, 0.0, 0.0)
     inertia: Any = None
     frame: str | None = None
+    start: float = 0.0
+    stop: float | None = None
 
     def __post_init__(self) -> None:
         instance("payload, frame", self.frame, (str, NoneType), "the name of a frame")
         object.__setattr__(self, "mass", positive_number("payload, mass", self.mass))
         object.__setattr__(self, "com", finite_array("payload, com", self.com, (3,)))
         object.__setattr__(self, "inertia", self._checked_inertia())
+        window("payload", self.start, self.stop)
 
     def _checked_inertia(self) -> np.ndarray:
         if self.inertia is None:
@@ -53,17 +60,29 @@ class Load:
         inertia = symmetric_matrix("payload, inertia", full, 3)
         moments = np.linalg.eigvalsh(inertia)
         if moments[0] <= 0 or moments[2] > (1 + 1e-9) * (moments[0] + moments[1]):
-            raise InputError(
-                "expected positive principal moments, none larger than the sum of the "
-                f"others, found {moments.tolist()} kg·m^2",
-                subject="payload, inertia",
-                found=moments.tolist(),
-            )
+            possible = "positive principal moments in kg·m^2, none larger than the sum of the others"
+            raise InputError.expected(possible, moments, "payload, inertia")
         return inertia
 
+    def carried_at(self, t: float) -> bool:
+        """Whether the robot has it at time t; at an edge from the right."""
+        return self.start <= t and (self.stop is None or t < self.stop)
 
-def carrying(robot: Robot, load: Load) -> Robot:
-    """The robot with a load fixed to it.
+    def as_dict(self) -> dict[str, Any]:
+        """The payload as plain data."""
+        return {
+            "robot": int(self.robot),
+            "mass": float(self.mass),
+            "com": self.com.tolist(),
+            "inertia": self.inertia.tolist(),
+            "frame": self.frame,
+            "start": float(self.start),
+            "stop": None if self.stop is None else float(self.stop),
+        }
+
+
+def carrying(robot: Robot, load: Payload) -> Robot:
+    """The robot with a load fixed to it, whenever that is, and whosever it is.
 
     Raises:
         FrameNotFound: the robot has no such frame.
@@ -72,11 +91,7 @@ def carrying(robot: Robot, load: Load) -> Robot:
     name = load.frame or robot.tip
     frame = robot.model.frames[frame_id(robot.name, robot.model, name)]
     if frame.parentJoint == 0:
-        raise InputError(
-            f"expected one of robot '{robot.name}' that moves, found '{name}'",
-            subject="payload, frame",
-            found=name,
-        )
+        raise InputError.expected(f"one of robot '{robot.name}' that moves", name, "payload, frame")
     model = pin.Model(robot.model)
     body = pin.Inertia(load.mass, np.array(load.com), np.array(load.inertia))
     model.appendBodyToJoint(frame.parentJoint, body, frame.placement)
@@ -85,7 +100,7 @@ def carrying(robot: Robot, load: Load) -> Robot:
     return kept(model, robot.tip, document=document)
 
 
-def _welded(document: Document | None, frame: str, load: Load) -> Document | None:
+def _welded(document: Document | None, frame: str, load: Payload) -> Document | None:
     """The same in the document; None if the frame is no link of it."""
     links = [] if document is None else [link.name for link in document.links]
     if document is None or frame not in links:

@@ -132,9 +132,7 @@ class Robot:
         """
         values = per_joint("armature", armature, self.nv)
         if values.min() < 0:
-            raise InputError(
-                f"expected at least 0 kg·m^2, found {values.min():g}", subject="armature", found=values.min()
-            )
+            raise InputError.expected("at least 0 kg·m^2", values.min(), "armature")
         model = pin.Model(self.model)
         model.armature = values.copy()
         return self._with(model)

@@ -13,16 +13,7 @@ from ..robots.robot import Robot
 from ..robots.written import read_robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .arms import (
-    add_bars,
-    add_disturbances,
-    arms_scene,
-    error_color,
-    error_share,
-    has_shapes,
-    reach,
-    tip_positions,
-)
+from . import arms
 from .legends import pair_colors, pair_symbols
 from .runs import check_run, frame_indices, shown_experiment
 from .scene import Scene
@@ -69,15 +60,15 @@ def scene_of(
     check_run(result, "x", "x_desired", "sync_error", "q", "disturbance")
     robots = _robots(result, experiment, package_dirs)
     frames = frame_indices(result, fps)
-    scene = arms_scene(result, robots, frames, fps)
-    tips, scale = tip_positions(robots, result.q[frames]), _scale(robots)
+    scene = arms.arms_scene(result, robots, frames, fps)
+    tips, scale = arms.tip_positions(robots, result.q[frames]), _scale(robots)
     for i, name in enumerate(result.names):
         scene.add_sphere(f"tip of {name}", BALL * scale, tips[:, i], robot_color(i))
     desired = _desired_tips(result, robots, frames, tips)
     if desired is not None:
         _add_paths(scene, result, desired, LINE * scale)
     _add_bars(scene, result, tips, frames, limit, scale)
-    add_disturbances(scene, result, robots, frames)
+    arms.add_disturbances(scene, result, robots, frames)
     scene.caption = " ".join(_caption(robots, result, desired is not None))
     return scene
 
@@ -104,7 +95,7 @@ def _robots(
 
 def _scale(robots: Sequence[Robot]) -> float:
     """Reach of the arms, as a measure for what is drawn beside them, m."""
-    reaches = [found for robot in robots if (found := reach(robot)) > 0]
+    reaches = [found for robot in robots if (found := arms.reach(robot)) > 0]
     return float(np.median(reaches)) if reaches else NO_REACH
 
 
@@ -117,7 +108,7 @@ def _desired_tips(
     the tips are; those that are left free are as the tips have them.
     """
     if result.x.shape == result.q.shape and np.array_equal(result.x, result.q):
-        return tip_positions(robots, result.x_desired[frames])
+        return arms.tip_positions(robots, result.x_desired[frames])
     axes = {"xyz".index(name): k for k, name in enumerate(result.info["axes"]) if name in ("x", "y", "z")}
     rows, columns = [*axes], [*axes.values()]
     if not axes or np.abs(result.x[frames][..., columns] - tips[..., rows]).max() > AT_TIP:
@@ -139,7 +130,7 @@ def _add_bars(
     scene: Scene, result: Result, tips: np.ndarray, frames: np.ndarray, limit: float | None, scale: float
 ) -> None:
     """Bars of each pair, in its colour until they redden."""
-    share = error_share(result, limit)[0][frames]
+    share = arms.error_share(result, limit)[0][frames]
     names, colors = row_names(result, "sync_error"), pair_colors(result)
     colors = colors if len(colors) > 1 else [ONE_PAIR]
     marks = zip(result.info["pairs"], colors, pair_symbols(result), names, strict=True)
@@ -148,7 +139,7 @@ def _add_bars(
         calm = np.array(read_color(symbol, color)[:3])
         radius = scale * (THIN + share[:, k] * (THICK - THIN))
         lifted = tips + np.array([0.0, 0.0, lifts[k]])
-        add_bars(scene, result, symbol, robots, lifted, radius, error_color(share[:, k], calm))
+        arms.add_bars(scene, result, symbol, robots, lifted, radius, arms.error_color(share[:, k], calm))
         scene.add_legend(f"{symbol}: {name.partition(': ')[2]}", color)
 
 
@@ -175,7 +166,7 @@ def _caption(robots: Sequence[Robot], result: Result, has_paths: bool) -> list[s
     lines = ["Bars between compared tips grow and turn red with the synchronization error."]
     if not has_paths:
         lines.append("Desired paths are not shown: the coordinates are not those of tips.")
-    plain = [name for name, robot in zip(result.names, robots, strict=True) if not has_shapes(robot)]
+    plain = [name for name, robot in zip(result.names, robots, strict=True) if not arms.has_shapes(robot)]
     if plain:
         lines.append(f"Without shapes that can be shown, as plain links: {', '.join(plain)}.")
     return lines

@@ -16,64 +16,8 @@ import numpy as np
 from ..errors import MissingDependencyError
 from .nodes import JSON, TINY
 
-STYLE = """
-body { margin: 0; overflow: hidden; font-family: system-ui, sans-serif; }
-#meshcat-pane { width: 100vw; height: 100vh; overflow: hidden; }
-#words { position: absolute; left: 14px; top: 12px; max-width: min(60vw, 44em); pointer-events: none;
-         color: #1d2733; text-shadow: 0 0 4px #fff, 0 0 4px #fff; }
-#words h1 { margin: 0 0 4px; font-size: 17px; font-weight: 600; }
-#words p { margin: 0 0 3px; font-size: 13px; line-height: 1.35; }
-#words i { display: inline-block; width: 10px; height: 10px; margin: 0 5px 0 0; border-radius: 2px; }
-#words span { display: inline-block; margin-right: 14px; }
-#failure { color: #a40000; font-weight: 600; }
-"""
-
-PLAYER = """
-"use strict";
-var viewer;
-
-async function inflate(line) {
-  const packed = Uint8Array.from(atob(line), c => c.charCodeAt(0));
-  const plain = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-  return new Uint8Array(await new Response(plain).arrayBuffer());
-}
-
-function shade(root) {
-  root.traverse(object => {
-    if (object.isMesh && !object.geometry.attributes.normal) object.geometry.computeVertexNormals();
-  });
-}
-
-function arrangeControls() {
-  const scene = viewer.scene_tree.find(["meshcat"]);
-  const root = scene.find(["<object>"]).object;
-  root.children.forEach(child => scene.add_child(child));
-  viewer.gui.__folders["Scene"].close();
-  viewer.gui.open();
-}
-
-function showTime() {
-  document.getElementById("time").textContent = `t = ${viewer.animator.time.toFixed(2)} s`;
-  requestAnimationFrame(showTime);
-}
-
-async function start() {
-  const lines = document.getElementById("commands").textContent.trim().split("\\n");
-  const commands = await Promise.all(lines.map(inflate));
-  const pane = document.getElementById("meshcat-pane");
-  viewer = new MeshCat.Viewer(pane);
-  viewer.controls.target.fromArray(JSON.parse(pane.dataset.target));
-  commands.forEach(command => viewer.handle_command_bytearray(command));
-  shade(viewer.scene);
-  arrangeControls();
-  if (viewer.animator.duration > 0) showTime();
-}
-
-start().catch(error => {
-  document.getElementById("failure").textContent = `This scene cannot be shown: ${error.message}`;
-  throw error;
-});
-"""
+#: how the words on the page look, and what plays the commands
+STYLE, PLAYER = (Path(__file__).with_name(name).read_text("utf-8") for name in ("scene.css", "scene.js"))
 
 
 def page(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,19 +21,8 @@ from ..errors import InputError, ResultError
 from ..files import whole_file
 from ..renamed import names_elsewhere
 from ..simulation.result import Result
-from .legends import (
-    axis_handles,
-    disturbance_handles,
-    disturbance_windows,
-    legend,
-    legend_rows,
-    line_widths,
-    plain,
-    row_color,
-    row_handles,
-    shortened,
-    text_width,
-)
+from . import legends
+from .legends import plain
 from .panels import DPI, GAP, LEFT, LEGEND, RIGHT, TITLE, WIDTH, stacked_panels
 from .runs import check_run
 from .style import ACCENT, DESIRED, display, line_style, robot_color
@@ -43,34 +33,7 @@ if TYPE_CHECKING:
 
 #: of titles and of labels of axes, points
 TITLE_SIZE, LABEL_SIZE = 10, 9
-_STYLE: Any = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9,
-    "axes.titlesize": TITLE_SIZE,
-    "axes.titley": 1.0,
-    "axes.formatter.limits": (-3, 5),
-    "axes.formatter.useoffset": False,
-    "axes.labelsize": LABEL_SIZE,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": "#e3e6ea",
-    "grid.linewidth": 0.7,
-    "axes.edgecolor": "#8a929c",
-    "xtick.color": "#4a525c",
-    "ytick.color": "#4a525c",
-    "lines.linewidth": 1.4,
-    "lines.solid_capstyle": "round",
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "figure.facecolor": "white",
-    "svg.hashsalt": "synctrl",
-    "svg.fonttype": "path",
-    "path.simplify": True,
-    "path.simplify_threshold": 0.2,
-}
-
+_SIZES: Any = {"axes.titlesize": TITLE_SIZE, "axes.labelsize": LABEL_SIZE, "legend.fontsize": legends.SIZE}
 #: the next levels take twice the time and more for files that are a few kB smaller
 _PNG = {"compress_level": 2}
 
@@ -85,11 +48,19 @@ def style() -> Iterator[None]:
 
     Threads draw one after another, for what matplotlib looks up holds for the whole process.
     """
-    from matplotlib import rc_context, rcParamsDefault
+    from matplotlib import rc_context
 
-    default: Any = {k: v for k, v in rcParamsDefault.items() if k != "backend"}
-    with _drawing, rc_context({**default, **_STYLE}):
+    with _drawing, rc_context({**_look(), **_SIZES}):
         yield
+
+
+@cache
+def _look() -> Any:
+    """The package's own settings, and matplotlib's own for all else."""
+    from matplotlib import rc_params_from_file, rcParamsDefault
+
+    ours = rc_params_from_file(Path(__file__).with_name("figures.mplstyle"), use_default_template=False)
+    return {**{k: v for k, v in rcParamsDefault.items() if k != "backend"}, **ours}
 
 
 def new_figure(
@@ -149,10 +120,10 @@ def joint_trajectories(result: Result, robot: int, *, width: float = WIDTH) -> F
         figure, panels = stacked_panels([COORDINATE] * len(names), above, width)
         for k, panel in enumerate(panels):
             unit = draw_coordinate(panel, result, [robot], k)
-            room = 72 * COORDINATE - text_width(f", {unit}", LABEL_SIZE)
-            panel.set_ylabel(f"{shortened(plain(names[k]), room, LABEL_SIZE)}, {unit}")
+            room = 72 * COORDINATE - legends.text_width(f", {unit}", LABEL_SIZE)
+            panel.set_ylabel(f"{legends.shortened(plain(names[k]), room, LABEL_SIZE)}, {unit}")
         panels[0].set_title(titled(result.names[robot], width), loc="left")
-        legend(figure, panels[0].get_lines())
+        legends.legend(figure, panels[0].get_lines())
     return figure
 
 
@@ -210,14 +181,15 @@ class _Part(NamedTuple):
 def _errors(result: Result, kind: str, what: str, limits: tuple[float, float] | None, width: float) -> Figure:
     parts = _parts(result, kind, limits)
     with style():
-        handles = [*row_handles(result, kind), *axis_handles(result), *disturbance_handles(result)]
+        handles = [*legends.row_handles(result, kind), *legends.axis_handles(result)]
+        handles += legends.disturbance_handles(result)
         room = [GAP if part.times == 1 else TITLE for part in parts]
-        above = [LEGEND * legend_rows(handles, width) + GAP, *room[1:]]
+        above = [LEGEND * legends.legend_rows(handles, width) + GAP, *room[1:]]
         heights = [PANEL if part.times == 1 else MAGNIFIED for part in parts]
         figure, panels = stacked_panels(heights, above, width)
         for panel, part in zip(panels, parts, strict=True):
             _draw_errors(panel, result, kind, what, part)
-        legend(figure, handles)
+        legends.legend(figure, handles)
     return figure
 
 
@@ -244,8 +216,8 @@ def _draw_errors(panel: Axes, result: Result, kind: str, what: str, part: _Part)
     e = factor * getattr(result, kind)
     panel.axhline(0.0, color="#8a929c", linewidth=0.7, zorder=1)
     for a in part.columns:
-        for k, width in enumerate(line_widths(e.shape[1])):
-            color = row_color(result, kind, k)
+        for k, width in enumerate(legends.line_widths(e.shape[1])):
+            color = legends.row_color(result, kind, k)
             panel.plot(result.t, e[:, k, a], ls=line_style(a), color=color, linewidth=width, zorder=2 + k)
     shade_disturbances(panel, result)
     panel.set_ylim(factor * part.low, factor * part.high)
@@ -257,7 +229,7 @@ def _draw_errors(panel: Axes, result: Result, kind: str, what: str, part: _Part)
 def draw_coordinate(panel: Axes, result: Result, robots: Sequence[int], k: int) -> str:
     """Actual and desired values of a coordinate of some robots; returns the unit in which they are drawn."""
     unit, factor = display(result.units("x")[robots[0]][k])
-    for i, width in zip(robots, line_widths(len(robots)), strict=True):
+    for i, width in zip(robots, legends.line_widths(len(robots)), strict=True):
         actual, desired = factor * result.x[:, i, k], factor * result.x_desired[:, i, k]
         panel.plot(result.t, actual, color=robot_color(i), linewidth=width, label="actual")
         panel.plot(result.t, desired, "-.", color=DESIRED, linewidth=1.1, label="desired")
@@ -266,13 +238,13 @@ def draw_coordinate(panel: Axes, result: Result, robots: Sequence[int], k: int) 
 
 def shade_disturbances(panel: Axes, result: Result) -> None:
     """Shade the windows in which torques act from outside."""
-    for window in disturbance_windows(result):
+    for window in legends.disturbance_windows(result):
         panel.axvspan(window["start"], window["stop"], color=ACCENT, alpha=0.12, linewidth=0)
 
 
 def titled(name: str, width: float) -> str:
     """A name as the title of the panels of a figure, `width` inches wide."""
-    return shortened(plain(name), 72 * (width - LEFT - RIGHT), TITLE_SIZE)
+    return legends.shortened(plain(name), 72 * (width - LEFT - RIGHT), TITLE_SIZE)
 
 
 def _read_limits(limits: tuple[float, float]) -> tuple[float, float]:

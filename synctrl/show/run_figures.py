@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from io import BytesIO
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..checks import finite_number
+from ..checks import choice, finite_number
 from ..errors import InputError, SynctrlError
 from ..simulation.result import Result
-from ..simulation.views import FIGURES, find_figure
+from . import plots
 from .legends import columns_that_fit, fitted, legend, legend_rows, plain
 from .panels import GAP, LEFT, LEGEND, RIGHT, TITLE, WIDTH, stacked_panels
-from .plots import columns_by_unit, draw_coordinate, save, shade_disturbances, style, titled
 from .runs import check_run
 from .style import DESIRED, PALETTE, line_style, robot_color
 
@@ -64,7 +64,7 @@ def torques(result: Result, *, width: float = WIDTH) -> Figure:
     curves = []
     for i, robot in enumerate(result.info["robots"]):
         limits = robot.get("torque_limits") or [None] * len(robot["joints"])
-        for unit, columns in columns_by_unit(result.units("tau")[i]).items():
+        for unit, columns in plots.columns_by_unit(result.units("tau")[i]).items():
             curves.append(
                 Curves(
                     result.names[i],
@@ -113,7 +113,7 @@ def paths(result: Result, *, width: float = WIDTH) -> Figure:
 
     check_run(result, "x", "x_desired")
     names = result.info["axes"]
-    with style():
+    with plots.style():
         handles: list[Any] = [
             Line2D([], [], color=robot_color(i), label=plain(name)) for i, name in enumerate(result.names)
         ]
@@ -121,9 +121,9 @@ def paths(result: Result, *, width: float = WIDTH) -> Figure:
         above = [LEGEND * legend_rows(handles, width) + TITLE, *[TITLE] * (len(names) - 1)]
         figure, panels = stacked_panels([COORDINATE] * len(names), above, width)
         for k, panel in enumerate(panels):
-            panel.set_title(titled(names[k], width), loc="left")
-            panel.set_ylabel(draw_coordinate(panel, result, range(len(result.names)), k))
-            shade_disturbances(panel, result)
+            panel.set_title(plots.titled(names[k], width), loc="left")
+            panel.set_ylabel(plots.draw_coordinate(panel, result, range(len(result.names)), k))
+            plots.shade_disturbances(panel, result)
         legend(figure, handles)
     return figure
 
@@ -131,16 +131,16 @@ def paths(result: Result, *, width: float = WIDTH) -> Figure:
 def _figure(result: Result, curves: Sequence[Curves], width: float) -> Figure:
     """A panel for each group of curves, with a title and a legend of its own."""
     room = width - LEFT - RIGHT
-    with style():
+    with plots.style():
         rows = [-(-len(c.names) // columns_that_fit([plain(n) for n in c.names], room)) for c in curves]
         above = [GAP + TITLE + LEGEND * count for count in rows]
         figure, panels = stacked_panels([PANEL] * len(curves), above, width)
         for panel, shown in zip(panels, curves, strict=True):
             handles = _draw(panel, result, shown)
-            shade_disturbances(panel, result)
+            plots.shade_disturbances(panel, result)
             panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), **fitted(handles, room))
             y = 1 + LEGEND * legend_rows(handles, room) / PANEL  # above the legend
-            panel.set_title(titled(shown.title, width), loc="left", y=y)
+            panel.set_title(plots.titled(shown.title, width), loc="left", y=y)
             panel.set_ylabel(shown.label)
     return figure
 
@@ -172,6 +172,16 @@ def _near(tau: np.ndarray, limit: float | None) -> tuple[float, ...]:
     return tuple(sign * limit for sign in (1, -1) if (sign * tau).max() > NEAR * limit)
 
 
+#: the figures that have a name, in the order in which they are shown
+FIGURES: Mapping[str, Callable[..., Figure]] = MappingProxyType(
+    {
+        "tracking_error": plots.tracking_errors,
+        "sync_error": plots.sync_errors,
+        "torque": torques,
+        "path": paths,
+        "estimates": estimates,
+    }
+)
 #: the narrowest figure in which all words have their place, inches
 NARROWEST = 3.0
 
@@ -194,7 +204,7 @@ class Gallery(dict[str, "Figure"]):
         Raises:
             ResultError: a file cannot be written.
         """
-        return [file for name, figure in self.items() for file in save(figure, Path(folder) / name)]
+        return [file for name, figure in self.items() for file in plots.save(figure, Path(folder) / name)]
 
     def _repr_html_(self) -> str:
         """All figures for a notebook, and what is missing."""
@@ -226,13 +236,11 @@ def gallery(result: Result, *names: str, width: float = WIDTH) -> Gallery:
             or a width below `NARROWEST`.
     """
     if not finite_number("width", width) >= NARROWEST:
-        raise InputError(
-            f"expected at least {NARROWEST:g} inches, found {width:g}", subject="width", found=width
-        )
+        raise InputError.expected(f"at least {NARROWEST:g} inches", width, "width")
     found = Gallery(str(result.info["title"]))
     for name in names or FIGURES:
         try:
-            found[name] = find_figure(name)(result, width=width)
+            found[name] = FIGURES[choice("figure", name, tuple(FIGURES))](result, width=width)
         except SynctrlError as error:
             if names or (len(found.missing) + 1 == len(FIGURES)):
                 raise
@@ -245,6 +253,6 @@ def gallery(result: Result, *names: str, width: float = WIDTH) -> Gallery:
 
 def _png(figure: Figure) -> str:
     pixels = BytesIO()
-    with style():
+    with plots.style():
         figure.savefig(pixels, format="png")
     return base64.b64encode(pixels.getvalue()).decode()

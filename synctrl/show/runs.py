@@ -46,9 +46,7 @@ def check_axes(result: Result, *axes: str) -> None:
     """Refuse a run whose coordinates are not those of tips along these axes."""
     if (found := result.info["axes"]) != [*axes]:
         expected = f"{', '.join(axes[:-1])} and {axes[-1]}"
-        raise InputError(
-            f"expected tips along {expected}, found {', '.join(found)}", subject="result", found=found
-        )
+        raise InputError.expected(f"tips along {expected}", found, "result", shown=", ".join(found))
 
 
 def shown_experiment(result: Result, experiment: Experiment | None) -> Experiment:
@@ -67,11 +65,12 @@ def shown_experiment(result: Result, experiment: Experiment | None) -> Experimen
     experiment = experiment_of(result, experiment)
     cell = experiment.cell
     if (cell.n, cell.nv, cell.m) != (*result.q.shape[1:], result.x.shape[2]):
-        raise InputError(
-            f"expected the one that made the result, of {result.q.shape[1]} robots with up to "
-            f"{result.q.shape[2]} joints and {result.x.shape[2]} coordinates, found {cell!r}",
-            subject="experiment",
-            found=(cell.n, cell.nv, cell.m),
+        raise InputError.expected(
+            f"the one that made the result, of {result.q.shape[1]} robots with up to "
+            f"{result.q.shape[2]} joints and {result.x.shape[2]} coordinates",
+            (cell.n, cell.nv, cell.m),
+            "experiment",
+            shown=f"{cell!r}",
         )
     return experiment
 

@@ -291,7 +291,7 @@ class Scene:
         lengths = self._series(name, array.reshape(-1, 1) if array.ndim < 2 else array, 1)
         if lengths.min() < 0:
             found = lengths.min()
-            raise InputError(f"expected no length below 0, found {found:g}", subject=name, found=found)
+            raise InputError.expected("no length below 0", found, name)
         return np.maximum(lengths, TINY)
 
     def _colors(self, name: str, color: ColorLike) -> np.ndarray | None:

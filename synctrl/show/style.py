@@ -76,10 +76,8 @@ def read_color(name: str, color: ColorLike) -> Color:
     try:
         return to_rgba(given)
     except ValueError:
-        raise InputError(
-            f"expected #rrggbb, a name, or three or four numbers, found {given!r}",
-            subject=f"{name}: color",
-            found=given,
+        raise InputError.expected(
+            "#rrggbb, a name, or three or four numbers", given, f"{name}: color"
         ) from None
 
 

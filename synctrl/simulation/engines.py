@@ -227,9 +227,5 @@ def find_engine(engine: str | Engine) -> Engine:
         return getattr(import_module(module), kind)()
     if isinstance(engine, type) or not all(callable(getattr(engine, m, None)) for m in ("refuses", "run")):
         known = ", ".join(map(repr, ENGINES))
-        raise InputError(
-            f"expected one of {known}, or an engine of your own, found {engine!r}",
-            subject="engine",
-            found=engine,
-        )
+        raise InputError.expected(f"one of {known}, or an engine of your own", engine, "engine")
     return engine

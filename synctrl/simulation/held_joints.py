@@ -43,7 +43,7 @@ class Pid:
             gain = finite_array(name, getattr(self, name))
             least = float(gain.min(initial=0.0))
             if least < 0:
-                raise InputError(f"expected gains of at least 0, found {least:g}", subject=name, found=least)
+                raise InputError.expected("gains of at least 0", least, name)
             object.__setattr__(self, name, gain)
 
 
@@ -66,11 +66,7 @@ class HeldJointsPlant(Plant):
 
     def __init__(self, cell: Cell, *, robots: Sequence[Robot], pid: Pid, at: ArrayLike = 0.0, **options: Any):
         if len(robots) != cell.n:
-            raise InputError(
-                f"expected {cell.n}, one per robot of the cell, found {len(robots)}",
-                subject="robots",
-                found=len(robots),
-            )
+            raise InputError.expected(f"{cell.n}, one per robot of the cell", len(robots), "robots")
         super().__init__(cell, robots=robots, **options)
         self.pid = pid
         split = [_split(known, real) for known, real in zip(cell.robots, robots, strict=True)]
@@ -93,11 +89,7 @@ class HeldJointsPlant(Plant):
         self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, hidden: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         if hidden.size != self.hidden0.size:
-            raise InputError(
-                f"expected {self.hidden0.size} numbers of the held joints, found {hidden.size}",
-                subject="state",
-                found=hidden.size,
-            )
+            raise InputError.expected(f"{self.hidden0.size} numbers of the held joints", hidden.size, "state")
         rows = hidden.reshape(-1, 3, self._count)
         held_tau = self._torque(rows)
         state = np.zeros((3, self.cell.n, self._real_nv))

@@ -26,8 +26,7 @@ from .closed_loop import ClosedLoop, State
 from .limits import APPLIED, DampingLog, applied_output, limit_report, saturation_report
 from .memory import check_fits
 from .plant import Output
-from .result import LAYOUT, Result
-from .result_units import array_unit
+from .result import LAYOUT, Result, array_unit
 
 
 class Account(NamedTuple):
@@ -251,7 +250,7 @@ def _version(package: str) -> str:
 
 def _check_names(where: str, entries: Any, taken: Collection[str]) -> None:
     if not isinstance(entries, Mapping):
-        raise InputError(f"expected entries by name, found {entries!r:.80}", subject=where, found=entries)
+        raise InputError.expected("entries by name", entries, where, shown=f"{entries!r:.80}")
     for name in entries:
         if not isinstance(name, str) or not name.isidentifier() or name in taken:
             text = f"expected names that are not taken, found {name!r:.80}"
@@ -271,7 +270,6 @@ def _check_output(where: str, output: Any, lengths: Mapping[str, int]) -> None:
             f"expected an array of floats over {lengths['time']} instants, its unit, and the names of its "
             f"axes, of which the first is 'time', found {output!r:.80}",
             subject=where,
-            found=output,
         )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field, fields
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self
@@ -15,15 +16,16 @@ import numpy as np
 
 from ..checks import count, instance
 from ..errors import InputError, ResultError
+from ..robots.model import TURNS, joined, unit_for
 from .result_file import LAYOUT, check_shape, read_result, shapes, unit_of, write_result
-from .result_units import array_unit, array_units
 from .schema import FORMAT
-from .views import GALLERY, found
 
 __all__ = ["FORMAT", "LAYOUT", "Result", "unit_of"]
 
 #: what the names of outputs begin with in a file
 OUTPUTS = "outputs/"
+#: what draws the figures of a result; imported when it is asked for
+FIGURES = "synctrl.show.run_figures"
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +143,7 @@ class Result:
         Raises:
             InputError: an unknown name, or nothing that can be drawn.
         """
-        return found(*GALLERY)(self, *names, width=width)
+        return import_module(FIGURES).gallery(self, *names, width=width)
 
     def decimated(self, every: int) -> Self:
         """The first of every so many logged instants, and the last; `info["decimated"]` says how many.
@@ -205,14 +207,44 @@ def _check_outputs(result: Result) -> None:
     """Refuse outputs that are not those that info speaks of."""
     described = result.info.get("outputs", {})
     if described.keys() != result.outputs.keys():
-        raise InputError(
-            f"expected those of info['outputs'], {[*described]}, found {[*result.outputs]}",
-            subject="outputs",
-            found=[*result.outputs],
-        )
+        raise InputError.expected(f"those of info['outputs'], {[*described]}", [*result.outputs], "outputs")
     expected = shapes(result.info, len(result.t)) if described else {}
     for name, array in result.outputs.items():
         try:
             check_shape(name, array.dtype, array.shape, expected[f"{OUTPUTS}{name}"])
         except ResultError as error:
             raise InputError(str(error), subject="outputs") from None
+
+
+# -- units: coordinates and joints may differ in theirs ----------------------------------------------------
+
+
+def array_unit(info: Mapping[str, Any], array: str) -> str:
+    """Units of an array, or of an output, in one text: `rad`, or `rad, m` where joints differ."""
+    return joined(unit for row in array_units(info, array) for unit in row)
+
+
+def array_units(info: Mapping[str, Any], array: str) -> tuple[tuple[str, ...], ...]:
+    """Unit of every number of an array, or of an output, at one instant: rows and columns.
+
+    Rows are robots or pairs, columns are coordinates or the robot's own joints; an array of other axes has
+    one unit for all. Results of earlier versions say nothing of joints, which then count as turning.
+    """
+    if array in info.get("outputs", {}):
+        axes, unit = tuple(info["outputs"][array]["axes"]), str(info["outputs"][array]["unit"])
+    else:
+        axes, unit = LAYOUT[array][0], unit_of(array, info["task_unit"], info["weighted_unit"])
+    if axes[1:] == ("robot", "joint"):
+        joints = (robot.get("joint_units") or [TURNS] * len(robot["joints"]) for robot in info["robots"])
+        return tuple(tuple(unit_for(unit, joint) for joint in row) for row in joints)
+    if array in LAYOUT and axes[2:] == ("axis",):
+        rows = len(info["robots"] if axes[1] == "robot" else info["pairs"])
+        return (_of_coordinates(info, array),) * rows
+    return ((unit,),)
+
+
+def _of_coordinates(info: Mapping[str, Any], array: str) -> tuple[str, ...]:
+    count = len(info["axes"])
+    tasks = info.get("axis_units") or [info["task_unit"]] * count
+    weighted = info.get("weighted_units") or [info["weighted_unit"]] * count
+    return tuple(unit_of(array, *pair) for pair in zip(tasks, weighted, strict=True))

@@ -82,7 +82,7 @@ def write_result(path: Path, info: Mapping[str, Any], arrays: Mapping[str, np.nd
         try:
             text = json.dumps(info)
         except (TypeError, ValueError, RecursionError) as error:
-            raise ResultError(f"expected plain data, found {error}", subject="info", found=error) from None
+            raise ResultError.expected("plain data", error, "info", shown=f"{error}") from None
         check_info(read_json(text))
         check_arrays(info, arrays)
         content: dict[str, Any] = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
@@ -165,11 +165,7 @@ def _read_text(archive: zipfile.ZipFile, member: zipfile.ZipInfo | None) -> str:
     with archive.open(member) as stream:
         header = _read_header(stream, member)
         if header.dtype.kind != "U" or header.shape:
-            raise ResultError(
-                f"expected a text, found {header.dtype} of shape {header.shape}",
-                subject="info",
-                found=(str(header.dtype), header.shape),
-            )
+            raise ResultError.expected("a text", (str(header.dtype), header.shape), "info")
         return str(_read_numbers(stream, header))
 
 
@@ -197,11 +193,10 @@ def _read_header(stream: IO[bytes], member: zipfile.ZipInfo) -> Header:
         raise ResultError(f"expected float64, found float{8 * int(width)}", subject=f"{member.filename!a}")
     size = int(width) * (4 if kind == "U" else 1) * prod(shape)
     if len(start) + length + size != member.file_size:
-        raise ResultError(
-            f"expected {size} bytes of an array of shape {shape}, found "
-            f"{member.file_size - length - len(start)}",
-            subject=f"{member.filename!a}",
-            found=member.file_size - length - len(start),
+        raise ResultError.expected(
+            f"{size} bytes of an array of shape {shape}",
+            member.file_size - length - len(start),
+            f"{member.filename!a}",
         )
     return Header(np.dtype(f"{byte_order}{kind}{width}"), "F" if fortran == "True" else "C", shape)
 
@@ -245,11 +240,8 @@ def check_arrays(info: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> N
         check_shape(name, array.dtype, array.shape, expected[name])
         if name in LAYOUT and not np.isfinite(array).all():
             where = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
-            raise ResultError(
-                f"expected finite numbers, found {array[where]} at {where}",
-                subject=f"array '{name}'",
-                found=array[where],
-            )
+            shown = f"{array[where]} at {where}"
+            raise ResultError.expected("finite numbers", array[where], f"array '{name}'", shown=shown)
     _check_times(arrays["t"])
 
 
@@ -278,18 +270,13 @@ def check_shape(name: str, dtype: np.dtype, found: tuple[int, ...], expected: tu
         e is None or e == f for e, f in zip(expected, found, strict=True)
     )
     if not fits or dtype != np.float64:
-        raise ResultError(
-            f"expected float64 of shape {expected}, found {dtype} of shape {found}",
-            subject=f"array '{name}'",
-            found=(str(dtype), found),
-        )
+        kind, shown = (str(dtype), found), f"{dtype} of shape {found}"
+        raise ResultError.expected(f"float64 of shape {expected}", kind, f"array '{name}'", shown=shown)
 
 
 def _check_times(t: np.ndarray) -> None:
     wrong = np.flatnonzero(~(np.abs(t) <= LATEST) | (np.diff(t, prepend=-np.inf) <= 0))
     if wrong.size:
-        raise ResultError(
-            f"expected times that grow, at most {LATEST:g} s, found {t[wrong[0]]} at {wrong[0]}",
-            subject="array 't'",
-            found=t[wrong[0]],
-        )
+        k = wrong[0]
+        growing = f"times that grow, at most {LATEST:g} s"
+        raise ResultError.expected(growing, t[k], "array 't'", shown=f"{t[k]} at {k}")

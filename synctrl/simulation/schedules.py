@@ -16,7 +16,8 @@ import numpy as np
 from ..checks import finite_array, finite_number, index, instance, window
 from ..coupling.cell import Cell
 from ..errors import InputError
-from ..robots.payload import Load, carrying
+from ..robots.payload import Payload as Payload
+from ..robots.payload import carrying
 from ..robots.robot import Robot
 
 
@@ -90,65 +91,9 @@ def _check(cell: Cell, disturbance: Disturbance) -> None:
     instance("disturbances", disturbance, Disturbance, "Disturbance objects")
     nv = cell.robots[index("disturbance, robot", disturbance.robot, cell.n)].nv
     if disturbance.torque.shape not in ((), (nv,)):
-        raise InputError(
-            f"expected a number or shape ({nv},), found {disturbance.torque.shape}",
-            subject="disturbance, torque",
-            found=disturbance.torque.shape,
+        raise InputError.expected(
+            f"a number or shape ({nv},)", disturbance.torque.shape, "disturbance, torque"
         )
-
-
-@dataclass(frozen=True, eq=False)
-class Payload:
-    """A rigid body that a robot carries for start <= t < stop.
-
-    Args:
-        robot: index of the robot, counted from 0.
-        mass: kg.
-        com: centre of mass in the frame, (3,), m.
-        inertia: about the centre of mass in the frame's axes, (3, 3), or (3,) for its diagonal, kg·m^2; by
-            default that of a uniform ball of the density of water.
-        frame: name of the frame that holds it; by default the robot's tip.
-        start, stop: when it is picked up and put down, s; by default it is there from the beginning, and is
-            not put down.
-
-    Raises:
-        InputError: numbers that no body can have, or a window that is empty or starts before 0.
-    """
-
-    robot: int
-    mass: float
-    com: Any = (0.0, 0.0, 0.0)
-    inertia: Any = None
-    frame: str | None = None
-    start: float = 0.0
-    stop: float | None = None
-
-    def __post_init__(self) -> None:
-        load = Load(self.mass, self.com, self.inertia, self.frame)
-        for name in ("mass", "com", "inertia"):
-            object.__setattr__(self, name, getattr(load, name))
-        window("payload", self.start, self.stop)
-
-    @property
-    def load(self) -> Load:
-        """The body."""
-        return Load(self.mass, self.com, self.inertia, self.frame)
-
-    def carried_at(self, t: float) -> bool:
-        """Whether the robot has it at time t; at an edge from the right."""
-        return self.start <= t and (self.stop is None or t < self.stop)
-
-    def as_dict(self) -> dict[str, Any]:
-        """The payload as plain data."""
-        return {
-            "robot": int(self.robot),
-            "mass": float(self.mass),
-            "com": self.com.tolist(),
-            "inertia": self.inertia.tolist(),
-            "frame": self.frame,
-            "start": float(self.start),
-            "stop": None if self.stop is None else float(self.stop),
-        }
 
 
 class PayloadSchedule(Windows):
@@ -182,5 +127,5 @@ class PayloadSchedule(Windows):
 def _loaded(robot: Robot, i: int, payloads: Sequence[Payload], t: float) -> Robot:
     for payload in payloads:
         if payload.robot == i and payload.carried_at(t):
-            robot = carrying(robot, payload.load)
+            robot = carrying(robot, payload)
     return robot

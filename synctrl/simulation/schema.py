@@ -33,7 +33,7 @@ def read_json(text: str) -> Any:
     try:
         data = json.loads(text, object_pairs_hook=_once)
     except (ValueError, RecursionError) as error:
-        raise ResultError(f"expected JSON, found {error}", subject="info", found=error) from None
+        raise ResultError.expected("JSON", error, "info", shown=f"{error}") from None
     anything("info", data, {})
     return data
 
@@ -167,7 +167,7 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _refuse(where: str, expected: str, found: Any) -> NoReturn:
-    raise ResultError(f"expected {expected}, found {found!a:.80}", subject=where, found=found)
+    raise ResultError.expected(expected, found, where, shown=f"{found!a:.80}")
 
 
 # -- info of a result --------------------------------------------------------------------------------------
@@ -262,16 +262,17 @@ def check_info(info: Any) -> None:
     """
     form = info.get("format") if isinstance(info, dict) else type(info).__name__
     if form not in FORMATS:
-        raise ResultError(f"expected the format '{FORMAT}', found {form!a:.80}", found=form)
+        raise ResultError.expected(f"the format '{FORMAT}'", form, shown=f"{form!a:.80}")
     entries({"sizes": SIZES})("info", info, {})
     INFO("info", info, info["sizes"])
     _check_robots(info["robots"], info["sizes"])
     for name, about in info.get("outputs", {}).items():
         if not name.isidentifier() or about["axes"][0] != "time":
-            raise ResultError(
-                f"expected an identifier with 'time' as its first axis, found {about['axes']!a:.80}",
-                subject=f"info, outputs, {name}",
-                found=about["axes"],
+            raise ResultError.expected(
+                "an identifier with 'time' as its first axis",
+                about["axes"],
+                f"info, outputs, {name}",
+                shown=f"{about['axes']!a:.80}",
             )
 
 
@@ -285,9 +286,9 @@ def _check_robots(robots: list[dict[str, Any]], sizes: Mapping[str, int]) -> Non
         fits = found["joints"] <= sizes["joint"] and found["parameters"] <= sizes["parameter"]
         per_joint = {found.get(name, found["joints"]) for name in ("torque_limits", "joint_units")}
         if not fits or found["theta"] != found["parameters"] or per_joint != {found["joints"]}:
-            raise ResultError(
-                "expected as many theta as parameters, and torque_limits and joint_units as joints, up to "
-                f"{sizes['parameter']} and {sizes['joint']}, found {found}",
-                subject=f"info, robots[{k}]",
-                found=found,
+            raise ResultError.expected(
+                "as many theta as parameters, and torque_limits and joint_units as joints, up to "
+                f"{sizes['parameter']} and {sizes['joint']}",
+                found,
+                f"info, robots[{k}]",
             )

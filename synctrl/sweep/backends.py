@@ -13,6 +13,7 @@ from traceback import walk_stack
 from types import ModuleType
 from typing import Any
 
+from ..checks import instance
 from ..errors import InputError, MissingDependencyError, SweepError
 from .worker import Job, Outcome, Runner, Task, run_batch
 
@@ -93,12 +94,8 @@ def _connected(client: Any, workers: int) -> Iterator[Any]:
     if isinstance(client, Client):
         yield client
         return
-    if client is not None and not isinstance(client, str):
-        raise InputError(
-            f"expected a Dask client or an address, found {type(client).__name__}",
-            subject="client",
-            found=type(client).__name__,
-        )
+    if client is not None:
+        instance("client", client, str, "a Dask client or an address")
     with contextlib.ExitStack() as stack:
         if client is None:
             client = stack.enter_context(_local_cluster(workers))

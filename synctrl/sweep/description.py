@@ -97,11 +97,7 @@ def row_format(about: Mapping[str, Any]) -> Format:
     measures = FORMATS[about["format"]]
     expected = columns(factors, measures)
     if about.get("columns") != expected:
-        raise InputError(
-            f"expected {expected}, found {about.get('columns')!r}",
-            subject="columns",
-            found=about.get("columns"),
-        )
+        raise InputError.expected(f"{expected}", about.get("columns"), "columns")
     duration = positive_number("duration", about.get("duration"))
     if "search" in about:
         instance("search", about["search"], Mapping, "a description of the search")
@@ -109,11 +105,7 @@ def row_format(about: Mapping[str, Any]) -> Format:
         return Format(expected, Generations(factors, population), duration, measures)
     draws = Draws(factors, count("samples", about.get("samples")), count("seed", about.get("seed"), least=0))
     if about.get("runs") != draws.count:
-        raise InputError(
-            f"expected {draws.count}, as the factors say, found {about.get('runs')!r}",
-            subject="runs",
-            found=about.get("runs"),
-        )
+        raise InputError.expected(f"{draws.count}, as the factors say", about.get("runs"), "runs")
     return Format(expected, draws, duration, measures)
 
 
@@ -124,9 +116,7 @@ def checked_bands(bands: Any) -> dict[str, Band]:
         InputError: other kinds, or values that are no band.
     """
     if not isinstance(bands, Mapping) or set(bands) != set(ERRORS):
-        raise InputError(
-            f"expected numbers for {' and '.join(ERRORS)}, found {bands!r}", subject="bands", found=bands
-        )
+        raise InputError.expected(f"numbers for {' and '.join(ERRORS)}", bands, "bands")
     return {kind: checked_band(f"bands, {kind}", bands[kind]) for kind in ERRORS}
 
 

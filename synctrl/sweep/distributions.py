@@ -42,11 +42,7 @@ class _Interval:
         for name in ("low", "high"):
             object.__setattr__(self, name, finite_number(f"{kind}, {name}", getattr(self, name)))
         if not self.low < self.high:
-            raise InputError(
-                f"expected low < high, found {self.low:g} and {self.high:g}",
-                subject=kind,
-                found=(self.low, self.high),
-            )
+            raise InputError.expected("low < high", (self.low, self.high), kind)
 
     def at(self, share: float) -> float:
         """The value below which a share of the distribution lies, 0 <= share <= 1."""
@@ -118,14 +114,10 @@ class _Listed:
     def __init__(self, values: Sequence[Any]):
         kind = type(self).__name__
         if isinstance(values, str) or not len(values):
-            raise InputError(
-                f"expected a list of numbers, words or parts, found {values!r}", subject=kind, found=values
-            )
+            raise InputError.expected("a list of numbers, words or parts", values, kind)
         self.values = tuple(_plain(kind, part_label(value) if is_part(value) else value) for value in values)
         if len(set(self.values)) != len(self.values):
-            raise InputError(
-                f"expected different values, found {list(self.values)}", subject=kind, found=list(self.values)
-            )
+            raise InputError.expected("different values", list(self.values), kind)
         self.meant: Mapping[Value, Any] = dict(zip(self.values, values, strict=True))
 
     def describe(self) -> dict[str, Any]:
@@ -215,10 +207,8 @@ def part_label(part: Any) -> str:
     try:
         text = {name: json.dumps(x, ensure_ascii=False, allow_nan=False) for name, x in settings.items()}
     except (TypeError, ValueError) as error:
-        raise InputError(
-            f"expected settings that are plain data from as_dict, found {settings!r}",
-            subject=type(part).__name__,
-            found=settings,
+        raise InputError.expected(
+            "settings that are plain data from as_dict", settings, type(part).__name__
         ) from error
     return f"{settings['name']}({', '.join(f'{key}={text[key]}' for key in settings if key != 'name')})"
 
@@ -233,9 +223,7 @@ def _plain(name: str, value: Any) -> Value:
     if not isinstance(value, str):
         return finite_number(name, value)
     if not is_text(value):
-        raise InputError(
-            f"expected a word that can be written to a file, found {value!a}", subject=name, found=value
-        )
+        raise InputError.expected("a word that can be written to a file", value, name, shown=f"{value!a}")
     return str(value)
 
 

@@ -61,20 +61,14 @@ class Factor:
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():
-            raise InputError(f"expected a name, found {self.name!r}", subject="factor", found=self.name)
+            raise InputError.expected("a name", self.name, "factor")
         needed = ("describe",) if isinstance(self.values, Grid) else ("draw", "describe")
         if not all(callable(getattr(self.values, method, None)) for method in needed):
-            raise InputError(
-                f"expected a distribution, which has draw and describe, or a Grid, found {self.values!r}",
-                subject=f"factor '{self.name}'",
-                found=self.values,
+            raise InputError.expected(
+                "a distribution, which has draw and describe, or a Grid", self.values, f"factor '{self.name}'"
             )
         if not callable(self.change):
-            raise InputError(
-                f"expected a function, found {self.change!r}",
-                subject=f"factor '{self.name}'",
-                found=self.change,
-            )
+            raise InputError.expected("a function", self.change, f"factor '{self.name}'")
 
     def apply(self, setup: Setup, value: Value) -> Setup:
         """The setup with this factor at a value.
@@ -198,9 +192,7 @@ def _part(name: str, values: Grid | Choice) -> Factor:
     instance(name, values, (Grid, Choice), f"a Grid or a Choice of kinds of {name}")
     for value in values.meant.values():
         if not is_part(value):
-            raise InputError(
-                f"expected parts with bind and as_dict, found {value!r}", subject=name, found=value
-            )
+            raise InputError.expected("parts with bind and as_dict", value, name)
     return Factor(name, values, partial(variations.with_part, part=name, meant=values.meant))
 
 

@@ -269,9 +269,6 @@ def _checked_factors(factors: Sequence[Factor]) -> tuple[Factor, ...]:
         raise InputError("expected at least one, found none", subject="factors")
     varied = {"Gamma", "Gamma_scale"} & {*names}
     if "adaptation" in names and varied:
-        raise InputError(
-            "an adaptation takes the place of the gain Gamma, so expected one of the two, found "
-            f"'adaptation' and '{min(varied)}'",
-            subject="factors",
-        )
+        one = "one of both, for an adaptation takes the place of the gain Gamma"
+        raise InputError.expected(one, ("adaptation", min(varied)), "factors")
     return tuple(factors)

@@ -179,11 +179,7 @@ def _checked(
     space = CartesianSpace() if space is None else space
     instance("robot", robot, Robot, "a Robot, for example from load_robot")
     if isinstance(space, type) or not hasattr(space, "miss"):
-        raise InputError(
-            f"expected a CartesianSpace, a PoseSpace or another with `miss`, found {space!r}",
-            subject="space",
-            found=space,
-        )
+        raise InputError.expected("a CartesianSpace, a PoseSpace or another with `miss`", space, "space")
     m = len(space.labels((robot,)))
     return space, finite_array("target", target, (m,)), finite_array("q", q, (robot.nv,))
 

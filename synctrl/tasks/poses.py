@@ -7,7 +7,8 @@ derivative of the rotation vector.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, finite_number, instance, offers, positive_number
 from ..errors import InputError
 from . import rotations
-from .trajectories import Cubic, Hold, Motion, Trajectory, value_at
+from .trajectories import Certified, Cubic, Hold, Motion, Trajectory, functions_of_time, instants, values_at
 
 
 class Turning(NamedTuple):
@@ -116,26 +117,40 @@ class FunctionOrientation:
         acceleration: Callable[[float], ArrayLike],
         breaks: tuple[float, ...] = (),
     ):
-        self._functions = (rotation, velocity, acceleration)
-        for name, function in zip(("rotation", "velocity", "acceleration"), self._functions, strict=True):
-            instance(name, function, Callable, "a function of time")  # type: ignore[arg-type]
-        self.breaks = tuple(finite_array("breaks", breaks, (None,)).tolist())
+        self._functions = functions_of_time(rotation=rotation, velocity=velocity, acceleration=acceleration)
+        self.breaks = instants(breaks)
         self(0.0)
 
     def __call__(self, t: ArrayLike) -> Turning:
-        times = np.asarray(t, dtype=float)
-        rows = [self._at(float(tk)) for tk in times.ravel()]
-        R, w, w_dot = (np.array(part) for part in zip(*rows, strict=True))
-        shape = times.shape
-        return Turning(R.reshape(*shape, 3, 3), w.reshape(*shape, 3), w_dot.reshape(*shape, 3))
+        rotation, *rates = self._functions.items()
+        R = values_at(*rotation, t, (3, 3), rotations.rotation_matrix)
+        return Turning(R, *(values_at(*rate, t, (3,)) for rate in rates))
 
-    def _at(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        rotation, velocity, acceleration = self._functions
-        return (
-            value_at("rotation", rotation, t, rotations.rotation_matrix),
-            value_at("velocity", velocity, t, finite_array, (3,)),
-            value_at("acceleration", acceleration, t, finite_array, (3,)),
-        )
+
+class SmoothOrientation(Certified):
+    """A desired orientation given by a Python function of one time for its rotation alone.
+
+    The angular velocity is that of R' = [w] R, in world axes.
+
+    Args:
+        rotation: function of t returning a rotation matrix, (3, 3); smooth between the breaks.
+        duration, breaks: see `SmoothTrajectory`.
+
+    Raises:
+        InputError: no function, a duration that is not positive, or breaks that are no numbers.
+        TrajectoryError: no rotation matrices, or not smooth enough for a relative error of 1e-8; or a time,
+            in a later call, that is outside the duration.
+    """
+
+    def __init__(self, rotation: Callable[[float], ArrayLike], duration: float, breaks: Sequence[float] = ()):
+        functions_of_time(rotation=rotation)
+        at = partial(values_at, "rotation", rotation, shape=(3, 3), check=rotations.rotation_matrix)
+        super().__init__(lambda t: at(t)[None], duration, breaks)
+
+    def __call__(self, t: ArrayLike) -> Turning:
+        R, R_dot, R_ddot = self._at(t)
+        w, w_dot = _axial(R_dot @ R.mT), _axial(R_ddot @ R.mT + R_dot @ R_dot.mT)
+        return Turning(1.5 * R - 0.5 * R @ R.mT @ R, w, w_dot)  # the rotation next to R: a step of Newton's
 
 
 class PoseTrajectory:
@@ -205,7 +220,13 @@ def _check_dimension(name: str, trajectory: Any, m: int) -> None:
     if dimension != m:
         numbers = f"{m} number{'s' * (m != 1)}"
         found = repr(trajectory) if dimension is None else f"one of {dimension}"
-        raise InputError(f"expected a trajectory of {numbers}, found {found}", subject=name, found=dimension)
+        raise InputError.expected(f"a trajectory of {numbers}", dimension, name, shown=found)
+
+
+def _axial(A: np.ndarray) -> np.ndarray:
+    """The w of the skew part of A = [w], (..., 3, 3) -> (..., 3)."""
+    skew = 0.5 * (A - A.mT)
+    return np.stack((skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]), axis=-1)
 
 
 def _unit(name: str, vector: ArrayLike) -> np.ndarray:

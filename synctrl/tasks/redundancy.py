@@ -69,9 +69,7 @@ class Redundancy:
         weights = _rows("weights", self.weights, robots, 1.0)
         if any((row <= 0).any() for row in weights):
             lowest = min(map(min, weights))
-            raise InputError(
-                f"expected numbers above 0, found {lowest}", subject="redundancy, weights", found=lowest
-            )
+            raise InputError.expected("numbers above 0", lowest, "redundancy, weights")
         gain = 0.0 if self.posture is None else self.gain
         posture = _rows("posture", self.posture, robots, 0.0)
         gains = [np.full(robot.nv, gain) for robot in robots]
@@ -255,14 +253,10 @@ def _rows(name: str, value: ArrayLike | None, robots: Sequence[Robot], default: 
     where = f"redundancy, {name}"
     given: Any = list(value) if isinstance(value, np.ndarray) and value.ndim else value
     if not isinstance(given, (list, tuple)) or not len(given) or np.ndim(given[0]) > 1:
-        raise InputError(
-            f"expected one row of numbers, or a list of rows, found {value!r}", subject=where, found=value
-        )
+        raise InputError.expected("one row of numbers, or a list of rows", value, where)
     rows = given if np.ndim(given[0]) else [given] * len(robots)
     if len(rows) != len(robots):
-        raise InputError(
-            f"expected {len(robots)} rows, one per robot, found {len(rows)}", subject=where, found=len(rows)
-        )
+        raise InputError.expected(f"{len(robots)} rows, one per robot", len(rows), where)
     return [
         finite_array(f"{where} of '{robot.name}'", row, (robot.nv,))
         for robot, row in zip(robots, rows, strict=True)

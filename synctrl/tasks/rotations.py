@@ -124,7 +124,7 @@ def rotation_matrix(name: str, value: ArrayLike) -> np.ndarray:
     off = float(np.abs(R @ R.T - _EYE).max())
     if off > 1e-6 or np.linalg.det(R) < 0:
         kind = "a reflection" if off <= 1e-6 else f"one whose R R^T differs from 1 by {off:.2g}"
-        raise InputError(f"expected a rotation matrix, found {kind}", subject=name, found=kind)
+        raise InputError.expected("a rotation matrix", kind, name, shown=kind)
     return R
 
 

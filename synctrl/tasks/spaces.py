@@ -273,9 +273,7 @@ class CartesianSpace(TipSpace):
         redundancy: Redundancy | None = None,
     ):
         if not isinstance(axes, str) or not axes or set(axes) - set(AXES) or len(set(axes)) != len(axes):
-            raise InputError(
-                f"expected different letters out of x, y, z, found {axes!r}", subject="axes", found=axes
-            )
+            raise InputError.expected("different letters out of x, y, z", axes, "axes")
         super().__init__(len(axes), max_condition, singularity, redundancy)
         self.axes = axes
         self.rows = [AXES.index(a) for a in axes]

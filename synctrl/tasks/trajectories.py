@@ -6,15 +6,19 @@ A trajectory is called with one time or with an array of times and returns `Moti
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array, finite_number, instance, positive_number
 from ..errors import InputError, TrajectoryError
+from .chebyshev import Function, NotSmoothError, fit_smooth
 
+#: factors, (...), and a vector, (m,) -> the vector times each of them, (..., m)
+_times = np.multiply.outer
 #: what a `Motion` has, in words
 MOTION_PARTS = ("position", "velocity", "acceleration")
 
@@ -140,9 +144,8 @@ class Circle:
         self.center = finite_array("center", center, (None,))
         self.dimension = m = self.center.size
         if m < 2:
-            raise TrajectoryError(
-                f"a circle needs a task of at least 2 dimensions, found {m}", subject="center", found=m
-            )
+            few = f"a circle needs a task of at least 2 dimensions, found {m}"
+            raise TrajectoryError(few, subject="center", found=m)
         self.radius = positive_number("radius", radius)
         self.speed = finite_number("speed", speed)
         self.phase = finite_number("phase", phase)
@@ -150,11 +153,7 @@ class Circle:
         self.second = finite_array("second", np.eye(m)[1] if second is None else second, (m,))
         axes = np.array([self.first, self.second])
         if not np.allclose(axes @ axes.T, np.eye(2), atol=1e-9):
-            raise TrajectoryError(
-                f"expected orthonormal axes, found {self.first} and {self.second}",
-                subject="first, second",
-                found=(self.first, self.second),
-            )
+            raise TrajectoryError.expected("orthonormal axes", axes, "first, second")
 
     def __call__(self, t: ArrayLike) -> Motion:
         w = self.speed
@@ -185,40 +184,112 @@ class FunctionTrajectory:
         acceleration: Callable[[float], ArrayLike],
         breaks: tuple[float, ...] = (),
     ):
-        self._functions = dict(zip(MOTION_PARTS, (position, velocity, acceleration), strict=True))
-        for name, function in self._functions.items():
-            instance(name, function, Callable, "a function of time")  # type: ignore[arg-type]
-        self.breaks = tuple(finite_array("breaks", breaks, (None,)).tolist())
+        self._functions = functions_of_time(position=position, velocity=velocity, acceleration=acceleration)
+        self.breaks = instants(breaks)
         self.dimension = np.size(position(0.0))
         self(0.0)
 
     def __call__(self, t: ArrayLike) -> Motion:
-        times = np.asarray(t, dtype=float)
-        parts = [
-            [value_at(name, function, tk, finite_array, (self.dimension,)) for tk in times.ravel().tolist()]
-            for name, function in self._functions.items()
-        ]
-        return Motion(*(np.array(part).reshape(*times.shape, self.dimension) for part in parts))
+        return Motion(*(values_at(*named, t, (self.dimension,)) for named in self._functions.items()))
 
 
-def value_at(name: str, function: Callable, t: float, check: Callable, *expected: Any) -> np.ndarray:
-    """What a function of one time gives at t, checked.
+class Certified:
+    """What one function of time says alone, with two derivatives that are found and certified.
+
+    Between its breaks it becomes Chebyshev polynomials, see `chebyshev`, whose derivatives are exact. They
+    are off by at most 1e-8 of its size times its fastest rate, or it is refused.
 
     Args:
-        name: of the function, for messages.
-        function: of t.
-        t: s.
-        check: `finite_array` or another that raises an `InputError`, called with name, value and `expected`.
+        function: of time, in s; gives matrices, (1, a, b).
+        duration: it can be used from 0 to this time, s.
+        breaks: instants at which a derivative jumps, s.
 
     Raises:
-        TrajectoryError: what `check` refuses; with the time.
+        InputError: a duration that is not positive, or breaks that are no numbers.
+        TrajectoryError: a function that is not smooth enough.
     """
-    try:
-        return check(name, function(t), *expected)
-    except InputError as error:
-        raise TrajectoryError(f"{error} at t = {t:g} s").about(name, found=error.found, time=t) from error
+
+    def __init__(self, function: Function, duration: float, breaks: Sequence[float]):
+        self.breaks = instants(breaks)
+        try:
+            self._function = fit_smooth(function, positive_number("duration", duration), self.breaks)
+        except NotSmoothError as error:
+            raise TrajectoryError(
+                f"the {MOTION_PARTS[error.order]} cannot be found: {error}, with `breaks` where a derivative "
+                "jumps"
+            ).about(MOTION_PARTS[error.order], time=error.time) from None
+        self.duration = self._function.duration
+
+    def _at(self, t: ArrayLike) -> np.ndarray:
+        """Value and two derivatives, (3, ..., a, b), at times, s; at a break from the right."""
+        times = np.asarray(t, dtype=float)
+        outside = self._function.first_outside(times.ravel())
+        if outside is not None:
+            raise TrajectoryError(
+                f"expected a time from 0 to {self.duration:g} s, for which the motion was made, found "
+                f"t = {outside:g} s; make it for a longer duration"
+            ).about("t", found=outside)
+        found = self._function.at(times.ravel())[:, :, 0]
+        return found.reshape(3, *times.shape, *found.shape[2:])
 
 
-def _times(factor: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """factor (...) times vector (m,) -> (..., m)."""
-    return np.asarray(factor)[..., None] * vector
+class SmoothTrajectory(Certified):
+    """A desired motion given by a Python function of one time for its position alone.
+
+    Args:
+        position: function of t returning (m,); smooth between the breaks.
+        duration: it can be used from 0 to this time, s.
+        breaks: instants at which a derivative jumps, s.
+
+    Raises:
+        InputError: no function, a duration that is not positive, or breaks that are no numbers.
+        TrajectoryError: not finite vectors of one size, or not smooth enough for a relative error of 1e-8; or
+            a time, in a later call, that is outside the duration.
+    """
+
+    def __init__(self, position: Callable[[float], ArrayLike], duration: float, breaks: Sequence[float] = ()):
+        functions_of_time(position=position)
+        self.dimension = int(np.size(position(0.0)))
+        shape = (self.dimension,)
+        super().__init__(lambda t: values_at("position", position, t, shape)[None, :, None], duration, breaks)
+
+    def __call__(self, t: ArrayLike) -> Motion:
+        return Motion(*self._at(t)[..., 0])
+
+
+# -- functions of a user's own -----------------------------------------------------------------------------
+
+
+def functions_of_time(**functions: Callable) -> dict[str, Callable]:
+    """Functions by name, all of which are some: an `InputError` has the name of one that is not."""
+    for name, function in functions.items():
+        instance(name, function, Callable, "a function of time")  # type: ignore[arg-type]
+    return functions
+
+
+def instants(breaks: ArrayLike) -> tuple[float, ...]:
+    """Breaks as numbers, s."""
+    return tuple(finite_array("breaks", breaks, (None,)).tolist())
+
+
+def values_at(
+    name: str, function: Callable, t: ArrayLike, shape: tuple[int, ...], check: Callable | None = None
+) -> np.ndarray:
+    """What a function of one time gives at t, s, one time or many, (...): finite arrays, (..., *shape).
+
+    Args:
+        name, function, shape: what messages call it, and the shape of its values.
+        t: s.
+        check: called with name and value in the place of `finite_array`, if they have to be more than finite.
+
+    Raises:
+        TrajectoryError: what is refused by an `InputError`; with the time.
+    """
+    read, times, found = check or partial(finite_array, shape=shape), np.asarray(t, dtype=float), []
+    for tk in times.ravel().tolist():
+        try:
+            found.append(read(name, function(tk)))
+        except InputError as error:
+            failure = TrajectoryError(f"{error} at t = {tk:g} s")
+            raise failure.about(name, found=error.found, time=tk) from error
+    return np.array(found).reshape(*times.shape, *shape)

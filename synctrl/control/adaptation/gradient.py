@@ -81,9 +81,7 @@ def chosen(Gamma: np.ndarray | RaggedGain | None, adaptation: Adaptation | None)
         return Gradient(Gamma)
     if adaptation is None or Gamma is not None:
         found = "neither" if adaptation is None else "both"
-        raise InputError(
-            f"expected the gain Gamma or an adaptation, found {found}", subject="adaptation", found=found
-        )
+        raise InputError.expected("the gain Gamma or an adaptation", found, "adaptation", shown=found)
     if not hasattr(adaptation, "bind") or isinstance(adaptation, type):
         raise InputError(
             f"expected, for example, Gradient(0.3), found {adaptation!r}",

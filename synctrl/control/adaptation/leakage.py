@@ -133,8 +133,4 @@ def read_rate(rate: Any) -> Rate:
         return rate
     if isinstance(rate, (int, float, np.number)):
         return Sigma(positive_number("rate", rate))
-    raise InputError(
-        f"expected a number in 1/s, or for example Switching(1.0, radius=2.0), found {rate!r}",
-        subject="rate",
-        found=rate,
-    )
+    raise InputError.expected("a number in 1/s, or for example Switching(1.0, radius=2.0)", rate, "rate")

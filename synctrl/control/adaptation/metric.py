@@ -101,9 +101,7 @@ def read_metric(Gamma: Any) -> Gain:
         return tuple(_read_matrix(f"Gamma of robot {i}", matrix) for i, matrix in enumerate(Gamma, 1))
     gain = read_gain("Gamma", Gamma)
     if gain.size and gain.min() < 0:
-        raise InputError(
-            f"expected entries of at least 0, found {gain.min():g}", subject="Gamma", found=float(gain.min())
-        )
+        raise InputError.expected("entries of at least 0", gain.min(), "Gamma")
     return gain
 
 
@@ -118,11 +116,7 @@ def make_metric(gain: Gain, sizes: Sequence[int]) -> DiagonalMetric | FullMetric
     matrices = gain * len(sizes) if len(gain) == 1 else gain
     found, expected = tuple(len(matrix) for matrix in matrices), tuple(sizes)
     if found != expected:
-        raise InputError(
-            f"expected a matrix for each robot, with rows {expected}, found {found}",
-            subject="Gamma",
-            found=found,
-        )
+        raise InputError.expected(f"a matrix for each robot, with rows {expected}", found, "Gamma")
     full = np.zeros((len(sizes), max(sizes), max(sizes)))
     for matrix, place in zip(matrices, full, strict=True):
         place[: len(matrix), : len(matrix)] = matrix
@@ -155,15 +149,14 @@ def _read_matrix(name: str, matrix: ArrayLike) -> np.ndarray:
         )
     if np.diagonal(Gamma).min() < 0:
         lowest = float(np.diagonal(Gamma).min())
-        raise InputError(f"expected a diagonal of at least 0, found {lowest:g}", subject=name, found=lowest)
+        raise InputError.expected("a diagonal of at least 0", lowest, name)
     D = _scale(Gamma)
     scaled = Gamma / np.outer(D, D)
     if np.abs(scaled - scaled.T).max() > ROUNDING:
         raise InputError("expected a symmetric matrix, found one that is not", subject=name)
     lowest = float(np.linalg.eigvalsh(scaled)[0])
     if lowest < -ROUNDING * len(Gamma):
-        expected = "expected no eigenvalue below 0 once the diagonal is scaled to ones"
-        raise InputError(f"{expected}, found {lowest:g}", subject=name, found=lowest)
+        raise InputError.expected("no eigenvalue below 0 once the diagonal is scaled to ones", lowest, name)
     return (Gamma + Gamma.T) / 2
 
 

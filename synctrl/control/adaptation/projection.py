@@ -99,11 +99,7 @@ class Ball:
             InputError: Gamma or radii of another size.
         """
         if self.radius.shape not in ((), (cell.n,)):
-            raise InputError(
-                f"expected a number or shape ({cell.n},), found {self.radius.shape}",
-                subject="radius",
-                found=self.radius.shape,
-            )
+            raise InputError.expected(f"a number or shape ({cell.n},)", self.radius.shape, "radius")
         return BoundBall(cell, metric_of(self.Gamma, cell), np.broadcast_to(self.radius, cell.n))
 
     def as_dict(self) -> dict[str, Any]:
@@ -178,8 +174,6 @@ def _check_box(cell: Cell, lower: np.ndarray, upper: np.ndarray) -> None:
                     found=(low, high),
                 )
             if not low <= first <= high:
-                raise InputError(
-                    f"expected theta_hat0 of {what} from {low:g} to {high:g}, found {first:g}",
-                    subject=f"{name}, Box",
-                    found=first,
+                raise InputError.expected(
+                    f"theta_hat0 of {what} from {low:g} to {high:g}", first, f"{name}, Box"
                 )

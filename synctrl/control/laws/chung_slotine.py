@@ -41,11 +41,7 @@ class ChungSlotine:
     def __init__(self, K_2: ArrayLike):
         self.K_2 = finite_array("K_2", K_2)
         if self.K_2.size and self.K_2.min() < 0:
-            raise InputError(
-                f"expected entries of at least 0, found {self.K_2.min():g}",
-                subject="K_2",
-                found=self.K_2.min(),
-            )
+            raise InputError.expected("entries of at least 0", self.K_2.min(), "K_2")
 
     def scaled(self, factor: float) -> ChungSlotine:
         """This law with K_2 multiplied."""

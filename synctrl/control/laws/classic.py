@@ -111,9 +111,7 @@ class PDGravity:
     def __init__(self, K_p: ArrayLike):
         self.K_p = finite_array("K_p", K_p)
         if not self.K_p.size or not self.K_p.min() > 0:
-            raise InputError(
-                f"expected entries above 0, found {self.K_p.tolist()}", subject="K_p", found=self.K_p.tolist()
-            )
+            raise InputError.expected("entries above 0", self.K_p.tolist(), "K_p")
 
     def scaled(self, factor: float) -> PDGravity:
         """This law with K_p multiplied."""

@@ -41,11 +41,7 @@ class MasterSlave:
 
     def bind(self, cell: Cell, gains: Gains) -> BoundMasterSlave:
         if isinstance(self.master, bool) or self.master not in range(cell.n):
-            raise InputError(
-                f"expected a robot from 0 to {cell.n - 1}, found {self.master!r}",
-                subject="master",
-                found=self.master,
-            )
+            raise InputError.expected(f"a robot from 0 to {cell.n - 1}", self.master, "master")
         return BoundMasterSlave(alone(self, gains, cell.m), _common(cell, self.master), self.master)
 
     def as_dict(self) -> dict[str, Any]:

@@ -56,10 +56,7 @@ def _agreed(name: str, given: str | None, law: Law, otherwise: str) -> str:
     """An option of a law, which the one given beside it must not contradict."""
     own = getattr(law, name, otherwise)
     if given not in (None, own):
-        raise InputError(
-            f"expected {own!r}, which is what the law {type(law).__name__} has, or nothing beside "
-            f"it, found {given!r}",
-            subject=name,
-            found=given,
+        raise InputError.expected(
+            f"{own!r}, which is what the law {type(law).__name__} has, or nothing beside it", given, name
         )
     return own
