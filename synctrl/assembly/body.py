@@ -72,9 +72,9 @@ class CarriedObject:
 
     def bias(self, R: np.ndarray, w: np.ndarray, g: np.ndarray) -> np.ndarray:
         """c_o of M_o nu' + c_o = sum of the wrenches on it, (6,), with angular velocity w and gravity g."""
-        r, inertia = R @ self.com, R @ self.inertia @ R.T
-        force = self.mass * (np.cross(w, np.cross(w, r)) - g)
-        return np.concatenate((force, np.cross(r, force) + np.cross(w, inertia @ w)))
+        r, inertia, turning = R @ self.com, R @ self.inertia @ R.T, skew(w)
+        force = self.mass * (turning @ turning @ r - g)
+        return np.concatenate((force, skew(r) @ force + turning @ inertia @ w))
 
 
 def moved_parameters(theta: np.ndarray, xyz: np.ndarray, rotation: np.ndarray) -> np.ndarray:
@@ -120,5 +120,4 @@ def place_of(pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def pose_rate(pose: np.ndarray, nu: np.ndarray) -> np.ndarray:
     """Rate of a pose, (7,), of a body with the twist nu, (6,): q' = (w, 0) q / 2."""
     w, (v, s) = nu[3:], (pose[3:6], pose[6])
-    turning = 0.5 * np.array([*(s * w + np.cross(w, v)), -np.dot(w, v)])
-    return np.concatenate((nu[:3], turning))
+    return np.concatenate((nu[:3], 0.5 * (s * w + skew(w) @ v), [-0.5 * w @ v]))

@@ -111,10 +111,10 @@ def fixture_wrenches(
     lever = p_g - p_h
     d = np.concatenate((-lever, log(R_h @ R_g.mT)), axis=-1)
     moved = nu_h - nu_g
-    moved[..., :3] += np.cross(nu_h[..., 3:], lever)
+    moved[..., :3] += np.matvec(skew(nu_h[..., 3:]), lever)
     wrench = K * d + D * moved
     back = -wrench
-    back[..., 3:] -= np.cross(lever, wrench[..., :3])
+    back[..., 3:] -= np.matvec(skew(lever), wrench[..., :3])
     return wrench, back
 
 

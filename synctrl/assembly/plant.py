@@ -14,6 +14,7 @@ from ..robots.robot import Robot
 from ..simulation.plant import Output, Plant
 from ..tasks.measurement import Tips
 from ..tasks.poses import PoseTrajectory
+from ..tasks.rotations import skew
 from .body import CarriedObject, place_of, pose_of, pose_rate
 from .forces import internal_wrenches
 from .grasp import Grasp, fixture_wrenches, grasp_matrix
@@ -127,7 +128,7 @@ class CarryingPlant(Plant):
         (p, R), nu = place_of(hidden[:7]), hidden[7:]
         levers = self.arms @ R.T
         nu_g = np.tile(nu, (len(levers), 1))
-        nu_g[:, :3] += np.cross(nu[3:], levers)
+        nu_g[:, :3] += levers @ skew(nu[3:]).T
         on_object, on_hands = fixture_wrenches(
             (p_h, R_h, nu_h), (p + levers, R @ self.turned, nu_g), self.K, self.D
         )
