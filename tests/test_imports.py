@@ -29,6 +29,7 @@ ROOMS = (
     "coupling",
     "control",
     "simulation",
+    "assembly",
     "compiled",
     "analysis",
     "sweep",

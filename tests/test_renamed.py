@@ -194,3 +194,11 @@ def test_a_home_is_looked_up_only_when_it_is_asked_for():
     find = names_elsewhere("synctrl.old", ".nowhere", "thing")
     with pytest.raises(ModuleNotFoundError):
         find("thing")
+
+
+def test_a_load_of_0_1_is_a_payload_that_is_there_from_the_beginning():
+    from synctrl.robots.payload import Load, Payload
+
+    with pytest.warns(DeprecationWarning, match=r"payload\.Load is deprecated: use .*Payload"):
+        load = Load(2.0, com=(0.1, 0.0, 0.0), frame="tool")
+    assert isinstance(load, Payload) and (load.mass, load.frame, load.start) == (2.0, "tool", 0.0)

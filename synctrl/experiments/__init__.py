@@ -1,6 +1,7 @@
 """Ready cells: the paper's two, and its examples 1 to 3."""
 
 from .a460_pair import a460_full_pair, a460_pair
+from .carry import carry_ur5
 from .mixed_four import mixed_four
 from .mobile_robot import mobile_robot
 from .panda_four import panda_four
@@ -12,6 +13,7 @@ from .ur5_payload import ur5_payload
 __all__ = [
     "a460_full_pair",
     "a460_pair",
+    "carry_ur5",
     "mixed_four",
     "mobile_robot",
     "panda_four",

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from types import NoneType
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance, positive_number, symmetric_matrix, window
 from ..errors import InputError
+from ..renamed import tell
 from .documents import weld
 from .model import frame_id
 from .robot import Robot
-from .urdf.document import Document
+from .urdf.document import Document, Joint, Link, Pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +83,14 @@ class Payload:
         }
 
 
+def Load(  # noqa: N802
+    mass: float, com: Any = (0.0, 0.0, 0.0), inertia: Any = None, frame: str | None = None
+) -> Payload:
+    """A payload of some robot from the beginning; deprecated, see `Payload`."""
+    tell("synctrl.robots.payload.Load", "synctrl.robots.payload.Payload")
+    return Payload(0, mass, com, inertia, frame)
+
+
 def carrying(robot: Robot, load: Payload) -> Robot:
     """The robot with a load fixed to it, whenever that is, and whosever it is.
 
@@ -98,6 +108,33 @@ def carrying(robot: Robot, load: Payload) -> Robot:
     document = _welded(robot.document, name, load)
     kept = partial(Robot, visual=robot.visual, name=robot.name, report=robot.report)
     return kept(model, robot.tip, document=document)
+
+
+def holding(robot: Robot, xyz: ArrayLike, rotation: ArrayLike, name: str = "held") -> Robot:
+    """The robot controlled at a frame of something that its tip holds: of a tool, or of an object.
+
+    Args:
+        robot: the robot.
+        xyz, rotation: place and orientation of the frame in the axes of the robot's tip, (3,) and (3, 3).
+        name: what the frame is called, which the robot has not yet.
+
+    Raises:
+        InputError: not of these shapes, or the name is taken.
+    """
+    at = pin.SE3(
+        np.array(finite_array("rotation", rotation, (3, 3))), np.array(finite_array("xyz", xyz, (3,)))
+    )
+    model = pin.Model(robot.model)
+    if model.existFrame(name):
+        raise InputError.expected(f"a frame that robot '{robot.name}' does not have yet", name, "name")
+    tip = model.frames[robot.tip_id]
+    model.addFrame(pin.Frame(name, tip.parentJoint, robot.tip_id, tip.placement * at, pin.FrameType.BODY))
+    document = robot.document
+    if document is not None and robot.tip in {link.name for link in document.links}:
+        mount = Joint(f"{name}_mount", "fixed", robot.tip, name, Pose.of(at))
+        document = replace(document, links=(*document.links, Link(name)), joints=(*document.joints, mount))
+    kept = partial(Robot, visual=robot.visual, name=robot.name, report=robot.report)
+    return kept(model, name, document=document)
 
 
 def _welded(document: Document | None, frame: str, load: Payload) -> Document | None:

@@ -68,6 +68,23 @@ class Run(NamedTuple):
             with suppress(SimulationError):  # weights that fail end the run, which hands over what it has
                 cell.coupling.check_weights(self.clock.spread(WEIGHT_SAMPLES), cell.m)
 
+    def check_step(self) -> None:
+        """Refuse a step of "rk4" that is too long for what the plant connects the robots with.
+
+        Raises:
+            InputError: with the step that would do.
+        """
+        controller, dt = self.loop.controller, float(self.info["dt"])
+        joint = controller.k_r_space == "joint"
+        limit = self.loop.plant.longest_step(controller.K_r if joint else np.zeros(self.loop.cell.v0.shape))
+        if dt > limit:
+            raise InputError(
+                f"expected at most {limit:.2g} s, beyond which {type(self.loop.plant).__qualname__} is "
+                f"unstable, found {dt:g}",
+                subject="dt",
+                found=dt,
+            )
+
     def samples(self, solver: Solver) -> Iterator[Sample]:
         """What a solver makes of this run, see `advance`."""
         loop, clock = self.loop, self.clock

@@ -170,6 +170,14 @@ class Plant:
         """
         return q, v, hidden
 
+    def longest_step(self, K_r: np.ndarray) -> float:
+        """The longest step of "rk4" with which the plant is stable, s; longer ones are refused before a run.
+
+        Args:
+            K_r: damping of the controller in joint space, (n, nv), N·m·s/rad; zeros where it has none there.
+        """
+        return float("inf")
+
     def friction(self, v: np.ndarray) -> np.ndarray:
         """Torque by which friction opposes the velocities v, (n, nv), N·m."""
         return self.viscous * v + self.coulomb * np.tanh(v / self.smoothing)
@@ -181,6 +189,18 @@ class Plant:
             Under each name an array, its unit, and the names of its axes, the first of which is "time".
         """
         return {}
+
+    def outputs_along(
+        self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray, t: np.ndarray
+    ) -> dict[str, Output]:
+        """`outputs` of a plant that needs the motion of the robots for them; by default those of `outputs`.
+
+        Args:
+            q, v: joint positions and velocities, (T, n, nv).
+            hidden: the plant's own state, (T, size of the state).
+            t: the logged instants, (T,), s.
+        """
+        return self.outputs(hidden)
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         """What a result says of the plant's own state at its logged instants, (T, size of the state)."""

@@ -104,9 +104,11 @@ class Recorder:
             Exception: what the plant raises.
         """
         loop, nothing = self._loop, np.zeros((self.count, 0))
-        hidden, lengths = self.logged().get(PLANT_STATE, nothing), {"time": self.count, **sizes(loop)}
+        logged = self.logged()
+        hidden, lengths = logged.get(PLANT_STATE, nothing), {"time": self.count, **sizes(loop)}
         taken = {*info, *describe_run(loop), *LAYOUT, *_STATE_AXES, *OF_EVERY_RUN}
-        found = Account(loop.plant.report(hidden), loop.plant.outputs(hidden))
+        outputs = loop.plant.outputs_along(logged["q"], logged["v"], hidden, logged["t"])
+        found = Account(loop.plant.report(hidden), outputs)
         for what, entries in found._asdict().items():
             _check_names(f"plant {type(loop.plant).__qualname__}, {what}", entries, taken)
         for name, output in found.outputs.items():

@@ -257,6 +257,8 @@ def _carry_out(
         _needs_rk4(integrator, engine, run.info["control_period"])
     elif (reason := by.refuses(run)) is not None:
         raise InputError(reason, subject="engine")
+    if not adaptive:
+        run.check_step()
     run.check()
     warn_of_unasked_friction(run.experiment.cell)
     result = run_adaptive(run, integrator, rtol, atol, progress) if adaptive else by.run(run, progress)

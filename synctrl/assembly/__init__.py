@@ -1,0 +1,1 @@
+"""Robots that touch: objects that several hands hold, and the forces between them."""

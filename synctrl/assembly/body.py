@@ -1,0 +1,123 @@
+"""An object that hands carry: its inertia, its motion, and shares of it as loads of robots.
+
+Twists are (velocity of the body's origin, angular velocity), wrenches (force, moment about the origin), both
+in world axes. Poses are kept as (position, unit quaternion x y z w), (7,).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..checks import finite_array, positive_number
+from ..errors import InputError
+from ..robots.payload import Payload
+from ..robots.pseudo_inertia import inertial_parameters, pseudo_inertia
+from ..robots.robot import Robot
+from ..tasks.rotations import from_quaternion, quaternion, skew
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedObject:
+    """A rigid object that is carried.
+
+    Args:
+        mass: kg.
+        com: centre of mass in the object's axes, (3,), m.
+        inertia: about the centre of mass in the object's axes, (3, 3), or (3,) for its diagonal, kg·m^2; by
+            default that of a uniform ball of the density of water.
+        box: edges of the box about `center` that is drawn for it, (3,), m, above 0; by default none is.
+        center: of that box, (3,), m; by default the centre of mass.
+        name: what figures call it.
+
+    Raises:
+        InputError: numbers that no body can have.
+    """
+
+    mass: float
+    com: Any = (0.0, 0.0, 0.0)
+    inertia: Any = None
+    box: Any = None
+    center: Any = None
+    name: str = "object"
+
+    def __post_init__(self) -> None:
+        load = Payload(0, self.mass, self.com, self.inertia)
+        for name in ("mass", "com", "inertia"):
+            object.__setattr__(self, name, getattr(load, name))
+        if self.box is not None:
+            edges = finite_array("object, box", self.box, (3,))
+            positive_number("object, box", float(edges.min()))
+            object.__setattr__(self, "box", edges)
+        center = self.com if self.center is None else self.center
+        object.__setattr__(self, "center", finite_array("object, center", center, (3,)))
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """Its ten inertial parameters about its origin, in Pinocchio's order, (10,)."""
+        c = skew(np.array(self.com))
+        I = self.inertia - self.mass * c @ c
+        entries = I[0, 0], I[0, 1], I[1, 1], I[0, 2], I[1, 2], I[2, 2]
+        return np.array([self.mass, *(self.mass * self.com), *entries])
+
+    def mass_matrix(self, R: np.ndarray) -> np.ndarray:
+        """M_o of the twist of its origin in world axes, (6, 6), for its orientation R, (3, 3)."""
+        c, M = skew(R @ self.com), self.mass * np.eye(6)
+        M[:3, 3:], M[3:, :3] = -self.mass * c, self.mass * c
+        M[3:, 3:] = R @ self.inertia @ R.T - self.mass * c @ c
+        return M
+
+    def bias(self, R: np.ndarray, w: np.ndarray, g: np.ndarray) -> np.ndarray:
+        """c_o of M_o nu' + c_o = sum of the wrenches on it, (6,), with angular velocity w and gravity g."""
+        r, inertia, turning = R @ self.com, R @ self.inertia @ R.T, skew(w)
+        force = self.mass * (turning @ turning @ r - g)
+        return np.concatenate((force, skew(r) @ force + turning @ inertia @ w))
+
+
+def moved_parameters(theta: np.ndarray, xyz: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """Inertial parameters of a body, (10,), in a frame in which its own is at xyz, turned by rotation."""
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = rotation, xyz
+    return inertial_parameters(T @ pseudo_inertia(theta) @ T.T)
+
+
+def with_share(robot: Robot, theta: ArrayLike, xyz: np.ndarray, rotation: np.ndarray) -> Robot:
+    """A robot whose last body has a share of an object's inertia beside its own.
+
+    Args:
+        robot: the robot.
+        theta: the share, (10,), in the object's axes; of either sign, as long as the body stays one.
+        xyz, rotation: place and orientation of the object in the axes of the robot's tip.
+
+    Raises:
+        InputError: the tip does not move.
+        RobotError: the body would have no positive mass or no positive definite inertia.
+    """
+    frame = robot.model.frames[robot.tip_id]
+    if frame.parentJoint == 0:
+        raise InputError(f"expected a tip that moves, found '{robot.tip}'", subject=f"robot '{robot.name}'")
+    place = frame.placement
+    at = place.translation + place.rotation @ xyz, place.rotation @ rotation
+    pi = robot.inertial_parameters.reshape(-1, 10).copy()
+    pi[frame.parentJoint - 1] += moved_parameters(finite_array("share", theta, (10,)), *at)
+    return robot.with_parameters(pi.ravel())
+
+
+def pose_of(xyz: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """Position and unit quaternion, (..., 7), of a place and an orientation."""
+    return np.concatenate((xyz, quaternion(R)), axis=-1)
+
+
+def place_of(pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Place, (..., 3), and orientation, (..., 3, 3), of a pose; its quaternion has any length but 0."""
+    q = pose[..., 3:]
+    return pose[..., :3], from_quaternion(q / np.sqrt((q * q).sum(axis=-1, keepdims=True)))
+
+
+def pose_rate(pose: np.ndarray, nu: np.ndarray) -> np.ndarray:
+    """Rate of a pose, (7,), of a body with the twist nu, (6,): q' = (w, 0) q / 2."""
+    w, (v, s) = nu[3:], (pose[3:6], pose[6])
+    return np.concatenate((nu[:3], 0.5 * (s * w + skew(w) @ v), [-0.5 * w @ v]))

@@ -1,0 +1,189 @@
+"""Robots that hold an object in fixtures that give: it moves with them, and forces pass through it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..checks import finite_array, instance
+from ..coupling.cell import Cell
+from ..errors import InputError
+from ..robots.robot import Robot
+from ..simulation.plant import Output, Plant
+from ..tasks.measurement import Tips
+from ..tasks.poses import PoseTrajectory
+from ..tasks.rotations import skew
+from .body import CarriedObject, place_of, pose_of, pose_rate
+from .forces import internal_wrenches
+from .grasp import Grasp, fixture_wrenches, grasp_matrix
+from .step import largest_step
+
+
+class CarryingPlant(Plant):
+    """The true robots, and an object that their hands hold; its state is the object's pose and twist, (13,).
+
+        M_i v_i' + n_i = tau_i + J_i^T (what the fixture does to the hand)
+        M_o nu' + c_o  = sum G_i (what the fixtures do to the object)
+
+    A fixture takes its rest pose when it closes, at t = 0: a hand that is not where its grasp says holds the
+    object where it is.
+
+    Args:
+        cell: what the controller knows, its robots with their shares of the object.
+        body: the object.
+        grasps: who holds it where, at least one; no robot twice.
+        at: position and orientation of the object at t = 0, (3,) and (3, 3).
+        robots: the robots without the object, whose tips are the hands; by default those of the cell.
+        desired: desired motion of the object, for figures.
+        options: of `Plant`.
+
+    Raises:
+        InputError: grasps that do not fit the robots, or a pose that is none.
+    """
+
+    def __init__(
+        self,
+        cell: Cell,
+        *,
+        body: CarriedObject,
+        grasps: Sequence[Grasp],
+        at: tuple[Any, Any],
+        robots: Sequence[Robot] | None = None,
+        desired: PoseTrajectory | None = None,
+        **options: Any,
+    ):
+        super().__init__(cell, robots=robots, **options)
+        instance("body", body, CarriedObject, "a CarriedObject")
+        self.body, self.grasps, self.desired = body, _checked(grasps, cell), desired
+        self._hands = np.array([grasp.robot for grasp in self.grasps])
+        self._tips = Tips(self.robots)
+        self.K, self.D = (np.stack([getattr(g.compliance, name) for g in self.grasps]) for name in "KD")
+        self._gravity = np.array(self.robots[0].gravity_vector)
+        p, R = finite_array("at", at[0], (3,)), finite_array("at", at[1], (3, 3))
+        self.hidden0 = np.concatenate((pose_of(p, R), self._moving_along(p)))
+        hands, turned = self._held(cell.q0, cell.v0)[:2]
+        self.arms, self.turned = (hands - p) @ R, R.T @ turned
+
+    def longest_step(self, K_r: np.ndarray) -> float:
+        """With the fixtures, the arms and the object as they are at the start, see `step.py`."""
+        M, J_c, damping = self._together(K_r)
+        K, D = (J_c.T * part.ravel() @ J_c for part in (self.K, self.D))
+        return largest_step(M, K, D + np.diag(damping))
+
+    def move(
+        self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, hidden: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        wrenches, back, J = self._wrenches(q, v, hidden)
+        pulled = tau.copy()
+        pulled[self._hands] += np.vecmat(back, J)
+        v_dot, _ = super().move(q, v, pulled, hidden[:0])
+        return v_dot, self._object_rate(hidden, wrenches)
+
+    def outputs_along(
+        self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray, t: np.ndarray
+    ) -> dict[str, Output]:
+        """Pose, twist and desired motion of the object, and wrenches of the hands on it, all over time."""
+        pose, nu = hidden[:, :7].copy(), hidden[:, 7:].copy()
+        pose[:, 3:] /= np.linalg.norm(pose[:, 3:], axis=1, keepdims=True)
+        h = np.array([self._wrenches(*row)[0] for row in zip(q, v, hidden, strict=True)])
+        h = h.reshape(len(hidden), len(self.grasps), 6)
+        place, forces = "m, and a unit quaternion", "N, N·m"
+        along, at_hands = ("time", "coordinate"), ("time", "grasp", "coordinate")
+        return {
+            "object_pose": (pose, place, along),
+            "object_twist": (nu, "m/s, rad/s", along),
+            "object_desired": (self._desired_poses(t), place, along),
+            "hand_wrench": (h, forces, at_hands),
+            "internal_force": (internal_wrenches(h, self._levers(hidden)), forces, at_hands),
+        }
+
+    def report(self, hidden: np.ndarray) -> dict[str, Any]:
+        """What is carried, and by whom, as plain data."""
+        body, grasps = self.body, self.grasps
+        about = {
+            "name": body.name,
+            "parameters": body.parameters.tolist(),
+            "box": None if body.box is None else body.box.tolist(),
+            "center": body.center.tolist(),
+        }
+        held = [
+            {"robot": g.robot, "arm": arm.tolist(), **g.compliance.as_dict()}
+            for g, arm in zip(grasps, self.arms, strict=True)
+        ]
+        return {"object": about, "grasps": held}
+
+    # -- internals ----------------------------------------------------------------------------------------
+
+    def _held(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Positions, orientations, twists and Jacobians of the hands that hold the object."""
+        (p, _), R, J, _ = self._tips.poses(q, v)
+        J = J[self._hands]
+        return p[self._hands], R[self._hands], np.matvec(J, v[self._hands]), J
+
+    def _wrenches(self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Wrenches on the object, at its grasps, and on the hands, (k, 6) each, and the hands' Jacobians."""
+        p_h, R_h, nu_h, J = self._held(q, v)
+        (p, R), nu = place_of(hidden[:7]), hidden[7:]
+        levers = self.arms @ R.T
+        nu_g = np.tile(nu, (len(levers), 1))
+        nu_g[:, :3] += levers @ skew(nu[3:]).T
+        on_object, on_hands = fixture_wrenches(
+            (p_h, R_h, nu_h), (p + levers, R @ self.turned, nu_g), self.K, self.D
+        )
+        return on_object, on_hands, J
+
+    def _object_rate(self, hidden: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
+        pose, nu = hidden[:7], hidden[7:]
+        R = place_of(pose)[1]
+        load = np.matvec(grasp_matrix(self.arms @ R.T), wrenches).sum(axis=0)
+        nu_dot = np.linalg.solve(self.body.mass_matrix(R), load - self.body.bias(R, nu[3:], self._gravity))
+        return np.concatenate((pose_rate(pose, nu), nu_dot))
+
+    def _levers(self, hidden: np.ndarray) -> np.ndarray:
+        """From the object's origin to its grasps in world axes, (T, k, 3)."""
+        return self.arms @ place_of(hidden[:, :7])[1].mT
+
+    def _together(self, K_r: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of arms and object at t = 0: M, the J_c of all fixtures, and damping of all coordinates."""
+        q, robots = self.cell.q0, self.robots
+        at = np.cumsum([0, *(robot.nv for robot in robots)])
+        size = int(at[-1]) + 6
+        M, J_c, damping = np.zeros((size, size)), np.zeros((len(self.arms), 6, size)), np.zeros(size)
+        for i, robot in enumerate(robots):
+            joints = slice(at[i], at[i + 1])
+            M[joints, joints] = robot.mass_matrix(q[i, : robot.nv])
+            damping[joints] = K_r[i, : robot.nv]
+        R = place_of(self.hidden0[:7])[1]
+        M[-6:, -6:] = self.body.mass_matrix(R)
+        J = self._held(q, self.cell.v0)[3]
+        for rows, G, J_k, i in zip(J_c, grasp_matrix(self.arms @ R.T), J, self._hands, strict=True):
+            rows[:, at[i] : at[i + 1]], rows[:, -6:] = J_k[:, : robots[i].nv], -G.T
+        return M, J_c.reshape(-1, size), damping
+
+    def _moving_along(self, p: np.ndarray) -> np.ndarray:
+        """Twist of the object at t = 0: that which fits the hands best, which is 0 at rest."""
+        hands, _, nu, _ = self._held(self.cell.q0, self.cell.v0)
+        G = grasp_matrix(hands - p)
+        return np.linalg.lstsq(np.concatenate(G.mT), nu.ravel())[0]
+
+    def _desired_poses(self, t: np.ndarray) -> np.ndarray:
+        """Desired poses of the object, (T, 7); NaN if nobody told."""
+        if self.desired is None:
+            return np.full((len(t), 7), np.nan)
+        return pose_of(self.desired.position(t).x, self.desired.orientation(t).R)
+
+
+def _checked(grasps: Sequence[Grasp], cell: Cell) -> tuple[Grasp, ...]:
+    instance("grasps", grasps, Sequence, "a sequence of Grasp objects")
+    for grasp in grasps:
+        instance("grasps", grasp, Grasp, "Grasp objects")
+    held = [grasp.robot for grasp in grasps]
+    if not held or len(set(held)) != len(held) or max(held) >= cell.n:
+        raise InputError(
+            f"expected different robots from 0 to {cell.n - 1}, at least one, found {held}",
+            subject="grasps",
+            found=tuple(held),
+        )
+    return tuple(grasps)

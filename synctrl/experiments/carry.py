@@ -1,0 +1,123 @@
+"""Two UR5 arms that really carry a payload: forces pass through it from hand to hand.
+
+The cell, motion and hands are those of `ur5_payload`; here the payload has mass, and fixtures that give a
+little connect it to the hands. Both arms are controlled at the payload's own frame, as each believes to hold
+it, so that epsilon = 0 says exactly that the geometry of the grasps is kept. The load is learned: half of the
+payload's ten parameters belongs to the last link of each arm. Everything here is our choice and not the
+paper's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Any, Unpack
+
+import numpy as np
+
+from ..assembly.body import CarriedObject, with_share
+from ..assembly.grasp import Fixture, Grasp
+from ..assembly.plant import CarryingPlant
+from ..checks import boolean, choice, finite_array
+from ..control.gains import Gains
+from ..coupling.cell import Cell, Member
+from ..coupling.coupling import Coupling
+from ..robots.catalog import load_robot
+from ..robots.friction import Friction
+from ..robots.payload import holding
+from ..robots.robot import Robot
+from ..simulation.schedules import Disturbance
+from ..simulation.simulate import Experiment
+from ..tasks.inverse_kinematics import reach
+from ..tasks.pose import PoseSpace
+from ..tasks.rotations import exp, log
+from .parts import ControllerParts, ready_experiment
+from .ur5_payload import DISTANCE, DURATION, POSTURE, hand_on_payload, payload_motion
+from .ur5_payload import GAINS as HANDS_ALONE
+
+PAYLOAD = CarriedObject(
+    4.0, (0.03, 0.01, 0.0), 4.0 / 12 * np.array([0.12**2 + 0.12**2, 0.4**2 + 0.12**2, 0.4**2 + 0.12**2]),
+    box=(0.4, 0.12, 0.12), center=(0.0, 0.0, 0.0), name="payload",
+)  # fmt: skip
+#: error of the payload at the start, desired less actual: position, m, and rotation vector, rad
+OFFSET = np.array([0.01, -0.01, 0.01, 0.03, 0.0, -0.02])
+#: what the first estimates know of the half of the payload that each arm carries
+SHARES_KNOWN = (0.8, 0.0)
+#: what arm 1 believes of the object in its hand beside the truth: displacement, m, and rotation vector, rad
+GEOMETRIC_ERROR = np.array([1e-3, 0.0, 0.0, 0.0, np.deg2rad(0.5), 0.0])
+_RUBS = np.array([3.0, 3.0, 2.0, 0.5, 0.5, 0.5])
+FRICTION = Friction(_RUBS, _RUBS, 0.01)
+#: torque on joints 1 to 3 of arm 1, N·m, from 1 s to 1.5 s
+PUSH = Disturbance(0, np.array([10.0, 10.0, 10.0, 0.0, 0.0, 0.0]), 1.0, 1.5)
+LAST_LINK = (5.0, 0.3, 0.3, 0.3, *[0.03] * 6)
+GAINS = HANDS_ALONE.replace(Gamma=np.array([*[0.3] * 40, *[0.03] * 10, *LAST_LINK]))
+
+
+def carry_ur5(
+    synchronized: bool = True,
+    grasp: str | Fixture = "compliant",
+    geometric_error: bool | Any = False,
+    friction: bool = False,
+    push: bool = False,
+    gains: Gains | None = None,
+    **parts: Unpack[ControllerParts],
+) -> Experiment:
+    """Two UR5 that carry a payload of 4 kg, in pose space, with epsilon = e_1 - e_2.
+
+    Args:
+        synchronized, gains, parts: see `ready_experiment`.
+        grasp: "compliant" for the fixtures of the cell, or a `Fixture`.
+        geometric_error: whether arm 1 is wrong about where it holds the payload, by 1 mm and 0.5 deg, or by
+            how much: displacement, m, and rotation vector, rad, (6,), in the payload's axes.
+        friction: whether the joints rub, which the controller does not know.
+        push: whether joints 1 to 3 of arm 1 are pushed for half a second.
+
+    Raises:
+        InputError: a value that is none of these.
+    """
+    fixture = grasp if isinstance(grasp, Fixture) else Fixture()
+    if not isinstance(grasp, Fixture):
+        choice("grasp", grasp, ("compliant",))
+    boolean("friction", friction), boolean("push", push)
+    error = GEOMETRIC_ERROR * geometric_error if isinstance(geometric_error, bool) else geometric_error
+    error = finite_array("geometric_error", error, (6,))
+    grasps = [Grasp(i, *hand_on_payload(i), fixture) for i in range(2)]
+    at = _start_of_payload()
+    arms = [_arm(i) for i in range(2)]
+    rubs = FRICTION if friction else Friction()
+    members = [_member(arms[i], grasps[i], at, error * (i == 0), rubs, SHARES_KNOWN[i]) for i in range(2)]
+    cell = Cell(members, Coupling.pair(), PoseSpace(), name="UR5 pair that carries a payload")
+    made = ready_experiment(
+        cell, DURATION, GAINS, gains, synchronized, parts, disturbances=[PUSH] * bool(push)
+    )
+    plant = partial(CarryingPlant, body=PAYLOAD, grasps=grasps, at=at, robots=arms, desired=payload_motion())
+    return replace(made, plant_type=plant)
+
+
+def _arm(i: int) -> Robot:
+    side, heading = ((-1.0, 0.0), (1.0, np.pi))[i]
+    return load_robot("ur5").placed((side * DISTANCE, 0.0, 0.0), (0.0, 0.0, heading), name=f"UR5 {i + 1}")
+
+
+def _start_of_payload() -> tuple[np.ndarray, np.ndarray]:
+    desired = payload_motion()(0.0).x
+    return desired[:3] - OFFSET[:3], exp(-OFFSET[3:]) @ exp(desired[3:])
+
+
+def _member(
+    arm: Robot,
+    grasp: Grasp,
+    at: tuple[np.ndarray, np.ndarray],
+    error: np.ndarray,
+    friction: Friction,
+    known: float,
+) -> Member:
+    """An arm controlled at the payload as it believes to hold it, with half of the payload as its load."""
+    (p, R), (d, G) = at, grasp.object_in_hand
+    half = 0.5 * PAYLOAD.parameters
+    loaded = with_share(arm, half, d, G)
+    believed = holding(loaded, d + G @ error[:3], G @ exp(error[3:]), "payload")
+    hand = np.concatenate((p + R @ grasp.xyz, log(R @ grasp.rotation)))
+    q0 = reach(arm, hand, np.array(POSTURE), PoseSpace())
+    guess = arm.inertial_parameters + known * (loaded.inertial_parameters - arm.inertial_parameters)
+    return Member(believed, payload_motion(), q0, theta_hat0=guess, friction=friction, name=arm.name)
