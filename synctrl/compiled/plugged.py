@@ -28,7 +28,7 @@ from ..coupling.cell import Cell
 from ..errors import InputError
 from .algebra import column_of, symbols
 
-#: what a rate is a function of, beside z and the gradient
+#: what a rate is a function of, beside z, the gradient and the regressor
 MOTION = ("q", "v", "v_ref", "a_ref", "s_q", "tau", "applied")
 
 
@@ -37,7 +37,8 @@ class Learning(NamedTuple):
 
     Attributes:
         estimate: CasADi function, z -> theta_hat.
-        rate: CasADi function, z, q, v, v_ref, a_ref, s_q, tau, what is applied of it, Y^T s_q -> z'.
+        rate: CasADi function, z, q, v, v_ref, a_ref, s_q, tau, what is applied of it, Y^T s_q, Y row by
+            row -> z'.
         settle: CasADi function, z -> z after a step; None if it stays what it is.
         leap: CasADi function, z, z', h -> z after a sample of h s; None if that is z + h z', settled.
     """
@@ -82,15 +83,17 @@ def trace_learning(controller: Controller) -> list[Learning | None]:
         counts = [len(parameters.theta) for parameters in cell.parameters]
         z = symbols("z", *adaptation.start().shape)
         gradient = _padded("gradient", counts, cell.theta.shape[1])
+        Y = _padded_matrices("regressor", joints, counts, (cell.n, cell.nv, cell.theta.shape[1]))
         motion = {name: _padded(name, joints, cell.nv) for name in MOTION}
         estimates, settled = adaptation.estimate(z), adaptation.settle(z)
-        rates = adaptation.rate(z, Seen(**motion, gradient=gradient, regressor=None))
+        seen = Seen(**motion, gradient=gradient, regressor=Y)
+        rates = adaptation.rate(z, seen)
         z_dot, h = symbols("z_dot", *z.shape), np.tile(symbols("h", 1), (cell.n, 1))
         leapt = adaptation.leap(z, z_dot, h[:1, 0]) if hasattr(adaptation, "leap") else None
         return [
             Learning(
                 _function("estimate", i, [z], [estimates[:, :P]]),
-                _function("rate", i, [z, *(x[:, :nv] for x in motion.values()), gradient[:, :P]], [rates]),
+                _function("rate", i, [z, *_inputs(seen, nv, P)], [rates]),
                 None if settled is z else _function("settle", i, [z], [settled]),
                 None if leapt is None else _function("leap", i, [z, z_dot, h], [leapt]),
             )
@@ -180,10 +183,12 @@ class ChosenAdaptation:
         """What one robot sees, in the larger cell."""
         found = {name: np.zeros_like(self._cell.v0) for name in MOTION}
         found["gradient"] = np.zeros_like(self._cell.theta)
+        found["regressor"] = np.zeros((*self._cell.v0.shape, self._cell.theta.shape[1]))
         for name, rows in found.items():
             value = getattr(seen, name)[row]
-            rows[self._robots[row], : len(value)] = value
-        return Seen(**found, regressor=None)
+            place: Any = (self._robots[row], *map(slice, value.shape))
+            rows[place] = value
+        return Seen(**found)
 
 
 # -- internals --------------------------------------------------------------------------------------------
@@ -210,6 +215,21 @@ def _function(name: str, robot: int, inputs: Sequence[np.ndarray], outputs: Sequ
 
     given, found = ([column_of(part[robot]) for part in parts] for parts in (inputs, outputs))
     return ca.Function(name, given, found)
+
+
+def _inputs(seen: Seen, nv: int, P: int) -> list[np.ndarray]:
+    """What a rate is a function of beside z, for robots with nv joints and P parameters."""
+    return [*(getattr(seen, x)[:, :nv] for x in MOTION), seen.gradient[:, :P], seen.regressor[:, :nv, :P]]
+
+
+def _padded_matrices(
+    name: str, rows: Sequence[int], columns: Sequence[int], shape: tuple[int, int, int]
+) -> np.ndarray:
+    """Matrices of symbols, (n, longest, longest), padded with zeros."""
+    matrices = np.zeros(shape, dtype=object)
+    for matrix, nv, P in zip(matrices, rows, columns, strict=True):
+        matrix[:nv, :P] = symbols(name, nv, P)
+    return matrices
 
 
 def _padded(name: str, lengths: Sequence[int], longest: int) -> np.ndarray:

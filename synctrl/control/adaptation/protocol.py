@@ -28,7 +28,7 @@ class Seen:
         v_ref, a_ref: reference velocity and acceleration, (n, nv).
         s_q: v_ref - v, (n, nv).
         gradient: Y^T s_q, (n, P).
-        regressor: Y, (n, nv, P); not in generated code.
+        regressor: Y, (n, nv, P).
         tau: torque that the controller asks for, (n, nv), N·m.
         applied: what the limits that it knows leave of it, (n, nv), N·m.
     """
