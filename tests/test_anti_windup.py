@@ -159,6 +159,12 @@ def test_an_adaptation_that_is_given_is_taken_as_it_is():
     assert loop.controller.adaptation_settings == adaptation.as_dict()
 
 
+def test_a_ball_leaves_states_inside_it_as_they_are_to_the_last_bit():
+    far = 30.0 * np.random.default_rng(4).standard_normal((2, P))
+    bound = Ball(0.3, 1e4).bind(CELL)
+    np.testing.assert_array_equal(bound.settle(CELL.theta_hat0 + far), CELL.theta_hat0 + far)
+
+
 @pytest.mark.parametrize("options", [{}, {"control_period": 2e-3}], ids=["continuous", "sampled"])
 @pytest.mark.parametrize("engine", ["pinocchio", "compiled"])
 @pytest.mark.parametrize("make", [planar_four, a460_pair])

@@ -157,7 +157,9 @@ def warn_of_saturation(result: Result) -> None:
 def _bounds(result: Result) -> str:
     """The adaptation that keeps estimates within bounds, by name; empty if there is none."""
     settings = result.info["adaptation"]
-    name = str(settings.get("adaptation", settings)["name"])
+    while "adaptation" in settings:  # the one that it slows down, or hedges
+        settings = settings["adaptation"]
+    name = str(settings["name"])
     return name if name in BOUNDED else ""
 
 

@@ -2,10 +2,11 @@
 
 from .gradient import Gradient, chosen
 from .guarded import Guarded, bounded
+from .hedged import Hedged
 from .leakage import EModification, Leakage, Sigma, Switching
 from .natural import Natural
 from .projection import Ball, Box
-from .protocol import Adaptation, BoundAdaptation, Seen, after_sample
+from .protocol import Adaptation, BoundAdaptation, Seen, after_sample, shift_of
 
 __all__ = [
     "Adaptation",
@@ -15,6 +16,7 @@ __all__ = [
     "EModification",
     "Gradient",
     "Guarded",
+    "Hedged",
     "Leakage",
     "Natural",
     "Seen",
@@ -23,4 +25,5 @@ __all__ = [
     "after_sample",
     "bounded",
     "chosen",
+    "shift_of",
 ]
