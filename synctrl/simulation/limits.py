@@ -157,9 +157,9 @@ def warn_of_saturation(result: Result) -> None:
 def _bounds(result: Result) -> str:
     """The adaptation that keeps estimates within bounds, by name; empty if there is none."""
     settings = result.info["adaptation"]
-    while "adaptation" in settings:  # the one that it slows down, or hedges
+    while isinstance(settings.get("adaptation"), Mapping):  # the one that it slows down, or hedges
         settings = settings["adaptation"]
-    name = str(settings["name"])
+    name = settings.get("name")
     return name if name in BOUNDED else ""
 
 
@@ -171,11 +171,7 @@ def _within(result: Result) -> str:
 
 def _advice(result: Result) -> str:
     """What keeps estimates within bounds, in words, if nothing does."""
-    return (
-        ""
-        if _bounds(result)
-        else "; adaptation=Ball(...) or Guarded(Ball(...)) keeps estimates within bounds"
-    )
+    return "" if _bounds(result) else "; adaptation=Guarded(Ball(...)) keeps estimates within bounds"
 
 
 def _learned(found: list[dict[str, Any]]) -> str:
