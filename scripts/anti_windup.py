@@ -2,7 +2,7 @@
 
     python scripts/anti_windup.py
 
-docs/laws.md tells what it shows. The cells are the paper's and two UR5, with less torque than they need.
+docs/saturation.md tells what it shows. The cells are the paper's and two UR5, with less torque than needed.
 """
 
 from __future__ import annotations
