@@ -78,6 +78,13 @@ def test_the_warning_says_what_was_learned_meanwhile():
     assert run.names[1] in text
 
 
+@pytest.mark.parametrize("settings", [{"name": "Mine"}, {"name": "Mine", "adaptation": "other"}, {}])
+def test_the_warning_takes_whatever_settings_an_adaptation_of_ones_own_has(settings):
+    run = cut_run()
+    with pytest.warns(SaturationWarning, match="adaptation=Guarded"):
+        warn_of_saturation(replace(run, info={**run.info, "adaptation": settings}))
+
+
 @pytest.mark.parametrize(("largest", "mentioned"), [(5.88, False), (5.9, False), (6.0, True)])
 def test_estimates_that_hardly_grew_are_not_mentioned(largest, mentioned):
     run = cut_run()

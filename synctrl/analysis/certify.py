@@ -207,7 +207,7 @@ _WORDS = {
     "network": "what the network keeps robots from knowing",
     "friction": "friction that the model does not contain",
     "disturbance": "torque from outside",
-    "saturation": "torque that saturation takes away",
+    "saturation": "torque that saturation takes away, for which no adaptation makes up while it lasts",
     "model error": "parameters that are wrong and not adapted",
     "damped inverse": "a reference that damped inverse kinematics do not follow",
     "other": "forces that the model does not contain",

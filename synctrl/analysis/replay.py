@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,7 +39,7 @@ class Moment(NamedTuple):
     """What the closed loop computes at one instant; with one more axis in front, at all of them.
 
     Attributes:
-        v, v_dot, v_ref, a_ref, s_q, tau, disturbance: (n, nv).
+        v, v_dot, v_ref, a_ref, s_q, tau, disturbance: (n, nv); a_ref less what a hedge gives up of it.
         friction: torque of friction that is not in Y, (n, nv).
         friction_damping: torque by which friction in Y damps, F_v s_q, (n, nv).
         cut_off: torque that saturation takes from tau, (n, nv).
@@ -184,7 +184,8 @@ def _row(
     M, C_s = _dynamics(bodies, q, v, s.s_q)
     friction, friction_damping = _friction(loop, bodies, q, v, s)
     return Moment(
-        v, loop.split(y_dot)[1], s.v_ref, s.a_ref, s.s_q, s.tau, disturbance, friction, friction_damping,
+        v, loop.split(y_dot)[1], s.v_ref, s.a_ref - _given_up(adaptation, z, s), s.s_q, s.tau,
+        disturbance, friction, friction_damping,
         s.tau - loop.plant.applied(s.tau), np.array(adaptation.storage(z, theta)),
         np.array(adaptation.storage_rate(z, s.z_dot, theta)),
         np.array([*adaptation.powers(z, theta, s.seen).values()]), s.epsilon, s.epsilon_dot,
@@ -192,6 +193,11 @@ def _row(
         reference.c_dot, reference.c_inv, J, J_inv, M, C_s,
         np.matvec(np.abs(s.Y), np.abs(s.theta_hat) + np.abs(theta)),
     )  # fmt: skip
+
+
+def _given_up(adaptation: Any, z: np.ndarray, s: Signals) -> np.ndarray | float:
+    """What an adaptation that moves the desired motion takes from v_ref' at this instant, (n, nv)."""
+    return adaptation.given_up(z, s.seen) if hasattr(adaptation, "shift") else 0.0
 
 
 def _state(result: Result, k: int) -> np.ndarray:

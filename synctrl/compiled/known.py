@@ -180,6 +180,10 @@ def _check_class(kind: type) -> None:
 
 def _check_controller(controller: Controller) -> None:
     """Refuse a controller whose parts no longer say what it does: it made some of them into others."""
+    if hasattr(controller.adaptation, "shift"):
+        raise _refusal(
+            "adaptation", _name(controller.adaptation), "an adaptation that moves the desired motion"
+        )
     own = [part for part in (controller, controller.law) if isinstance(part, (Controller, BoundSunMills))]
     for name in ("Lambda", "beta", "K_eps"):
         then = np.broadcast_to(getattr(controller.gains, name), (controller.cell.m,))

@@ -30,7 +30,7 @@ from ..errors import InputError
 from ..robots.momentum import momentum_of_all
 from .algebra import array_of, column_of, symbols
 
-#: what a rate is a function of, beside z and the gradient
+#: what a rate is a function of, beside z, the gradient and the regressor
 MOTION = ("q", "v", "v_ref", "a_ref", "s_q", "tau", "applied")
 
 
@@ -39,7 +39,8 @@ class Learning(NamedTuple):
 
     Attributes:
         estimate: CasADi function, z -> theta_hat.
-        rate: CasADi function, z, q, v, v_ref, a_ref, s_q, tau, what is applied of it, Y^T s_q -> z'.
+        rate: CasADi function, z, q, v, v_ref, a_ref, s_q, tau, what is applied of it, Y^T s_q, Y row by
+            row -> z'.
         settle: CasADi function, z -> z after a step; None if it stays what it is.
         leap: CasADi function, z, z', h -> z after a sample of h s; None if that is z + h z', settled.
     """
@@ -88,16 +89,18 @@ def trace_learning(controller: Controller, momentum: Sequence[Callable[[], Any]]
         counts = [len(parameters.theta) for parameters in cell.parameters]
         z = symbols("z", *adaptation.start().shape)
         gradient = _padded("gradient", counts, cell.theta.shape[1])
+        Y = _padded_matrices("regressor", joints, counts, (cell.n, cell.nv, cell.theta.shape[1]))
         motion = {name: _padded(name, joints, cell.nv) for name in MOTION}
         estimates, settled = adaptation.estimate(z), adaptation.settle(z)
         known = partial(_momentum, momentum, motion["q"], motion["v"], cell.theta.shape[1])
-        rates = adaptation.rate(z, Seen(**motion, gradient=gradient, regressor=None, momentum=known))
+        seen = Seen(**motion, gradient=gradient, regressor=Y, momentum=known)
+        rates = adaptation.rate(z, seen)
         z_dot, h = symbols("z_dot", *z.shape), np.tile(symbols("h", 1), (cell.n, 1))
         leapt = adaptation.leap(z, z_dot, h[:1, 0]) if hasattr(adaptation, "leap") else None
         return [
             Learning(
                 _function("estimate", i, [z], [estimates[:, :P]]),
-                _function("rate", i, [z, *(x[:, :nv] for x in motion.values()), gradient[:, :P]], [rates]),
+                _function("rate", i, [z, *_inputs(seen, nv, P)], [rates]),
                 None if settled is z else _function("settle", i, [z], [settled]),
                 None if leapt is None else _function("leap", i, [z, z_dot, h], [leapt]),
             )
@@ -187,12 +190,14 @@ class ChosenAdaptation:
         """What one robot sees, in the larger cell."""
         found = {name: np.zeros_like(self._cell.v0) for name in MOTION}
         found["gradient"] = np.zeros_like(self._cell.theta)
+        found["regressor"] = np.zeros((*self._cell.v0.shape, self._cell.theta.shape[1]))
         for name, rows in found.items():
             value = getattr(seen, name)[row]
-            rows[self._robots[row], : len(value)] = value
+            place: Any = (self._robots[row], *map(slice, value.shape))
+            rows[place] = value
         cell = self._cell
         momentum = partial(momentum_of_all, cell.robots, cell.parameters, found["q"], found["v"])
-        return Seen(**found, regressor=None, momentum=momentum)
+        return Seen(**found, momentum=momentum)
 
 
 # -- internals --------------------------------------------------------------------------------------------
@@ -232,6 +237,21 @@ def _momentum(
         regressors = function(*(column_of(part[i, :nv]) for part in (q, v)))
         found[:, i, :nv, :columns] = [array_of(part) for part in regressors]
     return found[0], found[1]
+
+
+def _inputs(seen: Seen, nv: int, P: int) -> list[np.ndarray]:
+    """What a rate is a function of beside z, for robots with nv joints and P parameters."""
+    return [*(getattr(seen, x)[:, :nv] for x in MOTION), seen.gradient[:, :P], seen.regressor[:, :nv, :P]]
+
+
+def _padded_matrices(
+    name: str, rows: Sequence[int], columns: Sequence[int], shape: tuple[int, int, int]
+) -> np.ndarray:
+    """Matrices of symbols, (n, longest, longest), padded with zeros."""
+    matrices = np.zeros(shape, dtype=object)
+    for matrix, nv, P in zip(matrices, rows, columns, strict=True):
+        matrix[:nv, :P] = symbols(name, nv, P)
+    return matrices
 
 
 def _padded(name: str, lengths: Sequence[int], longest: int) -> np.ndarray:

@@ -125,9 +125,9 @@ class Trace:
         v_ref, a_ref, s_q, feedback = law.compute_joint_command(
             asked, task, self._row("v"), self.space, self._row("K_r"), self.kind.k_r_space
         )
-        model_torque, gradient = self._adaptive(v_ref, a_ref, s_q)
+        model_torque, gradient, Y = self._adaptive(v_ref, a_ref, s_q)
         tau = model_torque + feedback
-        z_dot = self._learned(gradient, (v_ref, a_ref, s_q, tau))
+        z_dot = self._learned(gradient, Y, (v_ref, a_ref, s_q, tau))
         lost = velocity_lost(self._jacobians()[0], v_ref, asked.xref_dot) if self.kind.damped else None
         return self._function(
             "control",
@@ -160,21 +160,22 @@ class Trace:
             yield self._function("leap", leapt=array_of(learning.leap(*sampled)))
 
     def _adaptive(self, v_ref: np.ndarray, a_ref: np.ndarray, s_q: np.ndarray) -> tuple:
-        """Y theta_hat and Y^T s_q; with (14) the state z of the adaptation is theta_hat."""
+        """Y theta_hat, Y^T s_q and Y row by row; with (14) the state z of the adaptation is theta_hat."""
         learning, z = self.kind.learning, self.given["z"]
         motion = tuple(map(column_of, (v_ref, a_ref, s_q)))
         if learning is None:
-            return tuple(array_of(part, -1) for part in self._model(z, *motion))
+            return (*(array_of(part, -1) for part in self._model(z, *motion)), None)
         theta_hat = self.given["theta_hat"]
-        parts = self.ca.substitute([*self._model(theta_hat, *motion)], [theta_hat], [learning.estimate(z)])
-        return tuple(array_of(part, -1) for part in parts)
+        torque, gradient = self._model(theta_hat, *motion)
+        parts = self.ca.substitute([torque, gradient], [theta_hat], [learning.estimate(z)])
+        return tuple(array_of(part, -1) for part in (*parts, self.ca.jacobian(torque, theta_hat)))
 
-    def _learned(self, gradient: np.ndarray, motion: tuple[np.ndarray, ...]) -> np.ndarray:
+    def _learned(self, gradient: np.ndarray, Y: np.ndarray, motion: tuple[np.ndarray, ...]) -> np.ndarray:
         """z' of the adaptation, given v_ref, a_ref, s_q and tau."""
         learning, tau, limits = self.kind.learning, motion[-1], self._row("limits")
         if learning is None:
             return self._row("Gamma") * gradient
-        rows = (*motion, limited(tau, -limits, limits), gradient)
+        rows = (*motion, limited(tau, -limits, limits), gradient, Y)
         return array_of(learning.rate(self.given["z"], self.q, self.v, *map(column_of, rows)))
 
     def _model(self, theta_hat: Any, v_ref: Any, a_ref: Any, s_q: Any) -> tuple[Any, Any]:

@@ -24,7 +24,7 @@ from ..robots.regressors import Regressors, make_regressors
 from ..tasks.algebra import limited
 from ..tasks.spaces import Measurement
 from . import law, laws
-from .adaptation import Adaptation, Seen, chosen
+from .adaptation import Adaptation, Seen, chosen, shift_of
 from .gains import Gains, spread, spread_rows
 from .laws import Asked, BoundLaw, Errors, Law, completed, no_errors
 from .network import BoundNetwork, Ideal, Network, Received
@@ -144,6 +144,7 @@ class Controller:
         connection = Ideal() if network is None else network
         offers("network", connection, ("bind",), "a network, for example Ideal()")
         self.network, self.network_settings = connection.bind(cell), settings_of(connection)
+        self._shift = shift_of(self.adaptation, self.network)
         self.torque_limits = limits("torque_limits", torque_limits, (cell.n, cell.nv))
         self._cuts = bool(np.isfinite(self.torque_limits).any())
         check_parts(self.law, self.network, cell.n, cell.coupling.pairs, m)
@@ -211,7 +212,8 @@ class Controller:
         """
         (q, v), cell = motion, self.cell
         space, weights = cell.task, reference.weights
-        task = space.measure(motion, reference.desired)
+        desired = reference.desired if self._shift is None else self._shift(z, reference)
+        task = space.measure(motion, desired)
         w = law.compute_weighted_errors(weights, task.error)
         received = self.network.exchange(reference.t, w, integral)
         errors = Errors(reference.t, task.error, task.motion[1], task.rates, w, received.shares, weights)

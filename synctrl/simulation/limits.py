@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 #: the output that has what was left of the torque
 APPLIED = "applied_torque"
+#: adaptations that keep estimates within bounds, and need no advice
+BOUNDED = "Ball", "Box"
 #: growth of the estimates that is worth a word, as a share of what they were
 GROWN = 0.01
 
@@ -146,10 +148,30 @@ def warn_of_saturation(result: Result) -> None:
         f"{max(entry['share'] for entry in found):.0%} of the time; {result.names[worst['robot']]}, joint "
         f"{worst['joint'] + 1} asked for {worst['largest']:.3g} {worst['unit']} of its "
         f"{worst['limit']:.3g}. Estimates and integrals of the synchronization errors went on meanwhile as "
-        f"if it had got it{_learned(found)}. See info['saturation'] and "
-        f"outputs['{APPLIED}']; lower the gains, or ask for a slower motion",
+        f"if it had got it{_within(result)}{_learned(found)}. See info['saturation'] and "
+        f"outputs['{APPLIED}']; lower the gains, or ask for a slower motion{_advice(result)}",
         SaturationWarning,
     )
+
+
+def _bounds(result: Result) -> str:
+    """The adaptation that keeps estimates within bounds, by name; empty if there is none."""
+    settings = result.info["adaptation"]
+    while isinstance(settings.get("adaptation"), Mapping):  # the one that it slows down, or hedges
+        settings = settings["adaptation"]
+    name = settings.get("name")
+    return name if name in BOUNDED else ""
+
+
+def _within(result: Result) -> str:
+    """Within which bounds the estimates went on, in words."""
+    name = _bounds(result)
+    return f", estimates within those of the adaptation {name}" if name else ""
+
+
+def _advice(result: Result) -> str:
+    """What keeps estimates within bounds, in words, if nothing does."""
+    return "" if _bounds(result) else "; adaptation=Guarded(Ball(...)) keeps estimates within bounds"
 
 
 def _learned(found: list[dict[str, Any]]) -> str:

@@ -129,6 +129,8 @@ class Recorder:
         described.update(account.report)
         described["saturation"] = saturation_report(plant, arrays)
         found = {name: (array, "SI", _STATE_AXES[name]) for name, array in states.items()}
+        if hasattr(self._loop.controller.adaptation, "outputs"):
+            found |= self._loop.controller.adaptation.outputs(states[ADAPTATION_STATE])
         found |= {**applied_output(plant, arrays["tau"]), **account.outputs}
         outputs = {name: array for name, (array, _, _) in found.items()}
         described["outputs"] = {n: {"unit": unit, "axes": list(axes)} for n, (_, unit, axes) in found.items()}
@@ -138,7 +140,10 @@ class Recorder:
 #: outputs that have what an adaptation, a network and a plant have of their own in the state of the loop
 ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE = "adaptation_state", "network_state", "plant_state"
 #: further names of entries and outputs that a result gets from elsewhere
-OF_EVERY_RUN = "status", "outputs", "damping", "limits", "saturation", "step_error", "run", "format", APPLIED
+OF_EVERY_RUN = (
+    *("status", "outputs", "damping", "limits", "saturation", "step_error", "run", "format"),
+    *(APPLIED, "hedge"),
+)
 #: how every array is read from a sample and the parts of its state; the last one from int epsilon
 ROW: dict[str, Callable[[Sample, State, np.ndarray], Any]] = {
     "t": lambda at, y, _: at.t,

@@ -123,6 +123,18 @@ class PayloadSchedule(Windows):
             for t in (0.0, *self.edges)
         ]
 
+    @property
+    def carried(self) -> np.ndarray:
+        """Most that payloads add to the inertial parameters of each robot, (n,), as a share of these."""
+        added = [[_length(r, free) for r, free in zip(row, self.free, strict=True)] for row in self.robots]
+        return np.max(added, axis=0) / [_length(free) for free in self.free]
+
+
+def _length(robot: Robot, free: Robot | None = None) -> float:
+    """Of the inertial parameters of a robot, or of their difference from those of another."""
+    known = 0.0 if free is None else free.inertial_parameters
+    return float(np.linalg.norm(robot.inertial_parameters - known))
+
 
 def _loaded(robot: Robot, i: int, payloads: Sequence[Payload], t: float) -> Robot:
     for payload in payloads:

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from ..checks import boolean, choice, instance, label, positive_number
-from ..control.adaptation import Adaptation
+from ..control.adaptation import Adaptation, bounded
 from ..control.controller import Controller
 from ..control.discrete import DiscreteController
 from ..control.gains import Gains
@@ -60,7 +60,8 @@ class Experiment:
         payloads: what robots pick up and put down, of which the controller is not told.
         saturate: whether the plant cuts torques off at the limits of the robots' descriptions.
         plant_type: `Plant`, or a kind of plant with a state of its own.
-        adaptation: how the controller learns; by default `Gradient(gains.Gamma)`, eq. (14).
+        adaptation: how the controller learns; by default `Gradient(gains.Gamma)`, eq. (14), which is
+            `bounded` if the plant saturates, so that estimates cannot run away.
         law: from errors to reference motion and force; by default `SunMills`.
         network: what the robots know of each other; by default `Ideal`.
 
@@ -95,10 +96,11 @@ class Experiment:
     def closed_loop(self, plant: str = "pinocchio") -> ClosedLoop:
         """The differential equation of this experiment; `plant` as in `simulate`."""
         body = self.plant_type(self.cell, physics=plant, payloads=self.payloads, saturate=self.saturate)
+        gains, adaptation = self._learning(body)
         controller = Controller(
             self.cell,
-            self.gains,
-            adaptation=self.adaptation,
+            gains,
+            adaptation=adaptation,
             law=self.law,
             network=self.network,
             torque_limits=torque_limits(self.cell) if self.saturate else None,
@@ -106,6 +108,13 @@ class Experiment:
             k_r_space=self.k_r_space,
         )
         return ClosedLoop(controller, body)
+
+    def _learning(self, plant: Plant) -> tuple[Gains, Adaptation | None]:
+        """Gains and adaptation of the controller: (14) is bounded where its torque may be cut off."""
+        Gamma = self.gains.Gamma
+        if self.adaptation is not None or Gamma is None or not np.isfinite(plant.torque_limits).any():
+            return self.gains, self.adaptation
+        return self.gains.replace(Gamma=None), bounded(self.cell, Gamma, plant.schedule.carried)
 
     def simulate(
         self,

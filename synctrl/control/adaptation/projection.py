@@ -158,8 +158,8 @@ class BoundBall(Projected):
     def settle(self, z: np.ndarray) -> np.ndarray:
         far = z - self.theta_hat0
         length = distance(self.metric, far)
-        scale = self.radius / limited(length, self.radius, np.inf)
-        return self.theta_hat0 + scale[:, None] * far
+        excess = 1 - self.radius / limited(length, self.radius, np.inf)  # 0 inside, where z stays what it is
+        return z - excess[:, None] * far
 
 
 def _check_box(cell: Cell, lower: np.ndarray, upper: np.ndarray) -> None:

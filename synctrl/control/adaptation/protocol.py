@@ -36,7 +36,7 @@ class Seen:
         v_ref, a_ref: reference velocity and acceleration, (n, nv).
         s_q: v_ref - v, (n, nv).
         gradient: Y^T s_q, (n, P).
-        regressor: Y, (n, nv, P); not in generated code.
+        regressor: Y, (n, nv, P).
         tau: torque that the controller asks for, (n, nv), N·m.
         applied: what the limits that it knows leave of it, (n, nv), N·m.
         momentum: gives the regressors of momentum; a function, because they take time and few ask for them.
@@ -94,6 +94,29 @@ def after_sample(adaptation: Any, z: np.ndarray, z_dot: np.ndarray, h: float) ->
     """
     leap = getattr(adaptation, "leap", None)
     return adaptation.settle(z + h * z_dot) if leap is None else leap(z, z_dot, h)
+
+
+def shift_of(adaptation: Any, network: Any) -> Any:
+    """The method by which an adaptation moves the desired motion; None if it has none.
+
+    It takes z and the `Reference`, and gives xd, xd' and xd'', (3, n, m), that controller and coupling see in
+    place of the reference's; the log keeps those. With it there is `given_up`, from z and `Seen` to what is
+    missing of v_ref' in a_ref, (n, nv).
+
+    Args:
+        adaptation, network: for the robots of one cell.
+
+    Raises:
+        InputError: a network whose messages would tell of the motion that was not moved.
+    """
+    shift = getattr(adaptation, "shift", None)
+    if shift is not None and hasattr(network, "messages"):
+        raise InputError(
+            f"{type(adaptation).__name__} moves the desired motion, of which messages do not know; expected "
+            f"a network without messages, for example Ideal(), found {type(network).__name__}",
+            subject="network",
+        )
+    return shift
 
 
 class Adaptation(Protocol):
