@@ -53,12 +53,12 @@ class Guarded:
         """This adaptation for a cell.
 
         Raises:
-            InputError: an adaptation without a Gamma, or one that does not fit.
+            InputError: an adaptation without a Gamma, or whose Gamma may change, or one that does not fit.
         """
         inner: Any = self.adaptation.bind(cell)
-        if not hasattr(inner, "metric"):
+        if not hasattr(getattr(inner, "metric", None), "raised"):  # of `Composite` it is one of each state
             raise InputError(
-                "Guarded expects an adaptation with a Gamma, for example Gradient, Leakage, Box or Ball, "
+                "Guarded expects an adaptation with one Gamma, for example Gradient, Leakage, Box or Ball, "
                 f"found {type(self.adaptation).__name__}",
                 subject="adaptation",
                 found=type(self.adaptation).__name__,
