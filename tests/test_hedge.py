@@ -12,7 +12,7 @@ from refusals import refused
 
 from synctrl import Cell, Coupling, Disturbance, Experiment
 from synctrl.analysis.certify import certify
-from synctrl.control.adaptation import Gradient, Hedged
+from synctrl.control.adaptation import Composite, Gradient, Hedged, Natural
 from synctrl.control.network import Ideal
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, planar_four, ur5_payload
@@ -104,6 +104,15 @@ def test_without_a_cut_a_hedge_is_the_adaptation_itself_bit_for_bit(make, option
         for name in LAYOUT:
             np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
         assert not found.outputs["hedge"].any()
+
+
+@pytest.mark.parametrize("adaptation", [Natural(0.1), Composite(0.3, 2.0, 20.0)])
+def test_a_hedge_goes_from_sample_to_sample_as_the_adaptation_does(adaptation):
+    found, expected = (
+        a460_pair(adaptation=each).simulate(0.05, control_period=5e-3)
+        for each in (Hedged(adaptation, 5.0), adaptation)
+    )
+    np.testing.assert_array_equal(found.theta_hat, expected.theta_hat)
 
 
 def test_sampled_control_hedges_as_continuous_control_does():
