@@ -154,6 +154,7 @@ class Posted(Ideal):
         ("pull", lambda: Hedged(Gradient(0.3), 0.0)),
         ("speed", lambda: Hedged(Gradient(0.3), 8.0, -1.0)),
         ("adaptation", lambda: Hedged(0.3, 8.0)),
+        ("adaptation", lambda: a460_pair(adaptation=Hedged(Hedged(Gradient(0.3), 8.0), 8.0))),
         ("space", lambda: ur5_payload(adaptation=Hedged(Gradient(0.3), 8.0))),
         ("theta_hat0 of robot 1", lambda: Hedged(Gradient(0.3), 8.0).bind(unknowing())),
         ("coupling", lambda: Hedged(Gradient(0.3), 8.0).bind(waving())),

@@ -70,11 +70,17 @@ class Hedged:
 
         Raises:
             InputError: a task that is neither one of joints nor of positions with as many joints, weights
-                that move, or a first estimate of which the mass matrix is not positive definite.
+                that move, an adaptation that moves the desired motion itself, or a first estimate of which
+                the mass matrix is not positive definite.
         """
         _check_task(cell)
+        inner: Any = self.adaptation.bind(cell)
+        if hasattr(inner, "shift"):
+            found = type(self.adaptation).__name__
+            expected = "Hedged expects an adaptation that leaves the desired motion alone"
+            raise InputError(f"{expected}, found {found}", subject="adaptation", found=found)
         speeds = [SPEEDS.get(unit, 1.0) if self.speed is None else self.speed for unit in cell.units]
-        return BoundHedged(cell, self.adaptation.bind(cell), self.pull, np.array(speeds))
+        return BoundHedged(cell, inner, self.pull, np.array(speeds))
 
     def as_dict(self) -> dict[str, Any]:
         settings = {"pull": self.pull, "speed": self.speed, "adaptation": self.adaptation.as_dict()}
