@@ -126,6 +126,9 @@ def test_the_balance_of_v_closes_while_the_guard_acts():
         ("adaptation", lambda: Guarded(Natural(0.1)).bind(CELL)),
         ("adaptation", lambda: Guarded(Composite(0.3, 2.0, 20.0)).bind(CELL)),
         ("Gamma", lambda: Guarded(Gradient(np.ones(7))).bind(CELL)),
+        ("cell", lambda: bounded(a460_pair(), 0.3)),
+        ("carried", lambda: bounded(CELL, 0.3, [0.1, 0.2, 0.3])),
+        ("carried", lambda: bounded(CELL, 0.3, np.nan)),
     ],
 )
 def test_what_cannot_be_guarded_is_refused(subject, make):
