@@ -14,7 +14,7 @@ from synctrl import Cell, Coupling, Disturbance, Experiment
 from synctrl.analysis.certify import certify
 from synctrl.control.adaptation import Composite, Gradient, Hedged, Natural
 from synctrl.control.network import Ideal
-from synctrl.errors import InputError
+from synctrl.errors import InputError, SaturationWarning
 from synctrl.experiments import a460_pair, planar_four, ur5_payload
 from synctrl.simulation.result import LAYOUT
 
@@ -64,6 +64,12 @@ def test_a_certificate_names_the_hedge_and_what_was_cut_off():
     outside = certify(weak_joints().simulate(0.1)).outside
     assert any("hedge" in text for text in outside)
     assert any("torque that saturation takes away" in text for text in outside)
+
+
+def test_the_warning_of_saturation_says_that_the_desired_motion_gave_way():
+    with pytest.warns(SaturationWarning, match="desired motion gave way") as caught:
+        weak_joints().simulate(0.02)
+    assert not any("as if it had got it" in str(warning.message) for warning in caught)
 
 
 def test_nothing_is_learned_while_much_torque_is_missing():
