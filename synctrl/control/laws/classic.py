@@ -54,8 +54,9 @@ class BoundSlotineLi:
 class ComputedTorque:
     """The dynamics inverted: tau = M_hat a + C_hat v + g_hat,  xref'' = xd'' + 2 Lambda e' + Lambda^2 e.
 
-    The reference velocity is the measured one, so that s_q is zero: nothing is damped or learned. An arm with
-    spare joints damps what its task does not see.
+    The reference velocity is the measured one, so that s_q is zero: nothing is damped, or learned from
+    errors; `Composite` learns from predictions all the same. An arm with spare joints damps what its task
+    does not see.
 
     Raises:
         InputError: when it is bound, gains beta or K_eps that are not zero.
