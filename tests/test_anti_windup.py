@@ -14,7 +14,7 @@ from refusals import refused
 
 from synctrl import Experiment, Payload
 from synctrl.analysis.certify import certify
-from synctrl.control.adaptation import Ball, Gradient, Guarded, Leakage, Natural, Seen, bounded
+from synctrl.control.adaptation import Ball, Composite, Gradient, Guarded, Leakage, Natural, Seen, bounded
 from synctrl.control.adaptation.gradient import metric_of
 from synctrl.control.adaptation.metric import distance
 from synctrl.errors import InputError, SaturationWarning
@@ -124,7 +124,11 @@ def test_the_balance_of_v_closes_while_the_guard_acts():
         ("rate", lambda: Guarded(Gradient(0.3), -1.0)),
         ("adaptation", lambda: Guarded(0.3)),
         ("adaptation", lambda: Guarded(Natural(0.1)).bind(CELL)),
+        ("adaptation", lambda: Guarded(Composite(0.3, 2.0, 20.0)).bind(CELL)),
         ("Gamma", lambda: Guarded(Gradient(np.ones(7))).bind(CELL)),
+        ("cell", lambda: bounded(a460_pair(), 0.3)),
+        ("carried", lambda: bounded(CELL, 0.3, [0.1, 0.2, 0.3])),
+        ("carried", lambda: bounded(CELL, 0.3, np.nan)),
     ],
 )
 def test_what_cannot_be_guarded_is_refused(subject, make):

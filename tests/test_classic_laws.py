@@ -113,6 +113,14 @@ def test_a_target_that_stands_still_is_reached():
     assert np.abs(result.tracking_error[-1]).max() <= 1e-3 * np.abs(result.q[-1] - result.q[0]).max()
 
 
+def test_exact_gravity_that_is_adapted_leaves_an_arm_at_rest_beside_its_target():
+    """tilde grows by Gamma times what the potential energy did, so that J^T K_p e = Y tilde at rest."""
+    experiment = knowing(a460_pair(friction=False))
+    result = under(PDGravity(400.0), experiment, K_r=60.0, Gamma=3.0).simulate(5.0, dt=2e-3)
+    assert np.abs(result.v[-1]).max() < 1e-6
+    assert np.abs(result.tracking_error[-1]).max() > 1e-2 * np.abs(result.q[-1] - result.q[0]).max()
+
+
 # -- master and slaves --------------------------------------------------------------------------------------
 
 

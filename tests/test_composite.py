@@ -197,6 +197,11 @@ def test_with_a_memory_estimates_converge_exponentially_at_rest_where_the_gradie
     np.testing.assert_allclose(end / middle, middle / start, rtol=0.5)
 
 
+def test_a_memory_that_fades_stops_pulling_at_rest_and_leaves_an_error():
+    middle, end = errors_of(arms(Composite(0.002, 5.0, 20.0, memory=5.0, fade=5.0)), 2.0, 3.0)
+    assert (end > 0.95 * middle).all() and (end > 0.05).all()
+
+
 def test_forgotten_gamma_shrinks_where_something_is_learned_and_grows_back_to_its_bound():
     result = (experiment := arms(FORGETTING)).simulate(1.5, dt=2e-3)
     bound = FORGETTING.bind(experiment.cell)

@@ -12,9 +12,9 @@ from refusals import refused
 
 from synctrl import Cell, Coupling, Disturbance, Experiment
 from synctrl.analysis.certify import certify
-from synctrl.control.adaptation import Gradient, Hedged
+from synctrl.control.adaptation import Composite, Gradient, Hedged, Natural
 from synctrl.control.network import Ideal
-from synctrl.errors import InputError
+from synctrl.errors import InputError, SaturationWarning
 from synctrl.experiments import a460_pair, planar_four, ur5_payload
 from synctrl.simulation.result import LAYOUT
 
@@ -66,6 +66,12 @@ def test_a_certificate_names_the_hedge_and_what_was_cut_off():
     assert any("torque that saturation takes away" in text for text in outside)
 
 
+def test_the_warning_of_saturation_says_that_the_desired_motion_gave_way():
+    with pytest.warns(SaturationWarning, match="desired motion gave way") as caught:
+        weak_joints().simulate(0.02)
+    assert not any("as if it had got it" in str(warning.message) for warning in caught)
+
+
 def test_nothing_is_learned_while_much_torque_is_missing():
     run = pushed().simulate(0.15)
     missing = np.abs(run.outputs["applied_torque"] - run.tau)
@@ -104,6 +110,15 @@ def test_without_a_cut_a_hedge_is_the_adaptation_itself_bit_for_bit(make, option
         for name in LAYOUT:
             np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
         assert not found.outputs["hedge"].any()
+
+
+@pytest.mark.parametrize("adaptation", [Natural(0.1), Composite(0.3, 2.0, 20.0)])
+def test_a_hedge_goes_from_sample_to_sample_as_the_adaptation_does(adaptation):
+    found, expected = (
+        a460_pair(adaptation=each).simulate(0.05, control_period=5e-3)
+        for each in (Hedged(adaptation, 5.0), adaptation)
+    )
+    np.testing.assert_array_equal(found.theta_hat, expected.theta_hat)
 
 
 def test_sampled_control_hedges_as_continuous_control_does():
@@ -145,6 +160,7 @@ class Posted(Ideal):
         ("pull", lambda: Hedged(Gradient(0.3), 0.0)),
         ("speed", lambda: Hedged(Gradient(0.3), 8.0, -1.0)),
         ("adaptation", lambda: Hedged(0.3, 8.0)),
+        ("adaptation", lambda: a460_pair(adaptation=Hedged(Hedged(Gradient(0.3), 8.0), 8.0))),
         ("space", lambda: ur5_payload(adaptation=Hedged(Gradient(0.3), 8.0))),
         ("theta_hat0 of robot 1", lambda: Hedged(Gradient(0.3), 8.0).bind(unknowing())),
         ("coupling", lambda: Hedged(Gradient(0.3), 8.0).bind(waving())),

@@ -298,6 +298,7 @@ def test_the_metric_of_bodies_follows_the_unit_of_length(seed):
         (lambda: Gradient([np.triu(np.ones((3, 3)))]), "Gamma of robot 1"),
         (lambda: Gradient([np.eye(3), -np.eye(3)]), "Gamma of robot 2"),
         (lambda: Gradient([np.eye(3)]).bind(CELL), "Gamma"),
+        (lambda: Gradient(np.eye(P)).bind(CELL), "Gamma"),
         (lambda: Gradient([np.eye(P)] * 3).bind(CELL), "Gamma"),
         (lambda: Gradient.pullback(load_robot("a460"), 0.0), "gamma"),
         (lambda: Leakage(0.3, 0.0), "rate"),

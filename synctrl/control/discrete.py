@@ -44,7 +44,7 @@ class DiscreteController:
         controller: the law.
         period: time between two calls of `step`, s.
         torque_limits: (n, nv), N·m, at which the torque of the joints is cut off, gravity included; by
-            default it is not.
+            default it is not. What adaptations know of are the controller's, see `Controller`.
         include_gravity: False for robots that add the torque of gravity by themselves: it is then taken off,
             as the robots' descriptions have it.
         faults: what a measurement that is not finite, a period that was missed, or a time that is off the

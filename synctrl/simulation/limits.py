@@ -147,8 +147,7 @@ def warn_of_saturation(result: Result) -> None:
         f"{result.info['title']}: torque was cut off at {len(found)} joints, for up to "
         f"{max(entry['share'] for entry in found):.0%} of the time; {result.names[worst['robot']]}, joint "
         f"{worst['joint'] + 1} asked for {worst['largest']:.3g} {worst['unit']} of its "
-        f"{worst['limit']:.3g}. Estimates and integrals of the synchronization errors went on meanwhile as "
-        f"if it had got it{_within(result)}{_learned(found)}. See info['saturation'] and "
+        f"{worst['limit']:.3g}. {_meanwhile(result)}{_learned(found)}. See info['saturation'] and "
         f"outputs['{APPLIED}']; lower the gains, or ask for a slower motion{_advice(result)}",
         SaturationWarning,
     )
@@ -163,10 +162,14 @@ def _bounds(result: Result) -> str:
     return name if name in BOUNDED else ""
 
 
-def _within(result: Result) -> str:
-    """Within which bounds the estimates went on, in words."""
+def _meanwhile(result: Result) -> str:
+    """What controllers did while torque was cut off, in words."""
+    if result.info["adaptation"].get("name") == "Hedged":
+        did = "The desired motion gave way meanwhile, see outputs['hedge'], and little was learned"
+    else:
+        did = "Estimates and integrals of the synchronization errors went on meanwhile as if it had got it"
     name = _bounds(result)
-    return f", estimates within those of the adaptation {name}" if name else ""
+    return f"{did}, estimates within the bounds of the adaptation {name}" if name else did
 
 
 def _advice(result: Result) -> str:

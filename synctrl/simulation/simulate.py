@@ -152,7 +152,7 @@ class Experiment:
 
         Warns:
             SaturationWarning, StepWarning: torque was cut off; the step of "rk4" was too long.
-        RobotWarning: a robot's description states friction, and nobody says whether it acts.
+            RobotWarning: a robot's description states friction, and nobody says whether it acts.
         """
         run = self.plan(duration, dt, control_period, plant, log_dt)
         return _carry_out(run, integrator, engine, (rtol, atol), progress)

@@ -32,9 +32,9 @@ class Composite:
     """theta_hat' = Gamma (Y^T s_q + R W^T (y - W theta_hat) + kappa (b - Q theta_hat)).
 
     y is the torque that acts, filtered, and y = W theta: so y - W theta_hat shows errors of theta_hat even
-    where velocities are right. Q and b remember what was shown, see `Memory`: once every direction has been,
-    estimates converge exponentially, also when the robots rest. The powers "prediction" and "memory",
-    -R |W tilde|^2 and -kappa tilde^T Q tilde, only take from V.
+    where velocities are right. Q and b remember what was shown, see `Memory`: with `fade` 0, once every
+    direction has been, estimates converge exponentially, also when the robots rest. The powers "prediction"
+    and "memory", -R |W tilde|^2 and -kappa tilde^T Q tilde, only take from V.
 
     All this holds for torque that acts as the controller knows it: what it asks for, within `torque_limits`.
     Any other, such as a push or friction outside the model, enters y and is learned as if the robot were
@@ -47,8 +47,9 @@ class Composite:
         prediction: R, weight of the errors of prediction, 1/(N·m·s), at least 0.
         bandwidth: w of the filter, 1/s, above 0; well below 1 over the step.
         memory: kappa, how fast what is remembered pulls, 1/s, at least 0. It takes P (P + 3)/2 states.
-        fade: mu, how fast what is remembered fades, 1/s, at least 0. With 0 the pull grows without bound for
-            as long as there is excitation, until the step is too long for it.
+        fade: mu, how fast what is remembered fades, 1/s, at least 0. Above 0 the pull of what is not shown
+            again ends after a few times 1/mu, and what is wrong then stays so. With 0 the pull grows without
+            bound for as long as there is excitation, until the step is too long for it.
         forgetting: lambda_0, 1/s, at least 0. Above 0 Gamma follows what is learned, see `Forgetting`: it
             shrinks along what is excited, and recovers. That takes P (P + 1)/2 states, and parameters that
             motion tells apart, such as base parameters; the power "forgetting" only takes from V.

@@ -12,8 +12,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ...checks import offers, positive_number
+from ...checks import finite_array, instance, offers, positive_number
 from ...coupling.cell import Cell
 from ...errors import InputError
 from ...tasks.algebra import limited
@@ -53,12 +54,12 @@ class Guarded:
         """This adaptation for a cell.
 
         Raises:
-            InputError: an adaptation without a Gamma, or one that does not fit.
+            InputError: an adaptation without a Gamma, or whose Gamma may change, or one that does not fit.
         """
         inner: Any = self.adaptation.bind(cell)
-        if not hasattr(inner, "metric"):
+        if not hasattr(getattr(inner, "metric", None), "raised"):  # of `Composite` it is one of each state
             raise InputError(
-                "Guarded expects an adaptation with a Gamma, for example Gradient, Leakage, Box or Ball, "
+                "Guarded expects an adaptation with one Gamma, for example Gradient, Leakage, Box or Ball, "
                 f"found {type(self.adaptation).__name__}",
                 subject="adaptation",
                 found=type(self.adaptation).__name__,
@@ -106,7 +107,7 @@ class BoundGuarded:
         return replace(seen, gradient=p[:, None] * seen.gradient, regressor=p[:, None, None] * seen.regressor)
 
 
-def bounded(cell: Cell, Gamma: Any, carried: np.ndarray | float = 0.0) -> Guarded:
+def bounded(cell: Cell, Gamma: Any, carried: ArrayLike = 0.0) -> Guarded:
     """(14) that stays bounded whatever torque is cut off: guarded, in a ball that holds the truth.
 
     The radius is 1.5 times the distance of theta from theta_hat0 in the norm of Gamma^+, or of 20 % of theta
@@ -116,12 +117,16 @@ def bounded(cell: Cell, Gamma: Any, carried: np.ndarray | float = 0.0) -> Guarde
     Args:
         cell: the robots.
         Gamma: as in `Gradient`.
-        carried: what payloads add to the parameters of each robot, (n,), as a share of theta.
+        carried: what payloads add to the parameters of all robots, or of each, (n,), as a share of theta.
 
     Raises:
-        InputError: a Gamma that `Gradient` would not take, or of another size.
+        InputError: no cell, a Gamma that `Gradient` would not take, or Gamma or shares of another size.
     """
+    instance("cell", cell, Cell, "a Cell")
+    more = finite_array("carried", carried)
+    if more.shape not in ((), (cell.n,)):
+        raise InputError.expected(f"a number or shape ({cell.n},)", more.shape, "carried")
     metric = metric_of(read_metric(Gamma), cell)
     error, size = (distance(metric, part) for part in (cell.theta - cell.theta_hat0, cell.theta))
-    radius = ROOM * (np.maximum(error, UNKNOWN * size) + carried * size)
+    radius = ROOM * (np.maximum(error, UNKNOWN * size) + more * size)
     return Guarded(Ball(Gamma, np.where(radius > 0, radius, 1.0)))  # any serves where nothing is adapted

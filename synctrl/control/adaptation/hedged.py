@@ -24,7 +24,7 @@ from ...coupling.cell import Cell, Reference
 from ...errors import InputError
 from ...robots.regressors import make_regressors
 from ...tasks.spaces import CartesianSpace, JointSpace
-from .protocol import Adaptation, Seen
+from .protocol import Adaptation, Seen, after_sample
 
 #: share of a limit from which on missing torque counts in full
 FULL = 0.02
@@ -70,11 +70,17 @@ class Hedged:
 
         Raises:
             InputError: a task that is neither one of joints nor of positions with as many joints, weights
-                that move, or a first estimate of which the mass matrix is not positive definite.
+                that move, an adaptation that moves the desired motion itself, or a first estimate of which
+                the mass matrix is not positive definite.
         """
         _check_task(cell)
+        inner: Any = self.adaptation.bind(cell)
+        if hasattr(inner, "shift"):
+            found = type(self.adaptation).__name__
+            expected = "Hedged expects an adaptation that leaves the desired motion alone"
+            raise InputError(f"{expected}, found {found}", subject="adaptation", found=found)
         speeds = [SPEEDS.get(unit, 1.0) if self.speed is None else self.speed for unit in cell.units]
-        return BoundHedged(cell, self.adaptation.bind(cell), self.pull, np.array(speeds))
+        return BoundHedged(cell, inner, self.pull, np.array(speeds))
 
     def as_dict(self) -> dict[str, Any]:
         settings = {"pull": self.pull, "speed": self.speed, "adaptation": self.adaptation.as_dict()}
@@ -107,6 +113,11 @@ class BoundHedged:
         learned = z[:, : self._Z]
         settled = self._adaptation.settle(learned)
         return z if settled is learned else np.concatenate((settled, z[:, self._Z :]), axis=1)
+
+    def leap(self, z: np.ndarray, z_dot: np.ndarray, h: float) -> np.ndarray:
+        """What is learned as the adaptation has it, and the hedge along its rate."""
+        learned = after_sample(self._adaptation, z[:, : self._Z], z_dot[:, : self._Z], h)
+        return np.concatenate((learned, z[:, self._Z :] + h * z_dot[:, self._Z :]), axis=1)
 
     def shift(self, z: np.ndarray, reference: Reference) -> np.ndarray:
         """xd - c^-1 xi with its rates, (3, n, m), with xi'' as it is where nothing is cut off."""

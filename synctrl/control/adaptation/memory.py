@@ -1,7 +1,7 @@
 """What composite adaptation remembers: all that was ever predicted, in the size of theta.
 
 Q' = R W^T W - mu Q and b' = R W^T y - mu b keep y = W theta as b = Q theta, so that what was once excited
-goes on pulling: as a stack of old data would, without choosing what to keep.
+goes on pulling until it has faded: as a stack of old data would, without choosing what to keep.
 """
 
 from __future__ import annotations

@@ -112,6 +112,9 @@ def make_metric(gain: Gain, sizes: Sequence[int]) -> DiagonalMetric | FullMetric
         InputError: Gamma of another size.
     """
     if not isinstance(gain, tuple):
+        if isinstance(gain, np.ndarray) and gain.shape == 2 * (max(sizes),) and len(gain) != len(sizes):
+            wanted = "expected a matrix for each robot, (n, P, P), or one for all of them, (1, P, P)"
+            raise InputError(f"{wanted}, found {gain.shape}", subject="Gamma", found=gain.shape)
         return DiagonalMetric(spread_rows("Gamma", gain, sizes))
     matrices = gain * len(sizes) if len(gain) == 1 else gain
     found, expected = tuple(len(matrix) for matrix in matrices), tuple(sizes)

@@ -54,8 +54,9 @@ class BoundSlotineLi:
 class ComputedTorque:
     """The dynamics inverted: tau = M_hat a + C_hat v + g_hat,  xref'' = xd'' + 2 Lambda e' + Lambda^2 e.
 
-    The reference velocity is the measured one, so that s_q is zero: nothing is damped or learned. An arm with
-    spare joints damps what its task does not see.
+    The reference velocity is the measured one, so that s_q is zero: nothing is damped, or learned from
+    errors; `Composite` learns from predictions all the same. An arm with spare joints damps what its task
+    does not see.
 
     Raises:
         InputError: when it is bound, gains beta or K_eps that are not zero.
@@ -93,6 +94,7 @@ class PDGravity:
         tau = g_hat + J^T K_p e - K_r v
 
     In joint space with K_p = K_r Lambda it is K_r (e' + Lambda e) + g_hat for a target that stands still.
+    s_q is -v, from which (14) would learn away from exact gravity: it wants Gamma = 0.
 
     Args:
         K_p: stiffness, a number or (m,), N/m or N·m/rad, above 0.
@@ -103,7 +105,8 @@ class PDGravity:
     """
 
     statement = (
-        "e goes to zero for a target that stands still, with exact gravity; moving targets are followed late"
+        "e goes to zero for a target that stands still, with gravity that is exact and not adapted; moving "
+        "targets are followed late"
     )
 
     free_gain = "K_p"
