@@ -107,7 +107,7 @@ static void evaluate(const Cell *c, Quantities *a, Work *k, const Steps *s, int 
     for (int i = 0; i < c->n; i++) call_measure(c, a, i, k);
     couple(c, a);
     for (int i = 0; i < c->n; i++) call_control(c, a, i, k);
-    memcpy(a->integral_dot, a->epsilon, sizeof(double) * c->p * m);
+    for (int k = 0; k < c->p * m; k++) a->integral_dot[k] = a->epsilon[k] - a->leak[k % m] * a->integral[k];
     move(c, a, a->tau, k);
 }
 

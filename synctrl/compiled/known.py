@@ -185,7 +185,7 @@ def _check_controller(controller: Controller) -> None:
             "adaptation", _name(controller.adaptation), "an adaptation that moves the desired motion"
         )
     own = [part for part in (controller, controller.law) if isinstance(part, (Controller, BoundSunMills))]
-    for name in ("Lambda", "beta", "K_eps"):
+    for name in ("Lambda", "beta", "K_eps", "leak"):
         then = np.broadcast_to(getattr(controller.gains, name), (controller.cell.m,))
         if not all(np.array_equal(getattr(part, name), then) for part in own):
             what = f"a controller whose {name} was changed after its law was made of it"

@@ -228,7 +228,9 @@ def one_after_another(weights: Sequence[np.ndarray]) -> np.ndarray:
 def _constants(loop: ClosedLoop, bases: list[Any]) -> dict[str, np.ndarray]:
     """Arrays of the quantities that do not change in a run, by name; zeros for those that nothing reads."""
     controller, plant, cell = loop.controller, loop.plant, loop.cell
-    found = {name: np.atleast_2d(getattr(controller, name)) for name in ("Lambda", "beta", "K_eps", "K_r")}
+    found = {
+        name: np.atleast_2d(getattr(controller, name)) for name in ("Lambda", "beta", "K_eps", "leak", "K_r")
+    }
     found |= {name: getattr(plant, name) for name in ("viscous", "coulomb", "smoothing")}
     learns, zeros = controller.adaptation, np.zeros_like(cell.theta)
     redundancy = getattr(cell.space, "redundancy", None)

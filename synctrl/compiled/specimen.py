@@ -107,7 +107,8 @@ class Specimen:
     def _gains(self, cell: Cell, k_r_space: str) -> Gains:
         columns = cell.nv if k_r_space == "joint" else cell.m
         Lambda, beta, K_eps = self._positive(3, cell.m)
-        return Gains(Lambda, beta, self._positive(cell.n, columns), K_eps, self._positive(*cell.theta.shape))
+        K_r, Gamma = self._positive(cell.n, columns), self._positive(*cell.theta.shape)
+        return Gains(Lambda, beta, K_r, K_eps, Gamma, leak=0.5 * Lambda)
 
     # -- what it is asked ---------------------------------------------------------------------------------
 

@@ -143,8 +143,8 @@ class Trace:
         """What the law asks of one robot."""
         kind = self.kind
         if kind.law is None:
-            Lambda, beta, K_eps = map(self._row, ("Lambda", "beta", "K_eps"))
-            return BoundSunMills(Lambda, beta, K_eps, kind.reference_acceleration).command(errors)
+            Lambda, beta, K_eps, leak = map(self._row, ("Lambda", "beta", "K_eps", "leak"))
+            return BoundSunMills(Lambda, beta, K_eps, kind.reference_acceleration, leak).command(errors)
         rows = (column_of(getattr(errors, name)) for name in ROWS)
         parts = kind.law(*rows, self.given["weights"])
         return Asked(*(array_of(part, -1) for part in parts))

@@ -27,7 +27,7 @@ from . import law, laws
 from .adaptation import Adaptation, Seen, chosen, shift_of
 from .gains import Gains, spread, spread_rows
 from .laws import Asked, BoundLaw, Errors, Law, completed, no_errors
-from .network import BoundNetwork, Ideal, Network, Received
+from .network import BoundNetwork, Ideal, Network, Received, check_leak
 
 
 @dataclass(slots=True)
@@ -141,13 +141,15 @@ class Controller:
         learning = chosen(gains.Gamma, adaptation)
         self.adaptation, self.adaptation_settings = learning.bind(cell), settings_of(learning)
         self.law, self.law_settings = options.law.bind(cell, gains), settings_of(options.law)
-        connection = Ideal() if network is None else network
+        self.leak = spread("leak", gains.leak, (m,))
+        connection = Ideal(self.leak) if network is None else network
         offers("network", connection, ("bind",), "a network, for example Ideal()")
         self.network, self.network_settings = connection.bind(cell), settings_of(connection)
         self._shift = shift_of(self.adaptation, self.network)
         self.torque_limits = limits("torque_limits", torque_limits, (cell.n, cell.nv))
         self._cuts = bool(np.isfinite(self.torque_limits).any())
         check_parts(self.law, self.network, cell.n, cell.coupling.pairs, m)
+        check_leak(self.network, self.leak)
 
     @property
     def Gamma(self) -> np.ndarray:  # noqa: N802

@@ -29,6 +29,8 @@ class Gains:
         K_r: damping, (nv,), (n, nv) or a list of n rows of different lengths, N·m·s/rad, above 0; (m,) or
             (n, m) if it acts in task space.
         K_eps: stiffness of the coupling, (m,), N·m/rad when c has no unit, 0 for independent control.
+        leak: rate at which integrals of synchronization errors are forgotten, (m,), 1/s, from 0, as the paper
+            has it, to Lambda, which takes them out of the proof: (int epsilon)' = epsilon - leak int epsilon.
         Gamma: rate of the gradient adaptation (14), (P,), (n, P) or a list of n rows of different lengths; 0
             switches the adaptation off. None where a controller is given an adaptation of another kind.
 
@@ -41,6 +43,7 @@ class Gains:
     K_r: Any
     K_eps: Any
     Gamma: Any = None
+    leak: Any = 0.0
 
     def __post_init__(self) -> None:
         for name, positive in _SIGNS.items():
@@ -110,8 +113,9 @@ class Gains:
         return replace(self, **changes)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain numbers and lists under the gains' names."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        """Plain numbers and lists under the gains' names; a leak only if there is one."""
+        named = (field.name for field in fields(self) if field.name != "leak" or self.leak.any())
+        values = {name: getattr(self, name) for name in named}
         return {name: None if value is None else value.tolist() for name, value in values.items()}
 
     def __repr__(self) -> str:
@@ -126,7 +130,7 @@ class Gains:
 
 
 #: which gains must be above zero; the others may be zero
-_SIGNS = {"Lambda": True, "beta": False, "K_r": True, "K_eps": False, "Gamma": False}
+_SIGNS = {"Lambda": True, "beta": False, "K_r": True, "K_eps": False, "Gamma": False, "leak": False}
 #: which gains may differ between robots
 _PER_ROBOT = ("K_r", "Gamma")
 

@@ -11,11 +11,13 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..checks import finite_array, shaped
 from ..coupling.cell import Cell, Reference
 from ..coupling.coupling import Coupling
 from ..errors import InputError, NonFiniteError
+from .gains import spread
 from .law import compute_weighted_errors
 
 #: how far beyond an interval a message may be that counts as in it, as a share of its ends
@@ -28,7 +30,7 @@ class Received(NamedTuple):
     Attributes:
         epsilon, epsilon_dot: synchronization errors and their rates, (p, m), for the log and for V.
         shares: E, sigma and sigma', (3, n, m): what every robot makes of its own errors and of what it heard.
-            The laws need E' = sigma, and sigma' to be the rate of sigma.
+            The laws need E' = sigma - leak E, and sigma' to be the rate of sigma.
         memory_dot: rate of the memory, of its shape.
     """
 
@@ -43,6 +45,7 @@ class BoundNetwork(Protocol):
 
     It may also have
 
+    - `leak`, (m,), 1/s, the rate at which its integrals are forgotten, which has to be that of the gains.
     - `outside`, without arguments: what the theorem does not know of it, in words, or None if the theorem
       holds with it. Without one its runs are outside the theorem, and certificates say so.
     - `messages(start, end)` and `meet(t, w, memory)`: the instants of its messages with start <= t < end, in
@@ -82,21 +85,38 @@ class Network(Protocol):
 
 
 class Ideal:
-    """Everybody knows at once what the coupling compares, as the paper assumes."""
+    """Everybody knows at once what the coupling compares, as the paper assumes.
+
+    Args:
+        leak: rate at which integrals of synchronization errors are forgotten, a number or (m,), 1/s, that
+            of the gains.
+
+    Raises:
+        InputError: not numbers, not finite, or below 0.
+    """
+
+    def __init__(self, leak: ArrayLike = 0.0):
+        self.leak = finite_array("leak", leak)
+        if self.leak.min(initial=0.0) < 0:
+            raise InputError.expected("rates of at least 0", float(self.leak.min()), "leak")
 
     def bind(self, cell: Cell) -> BoundIdeal:
-        """This network for a cell."""
-        return BoundIdeal(cell.coupling, cell.m)
+        """This network for a cell.
+
+        Raises:
+            InputError: another number of leaks than task coordinates.
+        """
+        return BoundIdeal(cell.coupling, cell.m, spread("leak", self.leak, (cell.m,)))
 
     def as_dict(self) -> dict[str, Any]:
-        return {"name": "Ideal"}
+        return {"name": "Ideal", **({"leak": self.leak.tolist()} if self.leak.any() else {})}
 
 
 class BoundIdeal:
     """`Ideal` between the robots of a cell: its memory are the integrals of epsilon, (p, m)."""
 
-    def __init__(self, coupling: Coupling, m: int):
-        self._shape = coupling.pairs, m
+    def __init__(self, coupling: Coupling, m: int, leak: np.ndarray):
+        self._shape, self.leak, self._leaks = (coupling.pairs, m), leak, bool(leak.any())
         self._compare, self._distribute = coupling.products
 
     def start(self) -> np.ndarray:
@@ -105,13 +125,25 @@ class BoundIdeal:
     def exchange(self, t: float, w: np.ndarray, memory: np.ndarray) -> Received:
         epsilon, epsilon_dot = self._compare(w)  # (7), (28), and the derivative
         shares = self._distribute(np.array((memory, epsilon, epsilon_dot)))
-        return Received(epsilon, epsilon_dot, shares, epsilon)
+        memory_dot = epsilon - self.leak * memory if self._leaks else epsilon
+        return Received(epsilon, epsilon_dot, shares, memory_dot)
 
     def integral(self, memory: np.ndarray) -> np.ndarray:
         return memory
 
     def outside(self) -> str | None:
         return None
+
+
+def check_leak(network: BoundNetwork, leak: np.ndarray) -> None:
+    """Refuse a network whose integrals leak at another rate, (m,), 1/s, than the law takes for granted.
+
+    Raises:
+        InputError: it does.
+    """
+    own = getattr(network, "leak", np.zeros_like(leak))
+    if not np.array_equal(own, leak):
+        raise InputError.expected(f"the leak of the gains, {leak.tolist()}", own, "network, leak")
 
 
 class Messages:

@@ -59,6 +59,7 @@ def carry_ur5(
     geometric_error: bool | Any = False,
     friction: bool = False,
     push: bool = False,
+    leak: float | bool = 0.0,
     gains: Gains | None = None,
     **parts: Unpack[ControllerParts],
 ) -> Experiment:
@@ -71,6 +72,7 @@ def carry_ur5(
             how much: displacement, m, and rotation vector, rad, (6,), in the payload's axes.
         friction: whether the joints rub, which the controller does not know.
         push: whether joints 1 to 3 of arm 1 are pushed for half a second.
+        leak: of the integrals of epsilon, 1/s, see `Gains`; True for Lambda.
 
     Raises:
         InputError: a value that is none of these.
@@ -91,7 +93,9 @@ def carry_ur5(
         cell, DURATION, GAINS, gains, synchronized, parts, disturbances=[PUSH] * bool(push)
     )
     plant = partial(CarryingPlant, body=PAYLOAD, grasps=grasps, at=at, robots=arms, desired=payload_motion())
-    return replace(made, plant_type=plant)
+    ours = made.gains
+    leaking = ours.replace(leak=ours.Lambda if leak is True else leak) if leak else ours
+    return replace(made, gains=leaking, plant_type=plant)
 
 
 def _arm(i: int) -> Robot:

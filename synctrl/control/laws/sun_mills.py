@@ -13,6 +13,7 @@ import numpy as np
 
 from ...checks import choice
 from ...coupling.cell import Cell
+from ...errors import InputError
 from ..gains import Gains, spread
 from .protocol import Along, Asked, Errors, Proof
 
@@ -49,10 +50,13 @@ class SunMills:
         Raises:
             InputError: gains of another size.
         """
-        Lambda, beta, K_eps = (
-            spread(name, getattr(gains, name), (cell.m,)) for name in ("Lambda", "beta", "K_eps")
+        Lambda, beta, K_eps, leak = (
+            spread(name, getattr(gains, name), (cell.m,)) for name in ("Lambda", "beta", "K_eps", "leak")
         )
-        return BoundSunMills(Lambda, beta, K_eps, self.reference_acceleration)
+        if (leak > Lambda).any():
+            found = float(leak[leak > Lambda][0])
+            raise InputError.expected("rates up to Lambda, beyond which nothing is proved", found, "leak")
+        return BoundSunMills(Lambda, beta, K_eps, self.reference_acceleration, leak)
 
     def as_dict(self) -> dict[str, Any]:
         return {
@@ -67,9 +71,18 @@ class BoundSunMills:
 
     statement = SunMills.statement
 
-    def __init__(self, Lambda: np.ndarray, beta: np.ndarray, K_eps: np.ndarray, reference_acceleration: str):
+    def __init__(
+        self,
+        Lambda: np.ndarray,
+        beta: np.ndarray,
+        K_eps: np.ndarray,
+        reference_acceleration: str,
+        leak: np.ndarray | None = None,
+    ):
         self.Lambda, self.beta, self.K_eps = Lambda, beta, K_eps
+        self.leak = np.zeros_like(Lambda) if leak is None else leak
         self.reference_acceleration = reference_acceleration
+        self._leaks = self.leak.dtype == object or bool(self.leak.any())  # symbols may be anything
 
     def command(self, errors: Errors) -> Asked:
         """e*, u, the reference motion and the force; e* and u have two rows, the quantity and its derivative.
@@ -84,6 +97,8 @@ class BoundSunMills:
         Lambda, beta_shares = self.Lambda, self.beta * errors.shares  # beta E, beta sigma, beta sigma'
         c, c_dot, c_ddot, c_inv = errors.weights
         e, e_dot = errors.error
+        if self._leaks:  # E' = sigma - l E, and its rate
+            beta_shares = self._leaked(beta_shares)
         e_star = errors.weighted + beta_shares[:2]  # (10), (29), and the derivative
         u = np.matvec(c, errors.rates) + beta_shares[1:] + Lambda * e_star  # (11), (30), and the derivative
         if errors.weights.move:
@@ -96,21 +111,32 @@ class BoundSunMills:
         force = np.matvec(c.mT, self.K_eps * errors.shares[1])  # the last term of (13) and (32)
         return Asked(xref[0], xref[1], force, e_star[0], u)
 
+    def _leaked(self, shares: np.ndarray) -> np.ndarray:
+        """E, E', E'' of integrals that leak, where shares are E, sigma and sigma'."""
+        E, sigma, sigma_dot = shares
+        E_dot = sigma - self.leak * E
+        return np.stack((E, E_dot, sigma_dot - self.leak * E_dot))
+
     def proof(self, along: Along) -> Proof:
-        """Springs on epsilon and E, and what they lose, (19), (24), (34) and (39)."""
-        K_eps, beta, Lambda = self.K_eps, self.beta, self.Lambda
+        """Springs on epsilon and E, and what they lose, (19), (24), (34) and (39).
+
+        With a leak l the spring on E has K_eps (Lambda - l) beta, and loses l E^T K_eps (Lambda - l) beta E.
+        """
+        K_eps, beta, Lambda, leak = self.K_eps, self.beta, self.Lambda, self.leak
+        spring = K_eps * (Lambda - leak) * beta
         epsilon, E, sigma = along.epsilon, along.E, along.sigma
         return Proof(
             {
                 "synchronization": 0.5 * epsilon * K_eps * epsilon,
-                "integral": 0.5 * E * K_eps * Lambda * beta * E,
+                "integral": 0.5 * E * spring * E,
             },
             {
                 "synchronization": epsilon * K_eps * along.epsilon_dot,
-                "integral": E * K_eps * Lambda * beta * sigma,
+                "integral": E * spring * (sigma - leak * E),
             },
             {
                 "synchronization rate": -epsilon * K_eps * Lambda * epsilon,
                 "coupling": -sigma * K_eps * beta * sigma,
+                "leak": -E * leak * spring * E,
             },
         )
