@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -13,6 +15,7 @@ from synctrl import load_robot
 from synctrl.assembly.body import CarriedObject, moved_parameters, place_of, pose_rate, with_share
 from synctrl.assembly.forces import internal_wrenches, stick_wrenches
 from synctrl.assembly.grasp import Fixture, Grasp, fixture_wrenches, grasp_matrix
+from synctrl.assembly.plant import CarryingPlant
 from synctrl.errors import InputError
 from synctrl.experiments import carry_ur5
 from synctrl.robots.payload import Payload, carrying, holding
@@ -231,3 +234,30 @@ def test_the_papers_integral_lets_force_grow_for_a_millimetre_of_error_and_the_i
 def test_what_cannot_be_carried_is_refused(make, subject):
     with refused(InputError, subject):
         make()
+
+
+@pytest.mark.parametrize(
+    ("changed", "subject"),
+    [
+        (lambda kept: {"at": kept["at"][:1]}, "at"),
+        (lambda kept: {"at": (kept["at"][0], np.ones((3, 3)))}, "at, orientation"),
+        (lambda kept: {"at": (kept["at"][0][:2], np.eye(3))}, "at, position"),
+        (lambda kept: {"body": 4.0}, "body"),
+        (lambda kept: {"desired": kept["at"]}, "desired"),
+        (lambda kept: {"grasps": kept["grasps"][:1] * 2}, "grasps"),
+        (lambda kept: {"grasps": []}, "grasps"),
+        (lambda kept: {"grasps": [replace(kept["grasps"][0], robot=2)]}, "grasps"),
+        (lambda kept: {"robots": kept["robots"][:1]}, "robots"),
+        (lambda kept: {"robots": [load_robot("planar2r")] * 2}, "robots"),
+        (lambda kept: {"at": (kept["at"][0] + [0, 2e-6, 0], kept["at"][1])}, "grasps, robot 'UR5 1'"),
+        (
+            lambda kept: {"at": (kept["at"][0], exp(np.full(3, 2e-6)) @ kept["at"][1])},
+            "grasps, robot 'UR5 1'",
+        ),
+    ],
+)
+def test_a_plant_refuses_what_does_not_fit_its_robots(changed, subject):
+    experiment = carry_ur5()
+    kept = experiment.plant_type.keywords
+    with refused(InputError, subject):
+        CarryingPlant(experiment.cell, **{**kept, **changed(kept)})
