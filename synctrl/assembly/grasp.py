@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import count, finite_array, instance
+from ..checks import count, finite_array, instance, rotation_matrix
 from ..errors import InputError
-from ..tasks.rotations import log, rotation_matrix, skew
+from ..tasks.rotations import log, skew
 
 
 @dataclass(frozen=True, eq=False)

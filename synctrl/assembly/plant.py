@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array, instance
+from ..checks import finite_array, instance, rotation_matrix
 from ..coupling.cell import Cell
 from ..errors import InputError
 from ..robots.robot import Robot
 from ..simulation.plant import Output, Plant
 from ..tasks.measurement import Tips
 from ..tasks.poses import PoseTrajectory
-from ..tasks.rotations import log, rotation_matrix, skew
+from ..tasks.rotations import log, skew
 from .body import CarriedObject, place_of, pose_of, pose_rate
 from .forces import internal_wrenches
 from .grasp import Grasp, fixture_wrenches, grasp_matrix
