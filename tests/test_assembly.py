@@ -245,6 +245,14 @@ def test_a_run_is_stable_up_to_the_step_that_is_computed_and_refused_beyond(fixt
         unchecked.simulate(100 * 1.1 * limit, dt=1.1 * limit)
 
 
+def test_runs_with_fixtures_keep_the_order_of_the_method():
+    experiment = carry_ur5()
+    runs = [experiment.simulate(8e-3, dt=8e-4 / 2**k) for k in range(4)]
+    ends = [np.concatenate((run.outputs["plant_state"][-1], run.q[-1].ravel())) for run in runs]
+    errors = [np.linalg.norm(end - ends[-1]) for end in ends[:-1]]
+    assert errors[0] > 12 * errors[1] > 144 * errors[2] > 0
+
+
 def squeezed(**options) -> np.ndarray:
     """Force inside at hand 1 over .8 s, N."""
     run = carry_ur5(**options).simulate(0.8, dt=2e-3, log_dt=0.02)
