@@ -209,7 +209,8 @@ def test_of_a_robot_that_comes_back_only_missing_pictures_are_said_again(tmp_pat
     )
     with pytest.warns(RobotWarning):
         robot = load_robot(tmp_path / "odd.urdf")
-    with pytest.warns(RobotWarning, match=r"^robot 'left':\n  left out \(\d\): .*no\.stl") as said:
+    expected = r"^the result's robot 'left':\n  left out \(\d\): .*no\.stl"
+    with pytest.warns(RobotWarning, match=expected) as said:
         read_robot(write_robot(robot), "left", robot.joint_names)
     assert len(said) == 1
 
