@@ -67,6 +67,20 @@ def symmetric_matrix(name: str, value: ArrayLike, size: int) -> np.ndarray:
     return array
 
 
+def rotation_matrix(name: str, value: ArrayLike) -> np.ndarray:
+    """`value` as a read-only rotation matrix, (3, 3).
+
+    Raises:
+        InputError: another shape, not orthonormal to 1e-6, or a reflection.
+    """
+    R = finite_array(name, value, (3, 3))
+    off = float(np.abs(R @ R.T - np.eye(3)).max())
+    if off > 1e-6 or np.linalg.det(R) < 0:
+        kind = "a reflection" if off <= 1e-6 else f"one whose R R^T differs from 1 by {off:.2g}"
+        raise InputError.expected("a rotation matrix", kind, name, shown=kind)
+    return R
+
+
 def finite_number(name: str, value: object) -> float:
     """`value` as a finite float."""
     if isinstance(value, (bool, np.bool_)):

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -13,9 +18,13 @@ from synctrl import load_robot
 from synctrl.assembly.body import CarriedObject, moved_parameters, place_of, pose_rate, with_share
 from synctrl.assembly.forces import internal_wrenches, stick_wrenches
 from synctrl.assembly.grasp import Fixture, Grasp, fixture_wrenches, grasp_matrix
-from synctrl.errors import InputError
+from synctrl.assembly.plant import CarryingPlant
+from synctrl.assembly.step import largest_step
+from synctrl.coupling.cell import Cell, Member
+from synctrl.errors import InputError, SimulationError
 from synctrl.experiments import carry_ur5
 from synctrl.robots.payload import Payload, carrying, holding
+from synctrl.tasks.measurement import Tips
 from synctrl.tasks.rotations import exp, skew
 
 BODY = CarriedObject(4.0, (0.03, 0.01, -0.02), (0.02, 0.06, 0.05))
@@ -184,18 +193,64 @@ def test_arms_object_and_fixtures_together_keep_their_energy_but_for_torque_and_
     assert (ends[0] - ends[1]) / (2 * h) == pytest.approx(power, rel=1e-4)
 
 
-def test_a_grasp_at_rest_holds_with_no_force_and_the_object_moves_with_the_hands():
-    plant = carry_ur5().closed_loop().plant
+@pytest.mark.parametrize("speed", [0.0, 0.3])
+def test_a_grasp_begins_with_no_force_and_an_object_that_moves_with_the_hands(speed):
+    experiment = carry_ur5()
+    kept, cell = experiment.plant_type.keywords, experiment.cell
+    nu = speed * np.arange(1.0, 7.0)
+    members = [moving_along(member, kept["at"][0], nu) for member in cell.members]
+    plant = CarryingPlant(Cell(members, cell.coupling, cell.space), **kept)
+    np.testing.assert_allclose(plant.hidden0[7:], nu, atol=1e-9)
     wrench = plant._wrenches(plant.cell.q0, plant.cell.v0, plant.hidden0)[0]
-    assert np.abs(wrench).max() < 1e-6 * plant.K.max()
+    assert np.abs(wrench / plant.K).max() < 1e-10
 
 
+def moving_along(member: Member, origin: np.ndarray, nu: np.ndarray) -> Member:
+    """A robot whose tip, at the object's origin, moves with the twist nu."""
+    motion, _, J, _ = Tips([member.robot]).poses(member.q0[None], np.zeros((1, 6)))
+    np.testing.assert_allclose(motion[0, 0], origin, atol=1e-6)
+    return replace(member, v0=np.linalg.solve(J[0], nu))
+
+
+@given(st.floats(10.0, 1e4))
+def test_the_longest_step_of_a_spring_and_of_a_damper_are_those_of_the_method(rate):
+    """The growth of a step is 1 again at z^2 = 8 for a spring, at the root of a cubic for a damper."""
+    one, none = np.eye(1), np.zeros((1, 1))
+    spring = largest_step(one, rate**2 * one, none) * rate
+    assert spring == pytest.approx(np.sqrt(8), rel=1e-3)
+    z = largest_step(one, none, rate * one) * rate
+    assert -1 + z / 2 - z**2 / 6 + z**3 / 24 == pytest.approx(0.0, abs=1e-9)
+
+
+class Unchecked(CarryingPlant):
+    """The same plant, which lets steps be as long as one likes."""
+
+    def longest_step(self, K_r: np.ndarray) -> float:
+        return float("inf")
+
+
+@pytest.mark.filterwarnings("ignore::synctrl.errors.StepWarning")
 @pytest.mark.parametrize("fixture", [Fixture(), Fixture((1e6, 1e4), (800.0, 6.0))])
 def test_a_run_is_stable_up_to_the_step_that_is_computed_and_refused_beyond(fixture):
     experiment = carry_ur5(grasp=fixture)
-    limit = experiment.closed_loop().plant.longest_step(experiment.closed_loop().controller.K_r)
+    loop = experiment.closed_loop()
+    limit = loop.plant.longest_step(loop.controller.K_r)
+    run = experiment.simulate(100 * 0.95 * limit, dt=0.95 * limit)
+    wrench = np.linalg.norm(run.outputs["hand_wrench"], axis=(1, 2))
+    assert wrench[50:].max() < 1.1 * wrench[:50].max()
     with refused(InputError, "dt", found=1.01 * limit):
         experiment.simulate(10 * limit, dt=1.01 * limit)
+    unchecked = replace(experiment, plant_type=partial(Unchecked, **experiment.plant_type.keywords))
+    with refused(SimulationError):
+        unchecked.simulate(100 * 1.1 * limit, dt=1.1 * limit)
+
+
+def test_runs_with_fixtures_keep_the_order_of_the_method():
+    experiment = carry_ur5()
+    runs = [experiment.simulate(8e-3, dt=8e-4 / 2**k) for k in range(4)]
+    ends = [np.concatenate((run.outputs["plant_state"][-1], run.q[-1].ravel())) for run in runs]
+    errors = [np.linalg.norm(end - ends[-1]) for end in ends[:-1]]
+    assert errors[0] > 12 * errors[1] > 144 * errors[2] > 0
 
 
 def squeezed(**options) -> np.ndarray:
@@ -215,6 +270,16 @@ def test_the_papers_integral_lets_force_grow_for_a_millimetre_of_error_and_the_i
     assert np.ptp(alone) < 0.1 * alone.max()
 
 
+def test_the_examples_of_the_page_run_and_either_hand_has_half_of_the_weight():
+    page, names = (Path(__file__).parents[1] / "docs" / "assembly.md").read_text("utf-8"), {}
+    for block in re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL):
+        exec(compile(block, "docs/assembly.md", "exec"), names)
+    assert names["squeeze"].shape == names["result"].t.shape
+    force = names["held"].outputs["hand_wrench"][-1, :, :3]
+    half = -0.5 * names["plate"].mass * np.array(names["arm"].gravity_vector)
+    np.testing.assert_allclose(force, [half, half], atol=1e-3)
+
+
 @pytest.mark.parametrize(
     ("make", "subject"),
     [
@@ -223,6 +288,11 @@ def test_the_papers_integral_lets_force_grow_for_a_millimetre_of_error_and_the_i
         (lambda: Grasp(-1), "grasp, robot"),
         (lambda: Grasp(0, rotation=np.ones((3, 3))), "grasp, rotation"),
         (lambda: CarriedObject(-1.0), "payload, mass"),
+        (lambda: CarriedObject(1.0, name="two\nlines"), "object, name"),
+        (lambda: holding(load_robot("ur5"), np.zeros(3), np.ones((3, 3))), "rotation"),
+        (lambda: holding(load_robot("ur5"), np.zeros(3), np.eye(3), 5), "name"),
+        (lambda: with_share(load_robot("ur5"), np.zeros(10), np.zeros(2), np.eye(3)), "xyz"),
+        (lambda: with_share(load_robot("ur5"), np.zeros(10), np.zeros(3), -np.eye(3)), "rotation"),
         (lambda: CarriedObject(1.0, box=(1.0, 0.0, 1.0)), "object, box"),
         (lambda: carry_ur5(grasp="glue"), "grasp"),
         (lambda: carry_ur5(geometric_error=1.0), "geometric_error"),
@@ -231,3 +301,30 @@ def test_the_papers_integral_lets_force_grow_for_a_millimetre_of_error_and_the_i
 def test_what_cannot_be_carried_is_refused(make, subject):
     with refused(InputError, subject):
         make()
+
+
+@pytest.mark.parametrize(
+    ("changed", "subject"),
+    [
+        (lambda kept: {"at": kept["at"][:1]}, "at"),
+        (lambda kept: {"at": (kept["at"][0], np.ones((3, 3)))}, "at, orientation"),
+        (lambda kept: {"at": (kept["at"][0][:2], np.eye(3))}, "at, position"),
+        (lambda kept: {"body": 4.0}, "body"),
+        (lambda kept: {"desired": kept["at"]}, "desired"),
+        (lambda kept: {"grasps": kept["grasps"][:1] * 2}, "grasps"),
+        (lambda kept: {"grasps": []}, "grasps"),
+        (lambda kept: {"grasps": [replace(kept["grasps"][0], robot=2)]}, "grasps"),
+        (lambda kept: {"robots": kept["robots"][:1]}, "robots"),
+        (lambda kept: {"robots": [load_robot("planar2r")] * 2}, "robots"),
+        (lambda kept: {"at": (kept["at"][0] + [0, 2e-6, 0], kept["at"][1])}, "grasps, robot 'UR5 1'"),
+        (
+            lambda kept: {"at": (kept["at"][0], exp(np.full(3, 2e-6)) @ kept["at"][1])},
+            "grasps, robot 'UR5 1'",
+        ),
+    ],
+)
+def test_a_plant_refuses_what_does_not_fit_its_robots(changed, subject):
+    experiment = carry_ur5()
+    kept = experiment.plant_type.keywords
+    with refused(InputError, subject):
+        CarryingPlant(experiment.cell, **{**kept, **changed(kept)})

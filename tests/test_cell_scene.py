@@ -19,7 +19,7 @@ from test_animation import ends, node
 
 from synctrl import Cell, Coupling, Experiment, Hold, JointSpace, Member, Result, Robot, load_robot
 from synctrl.errors import InputError, RobotWarning
-from synctrl.experiments import mobile_robot
+from synctrl.experiments import carry_ur5, mobile_robot
 from synctrl.robots.written import read_robot, write_robot
 from synctrl.show import scene_of
 from synctrl.show.arms import ALARM, skeleton
@@ -81,6 +81,17 @@ def test_bars_join_compared_tips_in_different_colours_and_turn_red(star):
         assert bar.scale[worst, 0] == bar.scale[:, 0].max()
     bars = [color for text, color in scene._legend if text.startswith("ε")]
     assert bars == pair_colors(star) and len({*bars}) == 3
+
+
+def test_an_object_that_hands_carry_is_drawn_where_it_is_and_so_it_is_of_a_loaded_run(tmp_path):
+    run = carry_ur5().simulate(0.01, dt=1e-3)
+    scene = scene_of(run, fps=1e3)
+    box = node(scene, "box payload")
+    pose = run.outputs["object_pose"][: len(box.position)]
+    assert np.ptp(pose, axis=0).max() > 0
+    np.testing.assert_allclose(box.position, pose[:, :3], atol=1e-12)
+    np.testing.assert_allclose(np.abs((box.quaternion * pose[:, 3:]).sum(axis=1)), 1, atol=1e-12)
+    assert scene_of(reloaded(run, tmp_path), fps=1e3).page() == scene.page()
 
 
 def test_a_bar_past_other_tips_goes_above_what_it_would_hide():
@@ -198,7 +209,8 @@ def test_of_a_robot_that_comes_back_only_missing_pictures_are_said_again(tmp_pat
     )
     with pytest.warns(RobotWarning):
         robot = load_robot(tmp_path / "odd.urdf")
-    with pytest.warns(RobotWarning, match=r"^robot 'left':\n  left out \(\d\): .*no\.stl") as said:
+    expected = r"^the result's robot 'left':\n  left out \(\d\): .*no\.stl"
+    with pytest.warns(RobotWarning, match=expected) as said:
         read_robot(write_robot(robot), "left", robot.joint_names)
     assert len(said) == 1
 

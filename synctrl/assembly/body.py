@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, positive_number
+from ..checks import finite_array, label, positive_number, rotation_matrix
 from ..errors import InputError
 from ..robots.payload import Payload
 from ..robots.pseudo_inertia import inertial_parameters, pseudo_inertia
@@ -45,6 +45,7 @@ class CarriedObject:
     name: str = "object"
 
     def __post_init__(self) -> None:
+        label("object, name", self.name)
         load = Payload(0, self.mass, self.com, self.inertia)
         for name in ("mass", "com", "inertia"):
             object.__setattr__(self, name, getattr(load, name))
@@ -84,23 +85,24 @@ def moved_parameters(theta: np.ndarray, xyz: np.ndarray, rotation: np.ndarray) -
     return inertial_parameters(T @ pseudo_inertia(theta) @ T.T)
 
 
-def with_share(robot: Robot, theta: ArrayLike, xyz: np.ndarray, rotation: np.ndarray) -> Robot:
+def with_share(robot: Robot, theta: ArrayLike, xyz: ArrayLike, rotation: ArrayLike) -> Robot:
     """A robot whose last body has a share of an object's inertia beside its own.
 
     Args:
         robot: the robot.
         theta: the share, (10,), in the object's axes; of either sign, as long as the body stays one.
-        xyz, rotation: place and orientation of the object in the axes of the robot's tip.
+        xyz, rotation: place, (3,), m, and orientation, (3, 3), of the object in the axes of the robot's tip.
 
     Raises:
-        InputError: the tip does not move.
+        InputError: not of these shapes, no rotation matrix, or a tip that does not move.
         RobotError: the body would have no positive mass or no positive definite inertia.
     """
     frame = robot.model.frames[robot.tip_id]
     if frame.parentJoint == 0:
         raise InputError(f"expected a tip that moves, found '{robot.tip}'", subject=f"robot '{robot.name}'")
     place = frame.placement
-    at = place.translation + place.rotation @ xyz, place.rotation @ rotation
+    d, G = finite_array("xyz", xyz, (3,)), rotation_matrix("rotation", rotation)
+    at = place.translation + place.rotation @ d, place.rotation @ G
     pi = robot.inertial_parameters.reshape(-1, 10).copy()
     pi[frame.parentJoint - 1] += moved_parameters(finite_array("share", theta, (10,)), *at)
     return robot.with_parameters(pi.ravel())

@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import count, finite_array, instance
+from ..checks import count, finite_array, instance, rotation_matrix
 from ..errors import InputError
-from ..tasks.rotations import log, rotation_matrix, skew
+from ..tasks.rotations import log, skew
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,11 +40,7 @@ class Fixture:
         for name in ("stiffness", "damping"):
             pair = finite_array(f"fixture, {name}", getattr(self, name), (2,))
             if pair.min() <= 0:
-                raise InputError(
-                    f"expected two numbers above 0, found {pair.tolist()}",
-                    subject=f"fixture, {name}",
-                    found=tuple(pair.tolist()),
-                )
+                raise InputError.expected("two numbers above 0", pair, f"fixture, {name}")
             object.__setattr__(self, name, pair)
 
     @property
@@ -120,7 +116,6 @@ def fixture_wrenches(
 
 def grasp_matrix(arms: np.ndarray) -> np.ndarray:
     """G_i, (..., k, 6, 6), which makes wrenches at r_i, (..., k, 3), wrenches about the object's origin."""
-    G = np.zeros((*arms.shape, 6))[..., :1, :].repeat(6, axis=-2)
-    G[...] = np.eye(6)
+    G = np.tile(np.eye(6), (*arms.shape[:-1], 1, 1))
     G[..., 3:, :3] = skew(arms)
     return G

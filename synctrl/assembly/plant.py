@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from types import NoneType
 from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array, instance
+from ..checks import finite_array, instance, rotation_matrix
 from ..coupling.cell import Cell
 from ..errors import InputError
 from ..robots.robot import Robot
 from ..simulation.plant import Output, Plant
 from ..tasks.measurement import Tips
 from ..tasks.poses import PoseTrajectory
-from ..tasks.rotations import skew
+from ..tasks.rotations import log, skew
 from .body import CarriedObject, place_of, pose_of, pose_rate
 from .forces import internal_wrenches
 from .grasp import Grasp, fixture_wrenches, grasp_matrix
 from .step import largest_step
+
+#: how far a hand may be off its place on the object at t = 0, m and rad
+CLOSED = 1e-6
 
 
 class CarryingPlant(Plant):
@@ -27,20 +31,22 @@ class CarryingPlant(Plant):
         M_i v_i' + n_i = tau_i + J_i^T (what the fixture does to the hand)
         M_o nu' + c_o  = sum G_i (what the fixtures do to the object)
 
-    A fixture takes its rest pose when it closes, at t = 0: a hand that is not where its grasp says holds the
-    object where it is.
+    At t = 0 every hand is where its grasp says, to `CLOSED`. A fixture takes its rest pose then, so what is
+    left of the difference is no force.
 
     Args:
         cell: what the controller knows, its robots with their shares of the object.
         body: the object.
         grasps: who holds it where, at least one; no robot twice.
-        at: position and orientation of the object at t = 0, (3,) and (3, 3).
-        robots: the robots without the object, whose tips are the hands; by default those of the cell.
+        at: position, (3,), m, and orientation, (3, 3), of the object at t = 0 in world axes.
+        robots: the robots without the object, whose tips are the hands, with the joints of those of the cell;
+            by default these.
         desired: desired motion of the object, for figures.
         options: of `Plant`.
 
     Raises:
-        InputError: grasps that do not fit the robots, or a pose that is none.
+        InputError: grasps that do not fit the robots, robots that do not fit the cell, a pose that is none,
+            or a hand that is not where its grasp says.
     """
 
     def __init__(
@@ -54,17 +60,17 @@ class CarryingPlant(Plant):
         desired: PoseTrajectory | None = None,
         **options: Any,
     ):
-        super().__init__(cell, robots=robots, **options)
+        super().__init__(cell, robots=cell.robots if robots is None else _fitting(robots, cell), **options)
         instance("body", body, CarriedObject, "a CarriedObject")
+        instance("desired", desired, (PoseTrajectory, NoneType), "a PoseTrajectory")
         self.body, self.grasps, self.desired = body, _checked(grasps, cell), desired
         self._hands = np.array([grasp.robot for grasp in self.grasps])
         self._tips = Tips(self.robots)
         self.K, self.D = (np.stack([getattr(g.compliance, name) for g in self.grasps]) for name in "KD")
         self._gravity = np.array(self.robots[0].gravity_vector)
-        p, R = finite_array("at", at[0], (3,)), finite_array("at", at[1], (3, 3))
+        p, R = _place(at)
         self.hidden0 = np.concatenate((pose_of(p, R), self._moving_along(p)))
-        hands, turned = self._held(cell.q0, cell.v0)[:2]
-        self.arms, self.turned = (hands - p) @ R, R.T @ turned
+        self.arms, self.turned = self._closed(p, R)
 
     def longest_step(self, K_r: np.ndarray) -> float:
         """With the fixtures, the arms and the object as they are at the start, see `step.py`."""
@@ -115,6 +121,21 @@ class CarryingPlant(Plant):
         return {"object": about, "grasps": held}
 
     # -- internals ----------------------------------------------------------------------------------------
+
+    def _closed(self, p: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places, (k, 3), and orientations, (k, 3, 3), of the hands in the object's axes at t = 0."""
+        hands, turned = self._held(self.cell.q0, self.cell.v0)[:2]
+        arms, turned = (hands - p) @ R, R.T @ turned
+        for grasp, arm, turn in zip(self.grasps, arms, turned, strict=True):
+            off = [float(np.linalg.norm(miss)) for miss in (arm - grasp.xyz, log(turn @ grasp.rotation.T))]
+            if max(off) > CLOSED:
+                raise InputError(
+                    f"expected its hand at t = 0 where its grasp says, to {CLOSED:g} m and rad, "
+                    f"found it off by {off[0]:.2g} m and {off[1]:.2g} rad",
+                    subject=f"grasps, robot '{self.cell.names[grasp.robot]}'",
+                    found=tuple(off),
+                )
+        return arms, turned
 
     def _held(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Positions, orientations, twists and Jacobians of the hands that hold the object."""
@@ -173,6 +194,23 @@ class CarryingPlant(Plant):
         if self.desired is None:
             return np.full((len(t), 7), np.nan)
         return pose_of(self.desired.position(t).x, self.desired.orientation(t).R)
+
+
+def _fitting(robots: Sequence[Robot], cell: Cell) -> tuple[Robot, ...]:
+    instance("robots", robots, Sequence, "a sequence of Robot objects")
+    for robot in robots:
+        instance("robots", robot, Robot, "Robot objects")
+    joints, found = ([robot.nv for robot in some] for some in (cell.robots, robots))
+    if found != joints:
+        raise InputError.expected(f"robots with as many joints as the cell, {joints}", found, "robots")
+    return tuple(robots)
+
+
+def _place(at: tuple[Any, Any]) -> tuple[np.ndarray, np.ndarray]:
+    instance("at", at, Sequence, "a position and an orientation")
+    if len(at) != 2:
+        raise InputError.expected("a position and an orientation", f"{len(at)} things", "at")
+    return finite_array("at, position", at[0], (3,)), rotation_matrix("at, orientation", at[1])
 
 
 def _checked(grasps: Sequence[Grasp], cell: Cell) -> tuple[Grasp, ...]:

@@ -11,7 +11,15 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, instance, positive_number, symmetric_matrix, window
+from ..checks import (
+    finite_array,
+    instance,
+    label,
+    positive_number,
+    rotation_matrix,
+    symmetric_matrix,
+    window,
+)
 from ..errors import InputError
 from ..renamed import tell
 from .documents import weld
@@ -119,13 +127,11 @@ def holding(robot: Robot, xyz: ArrayLike, rotation: ArrayLike, name: str = "held
         name: what the frame is called, which the robot has not yet.
 
     Raises:
-        InputError: not of these shapes, or the name is taken.
+        InputError: not of these shapes, no rotation matrix, or a name that is none or taken.
     """
-    at = pin.SE3(
-        np.array(finite_array("rotation", rotation, (3, 3))), np.array(finite_array("xyz", xyz, (3,)))
-    )
+    at = pin.SE3(np.array(rotation_matrix("rotation", rotation)), np.array(finite_array("xyz", xyz, (3,))))
     model = pin.Model(robot.model)
-    if model.existFrame(name):
+    if model.existFrame(label("name", name)):
         raise InputError.expected(f"a frame that robot '{robot.name}' does not have yet", name, "name")
     tip = model.frames[robot.tip_id]
     model.addFrame(pin.Frame(name, tip.parentJoint, robot.tip_id, tip.placement * at, pin.FrameType.BODY))

@@ -93,7 +93,7 @@ def read_robot(
     robot = Robot(
         found.model, about.get("tip", found.tip), visual=found.visual, name=name, document=found.document
     )
-    _warn_of_pictures(found.report, f"robot {quoted(name)}")
+    _warn_of_pictures(found.report, f"the result's robot {quoted(name)}")
     if robot.joint_names != tuple(joints):
         raise RobotError(
             f"expected the joints {', '.join(joints)}, found {', '.join(robot.joint_names)}",

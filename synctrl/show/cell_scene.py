@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from ..analysis.metrics import row_names
+from ..assembly.body import place_of
 from ..errors import InputError, SynctrlError
 from ..robots.robot import Robot
 from ..robots.written import read_robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
+from ..tasks.rotations import quaternion
 from . import arms
 from .legends import pair_colors, pair_symbols
 from .runs import check_run, frame_indices, shown_experiment
@@ -21,6 +23,8 @@ from .style import DESIRED, read_color, robot_color
 
 #: as shares of the reach of the arms: a tip, a desired path, and bars without and with the largest error
 BALL, LINE, THIN, THICK = 0.032, 0.006, 0.006, 0.02
+#: colour of an object that hands carry
+CARRIED = "#b9b2a3"
 #: colour of the bar where there is no other
 ONE_PAIR = "#a3acb7"
 #: reach that is assumed where arms have none, such as wheels, m
@@ -44,7 +48,8 @@ def scene_of(
 
     It has the arms, the desired paths of their tips where the space says where these are, and a bar between
     the tips of every pair that is compared, in the pair's colour; it grows, and turns red, with the
-    synchronization error. Robots without shapes are drawn as plain links.
+    synchronization error. Robots without shapes are drawn as plain links, and an object that hands carry as
+    its box, if it has one.
 
     Args:
         result: a run in any space, also one that was loaded: its robots are then made again from what the
@@ -68,6 +73,7 @@ def scene_of(
     if desired is not None:
         _add_paths(scene, result, desired, LINE * scale)
     _add_bars(scene, result, tips, frames, limit, scale)
+    _add_object(scene, result, frames)
     arms.add_disturbances(scene, result, robots, frames)
     scene.caption = " ".join(_caption(robots, result, desired is not None))
     return scene
@@ -141,6 +147,17 @@ def _add_bars(
         lifted = tips + np.array([0.0, 0.0, lifts[k]])
         arms.add_bars(scene, result, symbol, robots, lifted, radius, arms.error_color(share[:, k], calm))
         scene.add_legend(f"{symbol}: {name.partition(': ')[2]}", color)
+
+
+def _add_object(scene: Scene, result: Result, frames: np.ndarray) -> None:
+    """The box of an object that hands carry, as it moved."""
+    if "object_pose" not in result.outputs:
+        return
+    about = result.info["object"]
+    if about["box"] is not None:
+        place, R = place_of(result.outputs["object_pose"][frames])
+        scene.add_box(about["name"], about["box"], place + R @ about["center"], CARRIED, quaternion(R))
+        scene.add_legend(about["name"], CARRIED)
 
 
 def _lifts(pairs: Sequence[Sequence[int]], tips: np.ndarray, ball: float) -> list[float]:

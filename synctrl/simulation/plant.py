@@ -70,7 +70,9 @@ class Plant:
     - `events` and `meet`: instants at which its state moves at once, by an impact or a catch, and how;
     - `move`: accelerations and the rate of that state, (k,), both finite and without side effects, for a
       method asks at states where the run never comes; what the package's plant does is `super().move(...)`;
-    - `outputs`: arrays over time that the result gets beside those of every run, with units and axes;
+    - `outputs`: arrays over time that the result gets beside those of every run, with units and axes; or
+      `outputs_along`, if the motion of the robots is needed for them;
+    - `longest_step`: how long a step of "rk4" may be, if that is known beforehand;
     - `report`: what `result.info` says of the state in plain data.
 
     Nothing else is asked of it. The state is logged as `outputs["plant_state"]`, so that a run can be gone

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, finite_number, instance, offers, positive_number
+from ..checks import finite_array, finite_number, instance, offers, positive_number, rotation_matrix
 from ..errors import InputError
 from . import rotations
 from .trajectories import Certified, Cubic, Hold, Motion, Trajectory, functions_of_time, instants, values_at
@@ -52,7 +52,7 @@ class AxisRotation:
     """
 
     def __init__(self, start: ArrayLike, axis: ArrayLike, angle: Trajectory):
-        self.start = rotations.rotation_matrix("start", start)
+        self.start = rotation_matrix("start", start)
         self.axis = _unit("axis", axis)
         _check_dimension("angle", angle, 1)
         self.angle = angle
@@ -66,7 +66,7 @@ class AxisRotation:
     @classmethod
     def between(cls, start: ArrayLike, end: ArrayLike, duration: float) -> Self:
         """The shortest way from one orientation to another, as a cubic polynomial from rest to rest."""
-        R0, R1 = rotations.rotation_matrix("start", start), rotations.rotation_matrix("end", end)
+        R0, R1 = rotation_matrix("start", start), rotation_matrix("end", end)
         phi = rotations.log(R1 @ R0.T)
         size = float(np.linalg.norm(phi))
         axis = phi if size > 0 else np.array([0.0, 0.0, 1.0])
@@ -123,7 +123,7 @@ class FunctionOrientation:
 
     def __call__(self, t: ArrayLike) -> Turning:
         rotation, *rates = self._functions.items()
-        R = values_at(*rotation, t, (3, 3), rotations.rotation_matrix)
+        R = values_at(*rotation, t, (3, 3), rotation_matrix)
         return Turning(R, *(values_at(*rate, t, (3,)) for rate in rates))
 
 
@@ -144,7 +144,7 @@ class SmoothOrientation(Certified):
 
     def __init__(self, rotation: Callable[[float], ArrayLike], duration: float, breaks: Sequence[float] = ()):
         functions_of_time(rotation=rotation)
-        at = partial(values_at, "rotation", rotation, shape=(3, 3), check=rotations.rotation_matrix)
+        at = partial(values_at, "rotation", rotation, shape=(3, 3), check=rotation_matrix)
         super().__init__(lambda t: at(t)[None], duration, breaks)
 
     def __call__(self, t: ArrayLike) -> Turning:
@@ -197,7 +197,7 @@ class Attached:
         instance("body", body, PoseTrajectory, "a PoseTrajectory")
         self.body = body
         self.xyz = finite_array("xyz", xyz, (3,))
-        self.rotation = rotations.rotation_matrix("rotation", np.eye(3) if rotation is None else rotation)
+        self.rotation = rotation_matrix("rotation", np.eye(3) if rotation is None else rotation)
         self.breaks = body.breaks
 
     def __call__(self, t: ArrayLike) -> Motion:

@@ -9,10 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike
-
-from ..checks import finite_array
-from ..errors import InputError
 
 _EYE = np.eye(3)
 #: nothing beside the square of any angle but zero, by which one must not divide
@@ -112,20 +108,6 @@ def left_jacobian_inverse_dot(phi: np.ndarray, phi_dot: np.ndarray) -> np.ndarra
     growth = slope * _dot(phi, phi_dot)[..., None]
     product = K @ K_dot
     return -0.5 * K_dot + growth * (K @ K) + b * (product + product.mT)
-
-
-def rotation_matrix(name: str, value: ArrayLike) -> np.ndarray:
-    """`value` if it is a rotation matrix.
-
-    Raises:
-        InputError: another shape, not orthonormal to 1e-6, or a reflection.
-    """
-    R = finite_array(name, value, (3, 3))
-    off = float(np.abs(R @ R.T - _EYE).max())
-    if off > 1e-6 or np.linalg.det(R) < 0:
-        kind = "a reflection" if off <= 1e-6 else f"one whose R R^T differs from 1 by {off:.2g}"
-        raise InputError.expected("a rotation matrix", kind, name, shown=kind)
-    return R
 
 
 def _coefficients(phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
