@@ -1,11 +1,14 @@
-"""The examples of the pages about sweeps and about held objects run, on runs that are shorter and fewer."""
+"""The examples of pages that have no test of their own run, on runs that are shorter and fewer."""
 
 from __future__ import annotations
 
 import re
+import warnings
 from pathlib import Path
 
 import pytest
+
+from synctrl.errors import StepWarning
 
 DOCS = Path(__file__).parents[1] / "docs"
 #: what takes long, and what takes its place
@@ -17,6 +20,7 @@ SHORTER = {
     'minimize="sync_rms"': 'minimize="sync_rms", generations=1, population=5, workers=1',
     'sweep.run("out/first", backend="dask")': 'sweep.run("out/second", backend="serial")',
     "simulate(0.2,": "simulate(0.01,",
+    "duration=0.5": "duration=0.02",
 }
 
 
@@ -37,6 +41,16 @@ def test_the_examples_about_sweeps_run(tmp_path, monkeypatch):
     names = run("sweeps.md")
     assert len(names["table"]) == 2 and (tmp_path / "out" / "second" / "table.csv").is_file()
     assert names["best"].measures["peak_torque"] <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("page", "part", "name"), [("laws", "law", "ChungSlotine"), ("adaptation", "adaptation", "Natural")]
+)
+def test_the_example_with_gains_of_ones_own_runs(page, part, name):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StepWarning)
+        result = run(f"{page}.md")["result"]
+    assert result.status == "completed" and result.info[part]["name"] == name
 
 
 def test_the_example_about_held_objects_has_the_outputs_that_the_page_names():
