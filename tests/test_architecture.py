@@ -6,6 +6,7 @@ import re
 import warnings
 from pathlib import Path
 
+import pytest
 import test_imports
 from test_trip import calls, trip
 
@@ -53,6 +54,14 @@ def test_the_picture_has_the_rooms_from_the_ground_up():
     words = re.findall(r'font-weight="bold"[^>]*>([^<]+)<', PICTURE)
     floors = [word.split(", ") for word in reversed(words) if "/" not in word]
     assert [room for floor in floors for room in floor] == list(test_imports.ROOMS)
+
+
+@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md"])
+def test_the_way_that_imports_run_is_told_as_it_is(page):
+    words = (DOCS.parent / page).read_text("utf-8")
+    told = re.search(r"Imports run one way, from (.*?) to `paper`", words, re.DOTALL)
+    rooms = test_imports.ROOMS[test_imports.ROOMS.index("robots") :]
+    assert told is not None and (*re.findall(r"`(\w+)`", told[1]), "paper") == rooms
 
 
 def test_the_page_names_every_room():

@@ -81,7 +81,8 @@ def chosen(Gamma: np.ndarray | RaggedGain | None, adaptation: Adaptation | None)
         return Gradient(Gamma)
     if adaptation is None or Gamma is not None:
         found = "neither" if adaptation is None else "both"
-        raise InputError.expected("the gain Gamma or an adaptation", found, "adaptation", shown=found)
+        shown = found if adaptation is None else "both; gains.replace(Gamma=None) leaves it to the adaptation"
+        raise InputError.expected("the gain Gamma or an adaptation", found, "adaptation", shown=shown)
     if not hasattr(adaptation, "bind") or isinstance(adaptation, type):
         raise InputError(
             f"expected, for example, Gradient(0.3), found {adaptation!r}",
