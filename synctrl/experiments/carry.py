@@ -77,9 +77,7 @@ def carry_ur5(
     Raises:
         InputError: a value that is none of these.
     """
-    fixture = grasp if isinstance(grasp, Fixture) else Fixture()
-    if not isinstance(grasp, Fixture):
-        choice("grasp", grasp, ("compliant",))
+    fixture = _fixture(grasp)
     boolean("friction", friction), boolean("push", push)
     error = GEOMETRIC_ERROR * geometric_error if isinstance(geometric_error, bool) else geometric_error
     error = finite_array("geometric_error", error, (6,))
@@ -89,13 +87,21 @@ def carry_ur5(
     rubs = FRICTION if friction else Friction()
     members = [_member(arms[i], grasps[i], at, error * (i == 0), rubs, SHARES_KNOWN[i]) for i in range(2)]
     cell = Cell(members, Coupling.pair(), PoseSpace(), name="UR5 pair that carries a payload")
-    made = ready_experiment(
-        cell, DURATION, GAINS, gains, synchronized, parts, disturbances=[PUSH] * bool(push)
-    )
+    pushes = [PUSH] * bool(push)
+    made = ready_experiment(cell, DURATION, GAINS, gains, synchronized, parts, disturbances=pushes)
     plant = partial(CarryingPlant, body=PAYLOAD, grasps=grasps, at=at, robots=arms, desired=payload_motion())
-    ours = made.gains
-    leaking = ours.replace(leak=ours.Lambda if leak is True else leak) if leak else ours
-    return replace(made, gains=leaking, plant_type=plant)
+    return replace(made, gains=_leaking(made.gains, leak), plant_type=plant)
+
+
+def _fixture(grasp: str | Fixture) -> Fixture:
+    if not isinstance(grasp, Fixture):
+        choice("grasp", grasp, ("compliant",))
+        return Fixture()
+    return grasp
+
+
+def _leaking(gains: Gains, leak: float | bool) -> Gains:
+    return gains.replace(leak=gains.Lambda if leak is True else leak) if leak else gains
 
 
 def _arm(i: int) -> Robot:
