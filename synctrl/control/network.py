@@ -115,8 +115,10 @@ class Ideal:
 class BoundIdeal:
     """`Ideal` between the robots of a cell: its memory are the integrals of epsilon, (p, m)."""
 
-    def __init__(self, coupling: Coupling, m: int, leak: np.ndarray):
-        self._shape, self.leak, self._leaks = (coupling.pairs, m), leak, bool(leak.any())
+    def __init__(self, coupling: Coupling, m: int, leak: np.ndarray | None = None):
+        self._shape = coupling.pairs, m
+        self.leak = np.zeros(m) if leak is None else leak
+        self._leaks = bool(self.leak.any())
         self._compare, self._distribute = coupling.products
 
     def start(self) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -48,8 +48,7 @@ def scene_of(
 
     It has the arms, the desired paths of their tips where the space says where these are, and a bar between
     the tips of every pair that is compared, in the pair's colour; it grows, and turns red, with the
-    synchronization error. Robots without shapes are drawn as plain links, and an object that hands carry as
-    its box, if it has one.
+    synchronization error. Robots without shapes are drawn as plain links, what hands carry as its box.
 
     Args:
         result: a run in any space, also one that was loaded: its robots are then made again from what the
@@ -151,10 +150,8 @@ def _add_bars(
 
 def _add_object(scene: Scene, result: Result, frames: np.ndarray) -> None:
     """The box of an object that hands carry, as it moved."""
-    if "object_pose" not in result.outputs:
-        return
-    about = result.info["object"]
-    if about["box"] is not None:
+    about = result.info.get("object")
+    if "object_pose" in result.outputs and isinstance(about, Mapping) and about.get("box") is not None:
         place, R = place_of(result.outputs["object_pose"][frames])
         scene.add_box(about["name"], about["box"], place + R @ about["center"], CARRIED, quaternion(R))
         scene.add_legend(about["name"], CARRIED)
