@@ -203,3 +203,13 @@ def test_a_certificate_says_when_the_law_converges(law):
     assert law.statement
     assert certificate.as_dict()["statement"] == law.statement
     assert f"law: {law.statement}" in str(certificate)
+
+
+@pytest.mark.parametrize(
+    "law", [SlotineLi(), ComputedTorque(), PDGravity(80.0), MasterSlave(), ChungSlotine(0.3)]
+)
+def test_ready_cells_leave_out_the_gains_that_a_law_has_no_place_for(law):
+    gains = a460_pair(law=law).gains
+    assert not gains.beta.any() and not gains.K_eps.any()
+    with refused(InputError, "gains"):
+        a460_pair(law=law, gains=a460_pair().gains)

@@ -45,7 +45,8 @@ def ready_experiment(
     Args:
         cell: robots, task and coupling.
         duration: of the experiment, s.
-        default: gains of the cell; without Gamma where another adaptation takes its place.
+        default: gains of the cell; without Gamma where another adaptation takes its place, and without beta
+            and K_eps where the law has no place for them.
         gains: what is used instead of them, or None.
         synchronized: False sets beta = K_eps = 0, independent adaptive control.
         parts: parts and options of the controller, see `ControllerParts`.
@@ -58,6 +59,7 @@ def ready_experiment(
     boolean("synchronized", synchronized)
     if gains is None:
         gains = default if parts.get("adaptation") is None else default.replace(Gamma=None)
+        gains = gains.independent() if getattr(parts.get("law"), "independent", False) else gains
     instance("gains", gains, Gains, "Gains")
     kind = "synchronized" if synchronized else "independent"
     title = ", ".join([cell.name, kind, *remarks, *["disturbed"] * bool(disturbances)])

@@ -33,6 +33,7 @@ class ChungSlotine:
     """
 
     free_gain = "K_2"
+    independent = True
     statement = (
         "e goes to zero, parameters known or not: V' = -s_q^T K_r s_q - rho^T K_2 rho; velocity errors of "
         "neighbours are damped, differences between position errors are not pulled together"

@@ -25,6 +25,7 @@ class SlotineLi:
         InputError: when it is bound, gains beta or K_eps that are not zero.
     """
 
+    independent = True
     statement = "e goes to zero, with unknown parameters too: V' = -s_q^T K_r s_q"
 
     def bind(self, cell: Cell, gains: Gains) -> BoundSlotineLi:
@@ -62,6 +63,7 @@ class ComputedTorque:
         InputError: when it is bound, gains beta or K_eps that are not zero.
     """
 
+    independent = True
     statement = (
         "with exact parameters e'' + 2 Lambda e' + Lambda^2 e = 0; with others e is bounded as long as "
         "|1 - M^-1 M_hat| < 1"
@@ -104,6 +106,7 @@ class PDGravity:
             are not zero.
     """
 
+    independent = True
     statement = (
         "e goes to zero for a target that stands still, with gravity that is exact and not adapted; moving "
         "targets are followed late"

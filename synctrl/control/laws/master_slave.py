@@ -31,6 +31,7 @@ class MasterSlave:
             or gains beta or K_eps that are not zero.
     """
 
+    independent = True
     statement = (
         "the master's e goes to zero; slaves follow it but for the acceleration of its error, "
         "which is dropped"

@@ -171,7 +171,10 @@ class BoundLaw(Protocol):
 
 
 class Law(Protocol):
-    """A law, before it knows the cell."""
+    """A law, before it knows the cell.
+
+    One that is `independent` has no place for the gains beta and K_eps; ready cells then leave theirs out.
+    """
 
     def bind(self, cell: Cell, gains: Gains) -> BoundLaw:
         """This law for a cell.
