@@ -186,7 +186,7 @@ def test_code_that_differs_from_pinocchio_is_refused(monkeypatch, tmp_path):
 
     def tampered(sources, folder):
         *functions, driver = sources
-        broken = driver.replace("X(Gamma, n, P) X(W_inv", "X(pi, n, P) X(W_inv")
+        broken = driver.replace("X(Gamma, n, P) X(limits", "X(pi, n, P) X(limits")
         assert broken != driver
         return compile_sources([*functions, broken], folder)
 

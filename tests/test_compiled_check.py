@@ -198,7 +198,7 @@ def test_robots_that_nobody_chose_pass_the_check(seed):
 # -- what the check finds ---------------------------------------------------------------------------------
 
 #: how Gamma is handed to the law
-GAMMA = "X(Gamma, n, P) X(W_inv"
+GAMMA = "X(Gamma, n, P) X(limits"
 #: faults of the driver and of the lists before it: a text, and what stands in its place
 FAULTS = {
     "a sign of S is lost": ("epsilon[j] += c->sign[t] * w[j]", "epsilon[j] += w[j]"),
@@ -207,13 +207,14 @@ FAULTS = {
     "the place of the base": ("X(base, n, 12) X(desired", "X(base, one, 12) X(desired"),
     "the posture's gain": ("X(gain, n, nv)\n", "X(posture, n, nv)\n"),
     "the weights of W": ("X(weights, n, 4*m*m) X(W_inv, n, nv)", "X(weights, n, 4*m*m) X(gain, n, nv)"),
-    "another robot's damping": ("X(K_eps, one, m) X(K_r, n, K)", "X(K_eps, one, m) X(K_r, one, K)"),
+    "another robot's damping": ("X(leak, one, m) X(K_r, n, K)", "X(leak, one, m) X(K_r, one, K)"),
     "another robot's true parameters": ("X(pi, n, bodies) X(base", "X(pi, one, bodies) X(base"),
     "Coulomb friction": ("* tanh(a->v[j] / a->smoothing[j])", "* (a->v[j] / a->smoothing[j])"),
     "the disturbance": ("+ a->disturbance[j]", ""),
     "what adapts": (GAMMA, GAMMA.replace("Gamma, n", "Gamma, one")),
     "which kind a robot is": ("kinds[c->kind[i]].function(", "kinds[c->kind[0]].function("),
-    "the integral's rate": ("a->integral_dot, a->epsilon,", "a->integral_dot, a->epsilon_dot,"),
+    "the integral's rate": ("a->integral_dot[k] = a->epsilon[k]", "a->integral_dot[k] = a->epsilon_dot[k]"),
+    "the leak of the integral": (" - a->leak[k % m] * a->integral[k]", ""),
     "the order of what is desired": ("X(desired_dot, n, m) X(desired_ddot, n, m) X(weights",
                                      "X(desired_ddot, n, m) X(desired_dot, n, m) X(weights"),
 }  # fmt: skip

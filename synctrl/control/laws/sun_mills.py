@@ -124,6 +124,7 @@ class BoundSunMills:
         """
         K_eps, beta, Lambda, leak = self.K_eps, self.beta, self.Lambda, self.leak
         spring = K_eps * (Lambda - leak) * beta
+        lost = {"leak": -along.E * leak * spring * along.E} if self._leaks else {}
         epsilon, E, sigma = along.epsilon, along.E, along.sigma
         return Proof(
             {
@@ -137,6 +138,6 @@ class BoundSunMills:
             {
                 "synchronization rate": -epsilon * K_eps * Lambda * epsilon,
                 "coupling": -sigma * K_eps * beta * sigma,
-                "leak": -E * leak * spring * E,
+                **lost,
             },
         )
