@@ -213,8 +213,8 @@ FAULTS = {
     "the disturbance": ("+ a->disturbance[j]", ""),
     "what adapts": (GAMMA, GAMMA.replace("Gamma, n", "Gamma, one")),
     "which kind a robot is": ("kinds[c->kind[i]].function(", "kinds[c->kind[0]].function("),
-    "the integral's rate": ("a->integral_dot[k] = a->epsilon[k]", "a->integral_dot[k] = a->epsilon_dot[k]"),
-    "the leak of the integral": (" - a->leak[k % m] * a->integral[k]", ""),
+    "the integral's rate": ("a->integral_dot[j] = a->epsilon[j]", "a->integral_dot[j] = a->epsilon_dot[j]"),
+    "the leak of the integral": (" - a->leak[j % m] * a->integral[j]", ""),
     "the order of what is desired": ("X(desired_dot, n, m) X(desired_ddot, n, m) X(weights",
                                      "X(desired_ddot, n, m) X(desired_dot, n, m) X(weights"),
 }  # fmt: skip

@@ -107,7 +107,7 @@ static void evaluate(const Cell *c, Quantities *a, Work *k, const Steps *s, int 
     for (int i = 0; i < c->n; i++) call_measure(c, a, i, k);
     couple(c, a);
     for (int i = 0; i < c->n; i++) call_control(c, a, i, k);
-    for (int k = 0; k < c->p * m; k++) a->integral_dot[k] = a->epsilon[k] - a->leak[k % m] * a->integral[k];
+    for (int j = 0; j < c->p * m; j++) a->integral_dot[j] = a->epsilon[j] - a->leak[j % m] * a->integral[j];
     move(c, a, a->tau, k);
 }
 
