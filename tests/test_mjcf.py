@@ -223,6 +223,15 @@ def test_what_acts_and_is_not_taken_is_said(old: str, new: str, said: str, tmp_p
     assert said in str(robot.report)
 
 
+def test_a_name_with_line_breaks_is_one_line_and_so_is_what_is_said_of_it(tmp_path: Path) -> None:
+    odd = ARM.replace('"spin"', '"s&#10;p\x9b" stiffness="3"').replace('"hand"', '"h&#10;d" gravcomp="1"')
+    odd = odd.replace("-7 7", "-7 9").replace('"push"', '"p&#10;h"').replace('model="arm"', 'model="a&#10;m"')
+    robot = quietly(write(tmp_path, odd.replace('"tool"', '"t&#10;l"')))
+    assert (robot.name, robot.tip) == ("a\\nm", "t\\nl")
+    assert robot.joint_names == ("turn", "p\\nh", "s\\np\\x9b")
+    assert len(robot.report) == 4 and all(str(note).isprintable() for note in robot.report)
+
+
 def test_a_model_in_which_nothing_moves_is_refused(tmp_path: Path) -> None:
     with refused(RobotError, found=0):
         quietly(write(tmp_path, "<mujoco><worldbody><body><geom size='.1'/></body></worldbody></mujoco>"))
