@@ -147,7 +147,7 @@ def test_an_equality_of_joints_makes_one_follow(tmp_path: Path) -> None:
 def test_an_equality_with_a_number_holds_a_joint_there(tmp_path: Path) -> None:
     held = '<equality><joint joint1="spin" polycoef=".4 0 0 0 0"/></equality><actuator>'
     file = write(tmp_path, ARM.replace("<actuator>", held))
-    with pytest.warns(RobotWarning, match="locked"):
+    with pytest.warns(RobotWarning, match=r"locked .* holds it at \S+ rad"):
         robot = load_robot(file, tip="tool")
     free = quietly(write(tmp_path, ARM, "free.xml"), tip="tool")
     at = {"turn": 0.3, "push": 0.1, "spin": math.radians(20) + 0.4}
@@ -210,7 +210,8 @@ def test_what_acts_on_the_joints_and_is_not_read_is_refused_with_the_torque(tmp_
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('name="spin"', 'name="spin" stiffness="3"', "a spring of 3"),
+        ('name="spin"', 'name="spin" stiffness="3"', "a spring of 3 N·m/rad,"),
+        ('name="push"', 'name="push" stiffness="3"', "a spring of 3 N/m,"),
         ("<compiler", '<option gravity="0 0 -1.62"/><compiler', "in place of 0 0 -1.62"),
         ("<compiler", '<option><flag gravity="disable"/></option><compiler', "in place of 0 0 0"),
         ('<body name="hand"', '<body name="hand" gravcomp="1"', "gravcomp"),

@@ -25,6 +25,7 @@ _VISIBLE_GROUPS = (0, 1, 2)
 """Groups of shapes that MuJoCo's own viewers show unless told otherwise."""
 _NO_SHIFT = 1e-12
 _TYPES = {2: "prismatic", 3: "revolute"}
+_SPRINGS = {2: "N/m", 3: "N·m/rad"}
 _REFUSED_TYPES = {0: "a free joint", 1: "a ball joint"}
 
 
@@ -118,7 +119,7 @@ class _Writer:
             self.notes.add("left out", "tendon", "tendons, with their springs, dampers and limits")
         for joint in np.flatnonzero(model.jnt_stiffness):
             where = f"joint {quoted(self.joint_names[joint])}"
-            spring = f"a spring of {model.jnt_stiffness[joint]:g} N·m/rad (N/m)"
+            spring = f"a spring of {model.jnt_stiffness[joint]:g} {_SPRINGS[int(model.jnt_type[joint])]}"
             self.notes.add("left out", where, f"{spring}, which is no part of the arm's dynamics here")
         for body in np.flatnonzero(model.body_gravcomp):
             where = f"body {quoted(self.bodies[body])}"
@@ -210,7 +211,7 @@ class _Writer:
         follower, leader = model.eq_obj1id[k], model.eq_obj2id[k]
         rest = float(model.qpos0[model.jnt_qposadr[follower]] + constant)
         if leader < 0:
-            self.notes.add("locked", joint.title, f"an equality holds it at {rest:g}")
+            self.notes.add("locked", joint.title, f"an equality holds it at {rest:g} {joint.unit}")
             self.held[joint.name] = rest
             return joint.fixed(rest)
         if any(higher):
