@@ -193,6 +193,11 @@ def test_what_is_neither_name_nor_path_is_refused():
         load_description(5)
 
 
+def test_folders_of_packages_are_asked_for_robots_of_the_catalogue_too():
+    with refused(InputError, "package_dirs"):
+        load_description("planar2r", package_dirs=3)
+
+
 def test_without_example_robot_data_the_own_robots_load_and_the_others_say_what_is_missing(monkeypatch):
     def missing(name: str):
         raise metadata.PackageNotFoundError(name)
