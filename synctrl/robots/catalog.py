@@ -13,7 +13,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import iter_modules
-from types import ModuleType
+from types import ModuleType, NoneType
 from typing import Any
 
 from ..checks import instance
@@ -134,6 +134,7 @@ def load_description(
         MissingDependencyError: a package that has the robot, or reads its kind of file, is not installed.
     """
     instance("robot", source, (str, Path), "a name or a path")
+    _check_kinds(tip, locked, xacro_args)
     options: dict[str, Any] = {"package_dirs": package_dirs, "inertials": inertials, "strict": strict}
     options["xacro_args"] = xacro_args
     if isinstance(source, str) and source.startswith(PREFIX):
@@ -144,6 +145,12 @@ def load_description(
         return read_urdf(source, tip=tip, locked=locked, **options)
     found = _load(source, locked or {}, options)
     return found if tip is None else found.with_tip(tip)
+
+
+def _check_kinds(tip: object, locked: object, xacro_args: object) -> None:
+    instance("tip", tip, (str, NoneType), "a name")
+    instance("locked", locked, (Mapping, NoneType), "positions by the names of joints")
+    instance("xacro_args", xacro_args, (Mapping, NoneType), "values by the names of arguments")
 
 
 def _looks_like_path(text: str) -> bool:
