@@ -76,13 +76,19 @@ def _place(model: pin.Model, name: str, followers: Followers) -> float:
 
 
 def followers_in(text: str) -> Followers:
+    """The joints of a URDF that mimic another."""
     found = {}
-    for joint in ElementTree.fromstring(text.encode()).findall("joint"):
+    for joint in parse(text).findall("joint"):
         mimic = joint.find("mimic")
         if mimic is not None:
             numbers = float(mimic.get("multiplier", 1)), float(mimic.get("offset", 0))
             found[joint.get("name", "")] = mimic.get("joint", ""), *numbers
     return found
+
+
+def parse(text: str) -> ElementTree.Element:
+    """The root of a URDF that has been decoded, whatever encoding it declares."""
+    return ElementTree.fromstring(text.encode(), ElementTree.XMLParser(encoding="utf-8"))
 
 
 def _theirs(

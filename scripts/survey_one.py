@@ -11,7 +11,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pinocchio as pin
-from survey_dynamics import differences, followers_in, loop_difference
+from survey_dynamics import differences, followers_in, loop_difference, parse
 
 from synctrl import Robot, load_robot
 from synctrl.errors import SynctrlError
@@ -127,7 +127,7 @@ def what_it_is(text: str) -> str:
     finger unless there is nothing else.
     """
     try:
-        root = ElementTree.fromstring(text.encode())
+        root = parse(text)
     except (ElementTree.ParseError, ValueError):
         return "not XML"
     if root.tag != "robot":

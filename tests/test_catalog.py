@@ -193,6 +193,25 @@ def test_what_is_neither_name_nor_path_is_refused():
         load_description(5)
 
 
+@pytest.mark.parametrize("source", ["planar2r", urdf_folder() / CATALOG["planar2r"].file])
+@pytest.mark.parametrize("value", [0, "joint1", ["joint1"]])
+@pytest.mark.parametrize("option", ["locked", "inertials", "xacro_args"])
+def test_what_is_no_mapping_is_refused_by_the_name_of_the_option(option, value, source):
+    with refused(InputError, option):
+        load_description(source, **{option: value})
+
+
+@pytest.mark.parametrize("source", ["planar2r", urdf_folder() / CATALOG["planar2r"].file])
+def test_a_tip_that_is_no_name_is_refused(source):
+    with refused(InputError, "tip"):
+        load_description(source, tip=3)
+
+
+def test_folders_of_packages_are_asked_for_robots_of_the_catalogue_too():
+    with refused(InputError, "package_dirs"):
+        load_description("planar2r", package_dirs=3)
+
+
 def test_without_example_robot_data_the_own_robots_load_and_the_others_say_what_is_missing(monkeypatch):
     def missing(name: str):
         raise metadata.PackageNotFoundError(name)

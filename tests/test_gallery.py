@@ -14,7 +14,7 @@ from test_panels import check_places
 from synctrl import Coupling, Disturbance, Experiment, Result
 from synctrl.errors import InputError
 from synctrl.show.legends import columns_that_fit, pair_colors, shortened, text_width
-from synctrl.show.run_figures import FIGURES, Gallery
+from synctrl.show.run_figures import FIGURES, NARROWEST, Gallery
 from synctrl.simulation.result import LAYOUT
 
 
@@ -46,10 +46,11 @@ def words(figure) -> list[str]:
     return [text.get_text() for legend in legends for text in legend.get_texts()]
 
 
+@pytest.mark.parametrize("width", [NARROWEST, 3.5])
 @pytest.mark.parametrize("name", FIGURES)
-def test_all_words_have_their_place_in_a_narrow_figure(scaras, name):
-    figure = scaras.plot(name, width=3.5)[name]
-    assert figure.get_figwidth() == 3.5
+def test_all_words_have_their_place_in_a_narrow_figure(scaras, name, width):
+    figure = scaras.plot(name, width=width)[name]
+    assert figure.get_figwidth() == width
     check_places(figure)
 
 
@@ -65,7 +66,7 @@ def test_names_of_any_length_keep_their_place(star, name):
     ]
     axes = [f"{k} {'coordinate ' * 9}" for k in range(2)]
     check_places(
-        replace(star, info={**star.info, "robots": robots, "axes": axes}).plot(name, width=3.5)[name]
+        replace(star, info={**star.info, "robots": robots, "axes": axes}).plot(name, width=NARROWEST)[name]
     )
 
 

@@ -461,7 +461,7 @@ def test_parameters_of_the_wrong_size_are_refused():
 
 def test_a_robot_is_made_of_a_model():
     refuses(lambda: Robot("planar2r", "tip"), "model", InputError)
-    refuses(lambda: load_robot("planar2r", tip=3), "frame", InputError, found="int")
+    refuses(lambda: load_robot("planar2r", tip=3), "tip", InputError, found="int")
     refuses(lambda: FullParameters("planar2r"), "robot", InputError, found="str")
 
 

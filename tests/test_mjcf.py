@@ -14,6 +14,7 @@ from refusals import refused
 
 from synctrl import Robot, load_robot
 from synctrl.errors import MissingDependencyError, RobotError, RobotWarning
+from synctrl.robots.mechanism import joint_limits
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is an extra: pip install 'synctrl[mujoco]'")
 
@@ -129,6 +130,17 @@ def test_limits_rotors_and_friction_come_along(tmp_path: Path) -> None:
     assert rotors == {"turn": 0.1, "push": 0.0, "spin": 0.02}
 
 
+def test_what_actuators_may_do_to_a_joint_counts_where_it_is_less_than_they_can(tmp_path: Path) -> None:
+    for most, limit in ((4, 4), (40, 10)):  # the motor can do 2 times 5
+        text = ARM.replace('name="turn"', f'name="turn" actuatorfrcrange="-{most} {most}"')
+        assert joint_limits(quietly(write(tmp_path, text))).torque[0] == limit
+
+
+def test_shapes_of_hidden_groups_are_not_seen(tmp_path: Path) -> None:
+    seen = [quietly(write(tmp_path, ARM.replace('group="2"', f'group="{k}"'))).visual.ngeoms for k in (2, 3)]
+    assert seen[1] == seen[0] - 1
+
+
 def test_shapes_are_seen_in_their_size_place_and_colour(tmp_path: Path) -> None:
     robot = quietly(write(tmp_path, ARM))
     box = next(g for link in robot.document.links for g in link.visuals if g.shape.kind == "box")
@@ -147,7 +159,7 @@ def test_an_equality_of_joints_makes_one_follow(tmp_path: Path) -> None:
 def test_an_equality_with_a_number_holds_a_joint_there(tmp_path: Path) -> None:
     held = '<equality><joint joint1="spin" polycoef=".4 0 0 0 0"/></equality><actuator>'
     file = write(tmp_path, ARM.replace("<actuator>", held))
-    with pytest.warns(RobotWarning, match="locked"):
+    with pytest.warns(RobotWarning, match=r"locked .* holds it at \S+ rad"):
         robot = load_robot(file, tip="tool")
     free = quietly(write(tmp_path, ARM, "free.xml"), tip="tool")
     at = {"turn": 0.3, "push": 0.1, "spin": math.radians(20) + 0.4}
@@ -183,6 +195,18 @@ def test_an_equality_with_a_number_holds_a_joint_there(tmp_path: Path) -> None:
             "mujoco, extension",
             "a plugin",
         ),
+        (
+            "<worldbody>",
+            '<worldbody><flexcomp name="f" type="grid" count="2 2 1" spacing=".1 .1 .1"/>',
+            "mujoco, worldbody, flexcomp",
+            "a flexible body",
+        ),
+        (
+            "<worldbody>",
+            '<asset><model name="m" file="m.xml"/></asset><worldbody>',
+            "mujoco, asset, model",
+            "a model within the model",
+        ),
         ("<mujoco", "<!DOCTYPE mujoco><mujoco", None, "<!DOCTYPE>"),
     ],
 )
@@ -210,17 +234,32 @@ def test_what_acts_on_the_joints_and_is_not_read_is_refused_with_the_torque(tmp_
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('name="spin"', 'name="spin" stiffness="3"', "a spring of 3"),
+        ('name="spin"', 'name="spin" stiffness="3"', "a spring of 3 N·m/rad,"),
+        ('name="push"', 'name="push" stiffness="3"', "a spring of 3 N/m,"),
         ("<compiler", '<option gravity="0 0 -1.62"/><compiler', "in place of 0 0 -1.62"),
         ("<compiler", '<option><flag gravity="disable"/></option><compiler', "in place of 0 0 0"),
         ('<body name="hand"', '<body name="hand" gravcomp="1"', "gravcomp"),
         ('forcerange="-7 7"', 'forcerange="-7 9"', "smaller limit of force, 7"),
+        (
+            "<actuator>",
+            '<tendon><fixed stiffness="3"><joint joint="spin" coef="1"/></fixed></tendon><actuator>',
+            "tendons",
+        ),
     ],
 )
 def test_what_acts_and_is_not_taken_is_said(old: str, new: str, said: str, tmp_path: Path) -> None:
     with pytest.warns(RobotWarning):
         robot = load_robot(write(tmp_path, ARM.replace(old, new)))
     assert said in str(robot.report)
+
+
+def test_a_name_with_line_breaks_is_one_line_and_so_is_what_is_said_of_it(tmp_path: Path) -> None:
+    odd = ARM.replace('"spin"', '"s&#10;p\x9b" stiffness="3"').replace('"hand"', '"h&#10;d" gravcomp="1"')
+    odd = odd.replace("-7 7", "-7 9").replace('"push"', '"p&#10;h"').replace('model="arm"', 'model="a&#10;m"')
+    robot = quietly(write(tmp_path, odd.replace('"tool"', '"t&#10;l"')))
+    assert (robot.name, robot.tip) == ("a\\nm", "t\\nl")
+    assert robot.joint_names == ("turn", "p\\nh", "s\\np\\x9b")
+    assert len(robot.report) == 4 and all(str(note).isprintable() for note in robot.report)
 
 
 def test_a_model_in_which_nothing_moves_is_refused(tmp_path: Path) -> None:

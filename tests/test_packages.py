@@ -132,6 +132,14 @@ def test_a_package_xml_that_says_no_name_leaves_the_folder_its_own(text, tmp_pat
     assert packages.folder("arm") == home and packages.folder("other") is None
 
 
+def test_no_encoding_of_a_package_xml_hides_an_entity(tmp_path):
+    home = package(tmp_path / "arm", "other")
+    text = '<!DOCTYPE package [<!ENTITY a "other">]><package><name>&a;</name></package>'
+    (home / "package.xml").write_text(text, encoding="utf-16")
+    packages = Packages(home / "urdf" / "a.urdf")
+    assert packages.folder("arm") == home and packages.folder("other") is None
+
+
 def test_a_pipe_in_place_of_a_package_xml_is_not_opened(tmp_path):
     home = package(tmp_path / "arm")
     os.mkfifo(home / "package.xml")

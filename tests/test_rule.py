@@ -557,6 +557,14 @@ def test_what_is_suspicious_is_said_and_taken(old, new, words, tmp_path):
     same_as_pinocchio(robot, tmp_path / "robot.urdf")
 
 
+def test_a_file_without_any_mass_says_so_before_what_else_is_wrong_with_it(tmp_path):
+    lost = joint("jx", "nowhere", "a") + link("b", None)
+    for wrong in (chain("a b c", lower=5), ARM + lost):
+        with refused(RobotError, None, file=str(tmp_path / "robot.urdf")) as caught:
+            loaded(tmp_path, robot_text(wrong.replace(BODY.format(mass=1.0, i=0.01), "")))
+        assert "inertials={...}" in str(caught.value)
+
+
 def test_inertials_of_the_caller_take_the_place_of_missing_ones(tmp_path):
     text = robot_text(ARM)
     bare = robot_text(ARM.replace(BODY.format(mass=1.0, i=0.01), ""))

@@ -49,6 +49,7 @@ def tree(*edges: str, kind: str = "revolute", mass: float = 1.0) -> str:
         (tree("ab", "bc"), "arm"),
         (tree("ab", "bc", "cd", "de", "df"), "arm"),
         (tree("ab", "bc", "cd", "ae", "ef", "fg"), "arm"),
+        (f"<?xml version='1.0' encoding='gb2312'?>{tree('ab', 'bc')}", "arm"),
         (tree("ab", "ac", "ad", "ae"), "wheels or fingers"),
         (tree("ab", "bc", "cd", "ae", "ef", "fg", "ah", "hi", "ij"), "more than two limbs"),
         (tree("ab", "bc", kind="fixed"), "nothing moves"),

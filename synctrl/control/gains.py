@@ -105,7 +105,11 @@ class Gains:
         return replace(self, beta=np.zeros_like(self.beta), K_eps=np.zeros_like(self.K_eps))
 
     def replace(self, **changes: ArrayLike | None) -> Self:
-        """These gains with some of them changed."""
+        """These gains with some of them changed.
+
+        Raises:
+            InputError: no gain of that name, or a value that such a gain cannot have.
+        """
         unknown = set(changes) - set(_SIGNS)
         if unknown:
             known, found = ", ".join(_SIGNS), ", ".join(sorted(unknown))

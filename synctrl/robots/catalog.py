@@ -13,7 +13,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import iter_modules
-from types import ModuleType
+from types import ModuleType, NoneType
 from typing import Any
 
 from ..checks import instance
@@ -123,7 +123,7 @@ def load_description(
             downloads what it has not got yet.
         tip: name of the tip frame. For a file, joints that do not move it are held.
         locked: positions, in rad or m, of joints that are to be held: they become fixed joints.
-        package_dirs: folders in which packages are looked for; for files only.
+        package_dirs: folders in which packages are looked for.
         inertials: of links, in the place of what the file says, each an `Inertial` or a mapping of "mass",
             "com" and "inertia".
         strict: whether everything that would be a warning is an error.
@@ -134,15 +134,23 @@ def load_description(
         MissingDependencyError: a package that has the robot, or reads its kind of file, is not installed.
     """
     instance("robot", source, (str, Path), "a name or a path")
-    options: dict[str, Any] = {"inertials": inertials, "strict": strict, "xacro_args": xacro_args}
+    _check_kinds(tip, locked, xacro_args)
+    options: dict[str, Any] = {"package_dirs": package_dirs, "inertials": inertials, "strict": strict}
+    options["xacro_args"] = xacro_args
     if isinstance(source, str) and source.startswith(PREFIX):
         source, folders, own_args = downloaded(source.removeprefix(PREFIX))
-        package_dirs = (*named_folders(package_dirs), *folders)
+        options["package_dirs"] = (*named_folders(package_dirs), *folders)
         options["xacro_args"] = xacro_args if own_args is None else {**own_args, **(xacro_args or {})}
     if isinstance(source, Path) or _looks_like_path(source):
-        return read_urdf(source, package_dirs, tip=tip, locked=locked, **options)
+        return read_urdf(source, tip=tip, locked=locked, **options)
     found = _load(source, locked or {}, options)
     return found if tip is None else found.with_tip(tip)
+
+
+def _check_kinds(tip: object, locked: object, xacro_args: object) -> None:
+    instance("tip", tip, (str, NoneType), "a name")
+    instance("locked", locked, (Mapping, NoneType), "positions by the names of joints")
+    instance("xacro_args", xacro_args, (Mapping, NoneType), "values by the names of arguments")
 
 
 def _looks_like_path(text: str) -> bool:

@@ -20,11 +20,11 @@ from .robot import Robot
 def momentum_regressors(
     parameters: Parameters, q: np.ndarray, v: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Y_p and Y_h of one robot, (nv, P) each.
+    """Y_p and Y_h of one robot, (nv, P) each: Y_p theta is in N·m·s (N·s), Y_h theta in N·m (N).
 
     Args:
         parameters: what is adapted.
-        q, v: joint positions and velocities, (nv,).
+        q, v: joint positions and velocities, (nv,), rad and rad/s (m and m/s).
     """
     Y, still, units = parameters.regressor, np.zeros_like(v), np.eye(len(v))
     rest, back = Y(q, v, still, still), Y(q, -v, still, still)

@@ -123,7 +123,7 @@ def holding(robot: Robot, xyz: ArrayLike, rotation: ArrayLike, name: str = "held
 
     Args:
         robot: the robot.
-        xyz, rotation: place and orientation of the frame in the axes of the robot's tip, (3,) and (3, 3).
+        xyz, rotation: place and orientation of the frame in the axes of the robot's tip, (3,), m, and (3, 3).
         name: what the frame is called, which the robot has not yet.
 
     Raises:

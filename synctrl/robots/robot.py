@@ -226,7 +226,7 @@ class Robot:
     # -- kinematics ---------------------------------------------------------------------------------------
 
     def tip_pose(self, q: ArrayLike) -> pin.SE3:
-        """Placement of the tip frame in the world."""
+        """Placement of the tip frame in the world at joint positions q, (nv,)."""
         pin.forwardKinematics(self.model, self._data.own, self.configuration(q))
         return pin.updateFramePlacement(self.model, self._data.own, self.tip_id).copy()
 
@@ -244,9 +244,9 @@ class Robot:
         return self.tip_kinematics(*self._vectors(q=q, v=v))[2].copy()
 
     def tip_kinematics(self, q: np.ndarray, v: np.ndarray) -> tuple[pin.SE3, np.ndarray, np.ndarray]:
-        """Pose of the tip, its Jacobian and the Jacobian's derivative, from one pass over the mechanism.
+        """Pose of the tip, its Jacobian, (6, nv), and the Jacobian's derivative, (6, nv), from one pass.
 
-        The pose is scratch memory, valid until this thread's next call.
+        q and v are (nv,), and not checked. The pose is scratch memory, valid until this thread's next call.
         """
         model, data, tip = self.model, self._data.own, self.tip_id
         pin.computeJointJacobiansTimeVariation(model, data, self._stored(q), v)

@@ -146,7 +146,7 @@ def examine(
     Raises: as `read_urdf`.
     """
     notes = notes or Notes(document.file)
-    instance("frame", tip, (str, type(None)), "a name")
+    instance("tip", tip, (str, type(None)), "a name")
     document = with_inertials(document, {} if inertials is None else inertials)
     document, held = _settled(document, {} if locked is None else locked, tip, notes)
     model = build_model(document)

@@ -19,12 +19,13 @@ from .mjcf_files import Whole, read_whole
 from .mjcf_model import check_dynamics, read_limits
 from .packages import Packages
 from .report import Notes
-from .xml import quoted
+from .xml import one_line, quoted
 
 _VISIBLE_GROUPS = (0, 1, 2)
 """Groups of shapes that MuJoCo's own viewers show unless told otherwise."""
 _NO_SHIFT = 1e-12
 _TYPES = {2: "prismatic", 3: "revolute"}
+_SPRINGS = {2: "N/m", 3: "N·m/rad"}
 _REFUSED_TYPES = {0: "a free joint", 1: "a ball joint"}
 
 
@@ -92,8 +93,8 @@ class _Writer:
         return Document(self.whole.name, tuple(links), tuple(joints), self.file)
 
     def _names(self, kind: Any, count: int, word: str) -> list[str]:
-        """Names of all of a kind; what has none gets one."""
-        names = [self.mujoco.mj_id2name(self.model, kind, k) for k in range(count)]
+        """Names of all of a kind, each one line; what has none gets one."""
+        names = [one_line(self.mujoco.mj_id2name(self.model, kind, k) or "") for k in range(count)]
         taken = set(names)
         return [name or unique(f"{word}{k}", taken) for k, name in enumerate(names)]
 
@@ -117,11 +118,11 @@ class _Writer:
         if model.ntendon:
             self.notes.add("left out", "tendon", "tendons, with their springs, dampers and limits")
         for joint in np.flatnonzero(model.jnt_stiffness):
-            where = f"joint '{self.joint_names[joint]}'"
-            spring = f"a spring of {model.jnt_stiffness[joint]:g} N·m/rad (N/m)"
+            where = f"joint {quoted(self.joint_names[joint])}"
+            spring = f"a spring of {model.jnt_stiffness[joint]:g} {_SPRINGS[int(model.jnt_type[joint])]}"
             self.notes.add("left out", where, f"{spring}, which is no part of the arm's dynamics here")
         for body in np.flatnonzero(model.body_gravcomp):
-            where = f"body '{self.bodies[body]}'"
+            where = f"body {quoted(self.bodies[body])}"
             self.notes.add("left out", where, "gravcomp: the body has its whole weight here")
         off = model.opt.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY)
         gravity = np.zeros(3) if off else model.opt.gravity
@@ -210,7 +211,7 @@ class _Writer:
         follower, leader = model.eq_obj1id[k], model.eq_obj2id[k]
         rest = float(model.qpos0[model.jnt_qposadr[follower]] + constant)
         if leader < 0:
-            self.notes.add("locked", joint.title, f"an equality holds it at {rest:g}")
+            self.notes.add("locked", joint.title, f"an equality holds it at {rest:g} {joint.unit}")
             self.held[joint.name] = rest
             return joint.fixed(rest)
         if any(higher):
@@ -232,7 +233,7 @@ class _Writer:
         shape = self._shape(geom)
         if shape is None:
             kind = self.mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
-            where = f"body '{self.bodies[model.geom_bodyid[geom]]}'"
+            where = f"body {quoted(self.bodies[model.geom_bodyid[geom]])}"
             self.notes.add("left out", where, f"a shape of kind '{kind}'; it will not be shown")
             return None
         if shape.kind == "mesh":  # MuJoCo puts a mesh's frame into its centre of mass

@@ -13,7 +13,7 @@ from xml.sax.saxutils import quoteattr
 
 from .packages import Packages, Unusable, read_regular
 from .report import Notes
-from .xml import Element, parse_xml, quoted, read_bytes
+from .xml import Element, one_line, parse_xml, quoted, read_bytes
 
 ROOT = "mujoco"
 MAX_INCLUDES = 100
@@ -59,7 +59,7 @@ def read_whole(file: Path, packages: Packages, notes: Notes) -> Whole:
     root = parse_xml(str(file), read_bytes(file), notes)
     reader.prepare(root)
     reader.whole.text = "".join(_written(root))
-    reader.whole.name = root.attributes.get("model") or file.stem
+    reader.whole.name = one_line(root.attributes.get("model") or file.stem)
     return reader.whole
 
 

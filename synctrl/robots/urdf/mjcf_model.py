@@ -12,6 +12,7 @@ import pinocchio as pin
 from .build import build_model
 from .document import Document, Limit
 from .report import Notes
+from .xml import quoted
 
 
 def read_limits(mujoco: Any, model: Any, names: list[str], notes: Notes) -> list[Limit]:
@@ -55,7 +56,7 @@ def _smaller(ends: np.ndarray, name: str, notes: Notes) -> float:
     low, high = sorted(float(end) for end in abs(ends))
     if low != high:
         text = f"the smaller limit of force, {low:g}, to both sides, where one side has {high:g}"
-        notes.add("assumed", f"joint '{name}', limit", text)
+        notes.add("assumed", f"joint {quoted(name)}, limit", text)
     return low
 
 

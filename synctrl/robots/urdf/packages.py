@@ -161,7 +161,7 @@ def _package_name(folder: Path) -> str | None:
         data = read_regular(folder / MANIFEST, _MANIFEST_BYTES)
     except Unusable:
         return folder.name if _is_laid_out(folder) else None
-    if b"<!DOCTYPE" in data:  # nobody needs entities here
+    if b"\0" in data or b"<!DOCTYPE" in data:  # nobody needs entities here, or UTF-16, which would hide them
         return folder.name
     try:
         name = ElementTree.fromstring(data).findtext("name", "")

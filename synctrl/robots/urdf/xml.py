@@ -44,6 +44,11 @@ def quoted(text: str) -> str:
     return ascii(text if len(text) <= 60 else text[:57] + "...")
 
 
+def one_line(name: str) -> str:
+    """A name from a file in one line: each control character as Python escapes it."""
+    return "".join(c if unprintable(c) is None else ascii(c)[1:-1] for c in name)
+
+
 @dataclass(slots=True, eq=False)
 class Element:
     """An XML element and where it stands."""
@@ -140,7 +145,7 @@ class Element:
         if not text.strip() or len(text) > _LONGEST_NAME:
             found = f"{quoted(text)} of {len(text)}"
             self.refuse(f"a {attribute} of 1 to {_LONGEST_NAME} characters, not all blank", found)
-        return "".join(c if unprintable(c) is None else ascii(c)[1:-1] for c in text)
+        return one_line(text)
 
     def number(self, attribute: str, default: float | None = None) -> float:
         """An attribute that is one finite number."""
