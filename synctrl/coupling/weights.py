@@ -207,7 +207,11 @@ def as_source(robots: int, c: ArrayLike | WeightFunction | WeightSource) -> Weig
 
 
 def as_matrices(c: np.ndarray, m: int) -> np.ndarray:
-    """Numbers, (n,), diagonals, (n, m), or matrices, (n, m, m), as matrices, (n, m, m)."""
+    """Numbers, (n,), diagonals, (n, m), or matrices, (n, m, m), as matrices, (n, m, m).
+
+    Raises:
+        InputError: another shape.
+    """
     n = c.shape[0] if c.ndim else 0
     if c.ndim == 1:
         return c[:, None, None] * np.eye(m)

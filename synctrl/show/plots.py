@@ -152,7 +152,18 @@ def sync_errors(result: Result, limits: tuple[float, float] | None = None, *, wi
 
 
 def common_limits(kind: str, *results: Result) -> tuple[float, float]:
-    """Limits that figures of an error share when their runs are compared: all that the runs need."""
+    """Limits that figures of an error share when their runs are compared: all that the runs need.
+
+    Args:
+        kind: "tracking_error" or "sync_error".
+        results: the runs.
+
+    Returns:
+        The lower and the upper one, in the unit of the error.
+
+    Raises:
+        InputError: another kind, or no run.
+    """
     choice("kind", kind, ERRORS)
     own = [_needed(result, kind) for result in results]
     if not own:
