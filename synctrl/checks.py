@@ -60,7 +60,11 @@ def per_joint(name: str, value: ArrayLike, nv: int) -> np.ndarray:
 
 
 def symmetric_matrix(name: str, value: ArrayLike, size: int) -> np.ndarray:
-    """`value` as a read-only symmetric float array, (size, size)."""
+    """`value` as a read-only symmetric float array, (size, size).
+
+    Raises:
+        InputError: not numbers, another shape, not finite, or not symmetric to 1e-12.
+    """
     array = finite_array(name, value, (size, size))
     if not np.allclose(array, array.T, rtol=1e-12, atol=0):
         raise InputError.expected("a symmetric matrix", array, name)
@@ -82,14 +86,22 @@ def rotation_matrix(name: str, value: ArrayLike) -> np.ndarray:
 
 
 def finite_number(name: str, value: object) -> float:
-    """`value` as a finite float."""
+    """`value` as a finite float.
+
+    Raises:
+        InputError: not one number, or not finite; True and False are no numbers.
+    """
     if isinstance(value, (bool, np.bool_)):
         raise InputError.expected("a number", value, name)
     return float(finite_array(name, value, ()))  # type: ignore[arg-type]
 
 
 def positive_number(name: str, value: object) -> float:
-    """`value` as a finite float above zero."""
+    """`value` as a finite float above zero.
+
+    Raises:
+        InputError: see `finite_number`; or 0 and below.
+    """
     number = finite_number(name, value)
     if number <= 0:
         raise InputError.expected("a number above 0", number, name)
@@ -97,7 +109,11 @@ def positive_number(name: str, value: object) -> float:
 
 
 def non_negative_number(name: str, value: object) -> float:
-    """`value` as a finite float that is not below zero."""
+    """`value` as a finite float that is not below zero.
+
+    Raises:
+        InputError: see `finite_number`; or below 0.
+    """
     number = finite_number(name, value)
     if number < 0:
         raise InputError.expected("a number of at least 0", number, name)
@@ -105,7 +121,11 @@ def non_negative_number(name: str, value: object) -> float:
 
 
 def count(name: str, value: object, least: int = 1) -> int:
-    """`value` as a whole number of at least `least`."""
+    """`value` as a whole number of at least `least`.
+
+    Raises:
+        InputError: no whole number, or a smaller one.
+    """
     instance(name, value, (int, np.integer), "a whole number")
     if isinstance(value, bool) or value < least:  # type: ignore[operator]
         raise InputError.expected(f"a whole number of at least {least}", value, name)
@@ -113,7 +133,11 @@ def count(name: str, value: object, least: int = 1) -> int:
 
 
 def index(name: str, value: object, count: int) -> int:
-    """`value` as the index of one of so many things, counted from 0."""
+    """`value` as the index of one of so many things, counted from 0.
+
+    Raises:
+        InputError: no whole number, or outside of 0 to count - 1.
+    """
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not whole or not 0 <= value < count:  # type: ignore[operator]
         raise InputError.expected(f"an index from 0 to {count - 1}", value, name, shown=repr(value))
@@ -121,7 +145,11 @@ def index(name: str, value: object, count: int) -> int:
 
 
 def window(name: str, start: object, stop: object) -> tuple[float, float]:
-    """Two times, s, of which the second is later than the first; None stands for no end."""
+    """Two times, s, of which the second is later than the first; None stands for no end.
+
+    Raises:
+        InputError: not two finite numbers with 0 <= start < stop.
+    """
     first = finite_number(f"{name}, start", start)
     last = np.inf if stop is None else finite_number(f"{name}, stop", stop)
     if not 0 <= first < last:
@@ -140,13 +168,16 @@ def limits(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> np.nda
         return np.full(shape, np.inf)
     array = numbers(name, value, shape)
     if not (array >= 0).all():
-        found = float(array[~(array >= 0)][0])
-        raise InputError(f"expected numbers of at least 0, found {found:g}", subject=name, found=found)
+        raise InputError.expected("numbers of at least 0", array[~(array >= 0)][0], name)
     return array
 
 
 def boolean(name: str, value: object) -> bool:
-    """`value` if it is True or False."""
+    """`value` if it is True or False.
+
+    Raises:
+        InputError: it is something else.
+    """
     if not isinstance(value, (bool, np.bool_)):
         raise InputError.expected("True or False", value, name)
     return bool(value)
@@ -184,14 +215,22 @@ def shaped(name: str, value: Any, shape: tuple[int, ...]) -> None:
 
 
 def choice(name: str, value: object, known: tuple[str, ...]) -> str:
-    """`value` if it is one of the known words."""
+    """`value` if it is one of the known words.
+
+    Raises:
+        InputError: it is none of them.
+    """
     if not isinstance(value, str) or value not in known:
         raise InputError.expected(f"one of {', '.join(map(repr, known))}", value, name)
     return str(value)
 
 
 def label(name: str, value: object) -> str:
-    """`value` if it is a text of one line, which files, pages and figures can hold."""
+    """`value` if it is a text of one line, which files, pages and figures can hold.
+
+    Raises:
+        InputError: no text, a longer one, or control characters in it.
+    """
     instance(name, value, str, "a text")
     line = str(value)
     if len(line) > LONGEST_LABEL or unprintable(line):

@@ -189,11 +189,11 @@ class NonFiniteError(SimulationError):
 
 
 class SingularJacobianError(SimulationError):
-    """A robot met a singular configuration in Cartesian control."""
+    """A robot met a singular configuration in Cartesian control; `found` is the condition number, or None."""
 
 
 class OrientationError(SimulationError):
-    """An orientation error close to half a turn, where its direction is not defined."""
+    """An orientation error, `found` in rad, close to half a turn, where its direction is not defined."""
 
 
 class RunInterrupted(Portable, KeyboardInterrupt):

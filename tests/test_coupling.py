@@ -236,7 +236,7 @@ def test_weight_functions_may_return_numbers_or_diagonals(form):
         (lambda t: (np.array([t - 3, 1.0]), np.ones(2), np.zeros(2)), {"robot": 0, "time": 3.0}),
         (lambda t: np.ones(2), {}),
         (lambda t: (np.ones(2), np.ones(2)), {}),
-        (lambda t: (np.ones(2), np.ones(3), np.ones(2)), {"time": 3.0}),
+        (lambda t: (np.ones(2), np.ones(3), np.ones(2)), {"time": 3.0, "found": ((2,), (3,), (2,))}),
         (lambda t: (np.ones(2), np.array([np.nan, 1]), np.ones(2)), {"time": 3.0}),
     ],
 )

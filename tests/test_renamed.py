@@ -25,6 +25,7 @@ MOVED = {
     "synctrl.show.plots": ("synctrl.show.legends", ["WIDE", "NARROW"]),
     "synctrl.simulation.simulate": ("synctrl.simulation.engines", ["run_reference"]),
     "synctrl.coupling.weights": ("synctrl.coupling.desired", ["check_weights"]),
+    "synctrl.tasks.rotations": ("synctrl.checks", ["rotation_matrix"]),
 }
 #: names by the module that had them, the module that has them now, and what they are called there
 RENAMED = [

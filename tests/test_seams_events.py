@@ -222,6 +222,22 @@ def test_messages_that_are_none_are_refused_with_their_network(kind, method, opt
         replace(a460_pair(), network=Wrong(1e-3)).simulate(0.01, **options)
 
 
+class Endless(BoundPosted):
+    def meet(self, t, w, memory):
+        return memory + np.inf
+
+
+@pytest.mark.parametrize("options", [{}, {"control_period": 2e-3}], ids=["continuous", "sampled"])
+def test_a_message_that_makes_memory_infinite_ends_the_run_with_what_it_made(options):
+    class Wrong(Posted):
+        def bind(self, cell):
+            return Endless(self.T, cell.coupling, cell.m)
+
+    with refused(NonFiniteError, "network Endless, meet", cause="part") as caught:
+        replace(a460_pair(), network=Wrong(1e-3)).simulate(0.01, **options)
+    assert np.isinf(caught.value.found).all() and caught.value.found
+
+
 class Flat(Plant):
     events = (2e-3,)
 

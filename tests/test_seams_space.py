@@ -31,7 +31,7 @@ from synctrl.errors import (
     UnreachableError,
 )
 from synctrl.sweep import Grid, Sweep, gain, load
-from synctrl.tasks.spaces import units_of
+from synctrl.tasks.spaces import BoundTipSpace, Measurement, TipSpace, units_of
 
 ARM, START = load_robot("planar2r"), np.array([0.3, 1.0])
 WAYS = {
@@ -118,6 +118,51 @@ def test_a_sweep_takes_a_space_of_ones_own(tmp_path):
 def test_the_compiled_engine_refuses_a_space_of_ones_own_by_name():
     with refused(InputError, "space", found="seams.degrees.Degrees"):
         experiment(Degrees()).simulate(engine="compiled")
+
+
+class BoundTurned(BoundTipSpace):
+    def measure(self, motion, desired):
+        turn = self._space.turn
+        moved, J, J_dot = self._tips.positions(*motion)
+        moved, J, J_dot = np.matvec(turn, moved[..., :2]), turn @ J[..., :2, :], turn @ J_dot[..., :2, :]
+        inversion = self._inverse.invert(J, J_dot, *motion)
+        return Measurement(moved, desired[:2] - moved, desired[1:], J, inversion.J_inv, J_dot, inversion)
+
+
+class Turned(TipSpace):
+    """Positions of tips in axes that are turned against those of the world."""
+
+    unit, bound = "m", BoundTurned
+    turn = np.array([[0.8, 0.6], [-0.6, 0.8]])
+
+    def __init__(self):
+        super().__init__(2, 1e4, "stop", None)
+
+    def labels(self, robots):
+        return "along", "across"
+
+    def miss(self, robot, target, q):
+        pose, J, _ = robot.tip_kinematics(q, np.zeros(robot.nv))
+        return target - self.turn @ pose.translation[:2], self.turn @ J[:2]
+
+
+def test_a_further_space_of_the_tip_is_compiled_once_its_name_is_known(monkeypatch):
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    from synctrl.compiled import known
+
+    tip = ARM.tip_pose(START).translation[:2]
+    ends = [tip + way for way in ([0.1, 0.0], [0.1, 0.1])]
+    ways = [Cubic(Turned.turn @ tip, Turned.turn @ end, 0.5) for end in ends]
+    members = [Member(ARM, way, q0=START, theta_hat0=0.5 * ARM.inertial_parameters) for way in ways]
+    gains = Gains(Lambda=10.0, beta=5.0, K_r=4.0, K_eps=80.0, Gamma=0.5)
+    turned = Experiment(Cell(members, Coupling.pair(), Turned()), gains, 0.5)
+    with refused(InputError, "space"):
+        turned.simulate(0.1, engine="compiled")
+    monkeypatch.setattr(known, "SPACES", (*known.SPACES, Turned))
+    monkeypatch.setattr(known, "BOUND", (*known.BOUND, BoundTurned))
+    found, expected = (turned.simulate(0.1, engine=engine) for engine in ("compiled", "pinocchio"))
+    np.testing.assert_allclose(found.q, expected.q, rtol=1e-9)
+    assert np.abs(expected.sync_error).max() > 1e-4
 
 
 class Narrow(Degrees):

@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import synctrl
-from synctrl import Experiment
+from synctrl import Cell, Coupling, Experiment
 from synctrl.experiments import a460_pair, planar_four
 
 PACKAGE = str(Path(synctrl.__file__).parent)
@@ -50,6 +51,19 @@ def trip(experiment: Experiment) -> list[str]:
 @pytest.mark.parametrize("make", [planar_four, a460_pair])
 def test_from_joint_positions_to_torque_it_is_a_dozen_calls_at_most(make: Callable[[], Experiment]) -> None:
     assert len(trip(make())) <= DOZEN
+
+
+def times(k: int, experiment: Experiment) -> Experiment:
+    """An experiment with k times as many robots."""
+    members = [replace(member, name=None) for member in k * experiment.cell.members]
+    cell = Cell(members, Coupling.signed_ring(len(members)), experiment.cell.space)
+    return replace(experiment, cell=cell)
+
+
+def test_robots_of_one_forest_share_the_trip_and_more_of_them_cost_no_more_calls_each() -> None:
+    assert trip(times(2, planar_four())) == trip(planar_four())
+    few, many = (len(trip(times(k, planar_four()))) / k for k in (6, 24))
+    assert many < few
 
 
 def test_every_station_is_in_the_file_that_the_page_says() -> None:

@@ -208,7 +208,7 @@ def _compare(library: ctypes.CDLL, loop: ClosedLoop, classified: Classified) -> 
 
 
 def _agree(expected: list[np.ndarray], found: list[np.ndarray]) -> None:
-    for name, a, b in zip(("q'", "v'", "theta_hat'", "epsilon"), expected, found, strict=True):
+    for name, a, b in zip(("q'", "v'", "z'", "integral'"), expected, found, strict=True):
         difference = np.abs(b - a).max(initial=0.0) / (1 + np.abs(a).max(initial=0.0))
         if not difference < AGREEMENT:
             raise CompilationError(

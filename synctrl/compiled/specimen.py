@@ -9,6 +9,7 @@ kinds, not of robots.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -26,9 +27,8 @@ from ..robots.parameters import FrictionParameters, FullParameters, LinearParame
 from ..robots.robot import Robot
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.plant import Plant
-from ..tasks.pose import PoseSpace
 from ..tasks.redundancy import Redundancy
-from ..tasks.spaces import CartesianSpace, JointSpace, Space
+from ..tasks.spaces import JointSpace, Space, TipSpace
 from ..tasks.trajectories import Hold
 from .kind import Classified
 from .plugged import ChosenAdaptation, ChosenLaw
@@ -94,15 +94,13 @@ class Specimen:
         return ClosedLoop(controller, Plant(cell))
 
     def _space(self, space: Space, robots: Sequence[Robot]) -> Space:
-        if isinstance(space, JointSpace):
-            return JointSpace()
+        if not isinstance(space, TipSpace):
+            return space
         posture = [self._random(robot.nv) for robot in robots]
         weights = [self._positive(robot.nv) for robot in robots]
-        redundancy = Redundancy(posture, 0.7, weights)
-        damping: Any = getattr(space, "damping", None) or "stop"
-        if isinstance(space, CartesianSpace):
-            return CartesianSpace(space.axes, singularity=damping, redundancy=redundancy)
-        return PoseSpace(singularity=damping, redundancy=redundancy)
+        other = copy(space)
+        other.redundancy = Redundancy(posture, 0.7, weights)
+        return other
 
     def _gains(self, cell: Cell, k_r_space: str) -> Gains:
         columns = cell.nv if k_r_space == "joint" else cell.m

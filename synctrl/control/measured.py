@@ -76,7 +76,7 @@ def check_signals(cell: Cell, t: float, signals: Signals) -> None:
             f"below {limit:g}; stop the robots and reset the controller",
             time=t,
             robot=i,
-        )
+        ).about(name, found=value)
     for what, rows in (("torque", signals.tau), ("rate of the estimates", signals.z_dot)):
         bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
         if bad.size:

@@ -216,5 +216,5 @@ class Messages:
             raise NonFiniteError(
                 f"{where}: expected finite memory after the message of {t:g} s, found {found.tolist()}",
                 cause="part",
-            )
+            ).about(where, found=found)
         return found

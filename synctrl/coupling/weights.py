@@ -123,12 +123,12 @@ class FunctionWeights:
         try:
             parts = [finite_array(name, part) for name, part in zip(DERIVATIVES, value, strict=True)]
             if any(part.ndim == 0 or len(part) != self.robots for part in parts):
-                found = ", ".join(str(part.shape) for part in parts)
-                raise InputError(
-                    f"expected one weight for each of {self.robots} robots, found shapes {found}"
-                )
+                found = [part.shape for part in parts]
+                shapes = f"shapes {', '.join(map(str, found))}"
+                raise InputError.expected(f"one weight for each of {self.robots} robots", found, shown=shapes)
         except InputError as error:
-            raise CouplingError(f"weights at t = {t:g} s: {error}").about("c", time=float(t)) from error
+            failure = CouplingError(f"weights at t = {t:g} s: {error}")
+            raise failure.about("c", found=error.found, time=float(t)) from error
         return parts
 
 
@@ -207,7 +207,11 @@ def as_source(robots: int, c: ArrayLike | WeightFunction | WeightSource) -> Weig
 
 
 def as_matrices(c: np.ndarray, m: int) -> np.ndarray:
-    """Numbers, (n,), diagonals, (n, m), or matrices, (n, m, m), as matrices, (n, m, m)."""
+    """Numbers, (n,), diagonals, (n, m), or matrices, (n, m, m), as matrices, (n, m, m).
+
+    Raises:
+        InputError: another shape.
+    """
     n = c.shape[0] if c.ndim else 0
     if c.ndim == 1:
         return c[:, None, None] * np.eye(m)

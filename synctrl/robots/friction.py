@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..checks import finite_array, positive_number
 from ..errors import InputError
@@ -44,4 +45,16 @@ class Friction:
 
     def torque(self, v: np.ndarray) -> np.ndarray:
         """Torque by which friction opposes the velocities v, (..., nv), in N·m."""
-        return self.viscous * v + self.coulomb * np.tanh(v / self.smoothing)
+        return friction_torque(v, self.viscous, self.coulomb, self.smoothing)
+
+
+def friction_torque(
+    v: np.ndarray, viscous: np.ndarray, coulomb: np.ndarray, smoothing: ArrayLike
+) -> np.ndarray:
+    """viscous v + coulomb tanh(v / smoothing), by which friction opposes the velocities v, (..., nv), in N·m.
+
+    Args:
+        v: (..., nv), rad/s.
+        viscous, coulomb, smoothing: see `Friction`; each a number or an array that fits v.
+    """
+    return viscous * v + coulomb * np.tanh(v / smoothing)

@@ -158,6 +158,9 @@ def common_limits(kind: str, *results: Result) -> tuple[float, float]:
         kind: "tracking_error" or "sync_error".
         results: the runs.
 
+    Returns:
+        The lower and the upper one, in the unit of the error.
+
     Raises:
         InputError: another kind, or no run.
     """

@@ -43,7 +43,11 @@ def check_run(result: Result, *arrays: str) -> None:
 
 
 def check_axes(result: Result, *axes: str) -> None:
-    """Refuse a run whose coordinates are not those of tips along these axes."""
+    """Refuse a run whose coordinates are not those of tips along these axes.
+
+    Raises:
+        InputError: other axes.
+    """
     if (found := result.info["axes"]) != [*axes]:
         expected = f"{', '.join(axes[:-1])} and {axes[-1]}"
         raise InputError.expected(f"tips along {expected}", found, "result", shown=", ".join(found))

@@ -276,13 +276,11 @@ class Scene:
         if array.shape == (width,):
             return array[None]
         if array.ndim != 2 or array.shape[1] != width or not len(array):
-            words = f"expected shape ({width},) or (T, {width}), found {array.shape}"
-            raise InputError(words, subject=name, found=array.shape)
+            raise InputError.expected(f"shape ({width},) or (T, {width})", array.shape, name)
         if len(array) > 1:
             self._frames = self._frames or len(array)
             if len(array) != self._frames:
-                words = f"expected {self._frames} frames as before, found {len(array)}"
-                raise InputError(words, subject=name, found=len(array))
+                raise InputError.expected(f"{self._frames} frames as before", len(array), name)
         return array
 
     def _lengths(self, name: str, value: ArrayLike) -> np.ndarray:
@@ -290,8 +288,7 @@ class Scene:
         array = finite_array(name, value)
         lengths = self._series(name, array.reshape(-1, 1) if array.ndim < 2 else array, 1)
         if lengths.min() < 0:
-            found = lengths.min()
-            raise InputError.expected("no length below 0", found, name)
+            raise InputError.expected("no length below 0", lengths.min(), name)
         return np.maximum(lengths, TINY)
 
     def _colors(self, name: str, color: ColorLike) -> np.ndarray | None:

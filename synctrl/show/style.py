@@ -82,7 +82,11 @@ def read_color(name: str, color: ColorLike) -> Color:
 
 
 def within_unit(name: str, rgb: np.ndarray) -> np.ndarray:
-    """`rgb` if all its numbers are in [0, 1]."""
+    """`rgb` if all its numbers are in [0, 1].
+
+    Raises:
+        InputError: one is not.
+    """
     if rgb.size and (rgb.min() < 0 or rgb.max() > 1):
         low, high = rgb.min(), rgb.max()
         words = f"expected numbers in [0, 1], found {low:g} to {high:g}"

@@ -90,7 +90,8 @@ def diagnosed(
     cause = find_cause(stop)
     about: Any = {"time": error.time, "robot": cause.robot, "joint": cause.joint, "cause": cause.word}
     if not cause.ran_away:
-        return type(error)(f"{error}; {cause.words}", **about)
+        found = type(error)(f"{error}; {cause.words}", **about)
+        return found.about(error.subject, found=error.found)
     name = "the cell" if cause.robot is None else loop.cell.names[cause.robot]
     place = name if cause.joint is None else f"joint {cause.joint + 1} of {name}"
     return NonFiniteError(f"{place} ran away at t = {error.time:g} s: {cause.words}", **about)

@@ -122,12 +122,13 @@ def stopped(loop: ClosedLoop, t: float, y: np.ndarray, v: np.ndarray, found: Ala
             f"the orientation error of {name} is {value:.3g} rad at t = {t:g} s; expected at most "
             f"{MAX_ANGLE:g} rad, because at pi its direction is not defined",
             **about,
-        )
+        ).about(check, found=value)
     if check in ("condition", "side"):
         large = f"{value:.3g}" if value < 1e12 else "infinite"  # above it is made of rounding errors
         side = "its determinant changed sign since the instant before"
         seen = side if check == "side" else f"its condition number is {large}"
-        return SingularJacobianError(f"the Jacobian of {name} is singular at t = {t:g} s: {seen}", **about)
+        error = SingularJacobianError(f"the Jacobian of {name} is singular at t = {t:g} s: {seen}", **about)
+        return error.about(check, found=None if check == "side" else value)
     return SimulationError(
         f"the {check} of {name} is {value:.3g} at t = {t:g} s; {loop.cell.space!r} says that its coordinates "
         "mean nothing there",

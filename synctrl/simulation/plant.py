@@ -12,6 +12,7 @@ import numpy as np
 from ..checks import choice, instance
 from ..coupling.cell import Cell
 from ..robots.forest import forests
+from ..robots.friction import friction_torque
 from ..robots.mechanism import joint_limits
 from ..robots.robot import Robot
 from ..tasks.algebra import padded
@@ -182,7 +183,7 @@ class Plant:
 
     def friction(self, v: np.ndarray) -> np.ndarray:
         """Torque by which friction opposes the velocities v, (n, nv), N·m."""
-        return self.viscous * v + self.coulomb * np.tanh(v / self.smoothing)
+        return friction_torque(v, self.viscous, self.coulomb, self.smoothing)
 
     def outputs(self, hidden: np.ndarray) -> dict[str, Output]:
         """Further arrays over time that a result gets, of the plant's own state, (T, size of the state).

@@ -257,9 +257,7 @@ def _carry_out(
     choice("integrator", integrator, ("rk4", *ADAPTIVE))
     by = find_engine(engine)
     if progress is not None and not callable(progress):
-        raise InputError(
-            f"expected a function of the time reached, found {progress!r}", subject="progress", found=progress
-        )
+        raise InputError.expected("a function of the time reached", progress, "progress")
     rtol, atol = (positive_number(*each) for each in zip(("rtol", "atol"), tolerances, strict=True))
     adaptive = integrator != "rk4"
     if adaptive:

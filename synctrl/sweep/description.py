@@ -97,7 +97,7 @@ def row_format(about: Mapping[str, Any]) -> Format:
     measures = FORMATS[about["format"]]
     expected = columns(factors, measures)
     if about.get("columns") != expected:
-        raise InputError.expected(f"{expected}", about.get("columns"), "columns")
+        raise InputError.expected(str(expected), about.get("columns"), "columns")
     duration = positive_number("duration", about.get("duration"))
     if "search" in about:
         instance("search", about["search"], Mapping, "a description of the search")

@@ -10,6 +10,8 @@ import math
 
 import numpy as np
 
+from ..renamed import names_elsewhere
+
 _EYE = np.eye(3)
 #: nothing beside the square of any angle but zero, by which one must not divide
 _TINY = 1e-300
@@ -132,3 +134,6 @@ def _less(a: np.ndarray, b: np.ndarray | float) -> np.ndarray:
 def _where(condition: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """`one` where a condition is 1, `other` where it is 0, for symbols too; of finite numbers."""
     return condition * one + (1 - condition) * other
+
+
+__getattr__ = names_elsewhere(__name__, "..checks", "rotation_matrix")
