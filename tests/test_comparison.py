@@ -138,6 +138,18 @@ def test_rules_that_are_left_out_have_no_rows_and_unknown_ones_are_refused() -> 
         compare(small(), [SlotineLi()], ["equal luck"], **RUN)
 
 
+def test_a_law_that_wants_exact_gravity_is_compared_without_adaptation() -> None:
+    pushed = small(disturbances=[PUSH])
+    (row,) = compare(pushed, [PDGravity(3.0)], ["equal pole"], **RUN).rows[1:]
+    gains = pushed.gains.independent()
+    still, learning = (
+        replace(pushed, law=PDGravity(row.value), gains=gains.replace(Gamma=Gamma))
+        for Gamma in (0.0, gains.Gamma)
+    )
+    assert sizes_of(still.simulate(**RUN)) == row.disturbed != sizes_of(learning.simulate(**RUN))
+    assert sizes_of(undisturbed(still).simulate(**RUN)) == row.quiet
+
+
 def test_experiments_side_by_side_are_rows_of_what_each_does(found: Comparison) -> None:
     whole = small(disturbances=[PUSH])
     loose = replace(whole, gains=whole.gains.replace(K_eps=0.0))

@@ -36,6 +36,8 @@ from .verdict import about_gravity, sentences, summary, table
 
 #: what is made equal, and by which size of the quiet run
 RULES = {"equal pole": None, "equal peak torque": "peak_torque", "equal tracking": "tracking_rms"}
+#: what a disturbed run has from the quiet one
+OF_THE_CONTROLLER = ("law", "gains", "adaptation", "reference_acceleration")
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,7 +231,7 @@ class _Bench:
         """A law with its gains, run quietly and, if there is anything to disturb it, disturbed."""
         runs = {"quiet": quiet}
         if self.calm is not self.experiment:
-            changes = {key: getattr(quiet, key) for key in ("law", "gains", "reference_acceleration")}
+            changes = {key: getattr(quiet, key) for key in OF_THE_CONTROLLER}
             runs["disturbed"] = replace(self.experiment, **changes)
         found = {situation: self.sizes(run) for situation, run in runs.items()}
         stopped = {key: error for key, error in found.items() if isinstance(error, SimulationError)}

@@ -1,7 +1,8 @@
 """The one gain of a law that a comparison may turn: which it is, and which factor on it does what is asked.
 
 Laws with a gain of their own say so by `free_gain`, its name, and `scaled(factor)`, the law with that gain
-multiplied; with all others Lambda is turned.
+multiplied; with all others Lambda is turned. A law that asks for estimates that stand still says so by
+`adaptive`, which is False.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..control.adaptation import Gradient
 from ..control.gains import spread_rows
 from ..control.laws import PDGravity
 from ..errors import InputError
@@ -29,16 +31,21 @@ ACCURACY = 1e-2
 def under(experiment: Experiment, law: Any) -> Experiment:
     """An experiment under another law; without beta and K_eps if the law has no place for them.
 
+    Nothing is adapted under a law whose `adaptive` is False.
+
     Raises:
         InputError: the law does not fit the cell, or contradicts where the damping acts.
     """
     changes: dict[str, Any] = {"law": law, "reference_acceleration": None}
+    gains = experiment.gains
+    if not getattr(law, "adaptive", True):
+        gains, changes["adaptation"] = gains.replace(Gamma=None), Gradient(0.0)
     try:
-        return replace(experiment, **changes)
+        return replace(experiment, gains=gains, **changes)
     except InputError as error:
         if error.subject != "gains":
             raise
-    return replace(experiment, gains=experiment.gains.independent(), **changes)
+    return replace(experiment, gains=gains.independent(), **changes)
 
 
 def free_gain(experiment: Experiment) -> tuple[str, Any]:
