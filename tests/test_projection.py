@@ -276,6 +276,14 @@ def test_the_metric_of_bodies_is_the_inverse_hessian_of_minus_log_det(seed):
     np.testing.assert_allclose(product, np.eye(10), atol=1e-6)
 
 
+def test_friction_stands_beside_the_metric_of_bodies_with_rates_of_its_own():
+    robot, rates = load_robot("a460"), [0.1, 0.2, 0.3, 1.0, 2.0, 3.0]
+    (bodies,), (whole,) = (Gradient.pullback(robot, 0.1, friction).Gamma for friction in ((), rates))
+    expected = np.zeros((36, 36))
+    expected[:30, :30], expected[30:, 30:] = bodies, np.diag(rates)
+    np.testing.assert_array_equal(whole, expected)
+
+
 @given(SEEDS)
 def test_the_metric_of_bodies_follows_the_unit_of_length(seed):
     """theta in mm is T theta, and Gamma there is T Gamma T."""
