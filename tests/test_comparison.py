@@ -16,7 +16,7 @@ from synctrl.analysis.comparison import sizes_of, undisturbed
 from synctrl.analysis.free_gain import factor_for, free_gain, scaled, slowest_rate, under
 from synctrl.analysis.trial_rows import Row
 from synctrl.analysis.verdict import about_gravity, sentences, summary
-from synctrl.control.laws import ChungSlotine, PDGravity, SlotineLi
+from synctrl.control.laws import ChungSlotine, PDGravity, SlotineLi, SunMills
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, planar_four
 
@@ -89,6 +89,17 @@ def test_the_slowest_mode_of_a_spring_and_a_damper_is_that_of_its_quadratic() ->
         rates.append((K_r - np.sqrt(K_r**2 - 4 * M * 0.2)) / (2 * M))
     assert slowest_rate(run) == pytest.approx(min(rates))
     assert slowest_rate(scaled(run, 0.5)) < slowest_rate(run)
+
+
+def test_damping_in_task_space_stays_there_and_is_in_the_slowest_mode() -> None:
+    """With M q'' + J^T (K_r q' + K_p q) = 0 and K_p = a K_r, modes tend to a pole at -a as K_r grows."""
+    arms = planar_four()
+    stiff = arms.gains.replace(K_r=1e4)
+    for said in ({"k_r_space": "task"}, {"law": SunMills(k_r_space="task")}):
+        run = under(replace(arms, gains=stiff, **said), PDGravity(5e4))
+        assert run.closed_loop().controller.k_r_space == "task"
+        assert slowest_rate(run) == pytest.approx(5.0, rel=1e-2)
+    assert under(arms, PDGravity(5e4)).closed_loop().controller.k_r_space == "joint"
 
 
 @pytest.mark.parametrize(

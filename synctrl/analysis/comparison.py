@@ -37,7 +37,7 @@ from .verdict import about_gravity, sentences, summary, table
 #: what is made equal, and by which size of the quiet run
 RULES = {"equal pole": None, "equal peak torque": "peak_torque", "equal tracking": "tracking_rms"}
 #: what a disturbed run has from the quiet one
-OF_THE_CONTROLLER = ("law", "gains", "adaptation", "reference_acceleration")
+OF_THE_CONTROLLER = ("law", "gains", "adaptation", "reference_acceleration", "k_r_space")
 
 
 @dataclass(frozen=True, eq=False)
