@@ -91,6 +91,12 @@ def test_the_slowest_mode_of_a_spring_and_a_damper_is_that_of_its_quadratic() ->
     assert slowest_rate(scaled(run, 0.5)) < slowest_rate(run)
 
 
+def test_the_pole_that_is_made_equal_is_that_of_the_first_law_whichever_it_is() -> None:
+    first = under(small(), PDGravity(0.2))
+    row = compare(first, [SlotineLi()], ["equal pole"], **RUN).rows[1]
+    assert row.value == pytest.approx(slowest_rate(first)) != first.gains.Lambda
+
+
 def test_damping_in_task_space_stays_there_and_is_in_the_slowest_mode() -> None:
     """With M q'' + J^T (K_r q' + K_p q) = 0 and K_p = a K_r, modes tend to a pole at -a as K_r grows."""
     arms = planar_four()

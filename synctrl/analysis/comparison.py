@@ -29,7 +29,7 @@ from ..robots.friction import Friction
 from ..robots.parameters import FrictionParameters
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .free_gain import LARGEST_FACTOR, factor_for, free_gain, scaled, under, with_pole
+from .free_gain import LARGEST_FACTOR, factor_for, free_gain, pole_of, scaled, under, with_pole
 from .metrics import metrics
 from .trial_rows import AS_GIVEN, Row, Sizes
 from .verdict import about_gravity, sentences, summary, table
@@ -211,7 +211,7 @@ class _Bench:
 
     def rows(self, name: str, base: Experiment, ours: Sizes, rules: Sequence[str]) -> Iterator[Row]:
         """A row of a law for each rule; `base` is the quiet experiment under it."""
-        pole = with_pole(base, float(np.min(self.experiment.gains.Lambda)))
+        pole = with_pole(base, pole_of(self.calm))
         for rule in rules:
             size = RULES[rule]
             found = pole if size is None else self.solved(pole or base, size, getattr(ours, size))

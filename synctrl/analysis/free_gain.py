@@ -64,18 +64,26 @@ def scaled(experiment: Experiment, factor: float) -> Experiment:
     return replace(experiment, gains=gains.replace(Lambda=factor * gains.Lambda))
 
 
+def pole_of(experiment: Experiment) -> float:
+    """The rate at which the slowest of the errors common to all robots die out, see `with_pole`, 1/s."""
+    if isinstance(experiment.law, PDGravity):
+        return slowest_rate(experiment)
+    return float(np.min(experiment.gains.Lambda))
+
+
 def with_pole(experiment: Experiment, rate: float) -> Experiment | None:
     """The experiment in which errors common to all robots die out as exp(-rate t), if a gain does it.
 
-    Laws that hold r = 0, or e'' + 2 Lambda e' + Lambda^2 e = 0, do so with Lambda = rate, which their gains
-    have already. `PDGravity` gets the K_p with which its slowest mode at the start has this rate.
+    Laws that hold r = 0, or e'' + 2 Lambda e' + Lambda^2 e = 0, do so with a smallest Lambda of this rate.
+    `PDGravity` gets the K_p with which its slowest mode at the start has it.
 
     Args:
         experiment: under the law.
         rate: 1/s.
     """
     if not isinstance(experiment.law, PDGravity):
-        return experiment
+        gains = experiment.gains
+        return replace(experiment, gains=gains.replace(Lambda=rate / pole_of(experiment) * gains.Lambda))
     factor = factor_for(lambda factor: slowest_rate(scaled(experiment, factor)) / rate - 1)
     return None if factor is None else scaled(experiment, factor)
 
