@@ -14,7 +14,7 @@ from refusals import refused
 from synctrl import Cell, load_robot
 from synctrl.control.adaptation import Gradient, Natural, Seen
 from synctrl.errors import InputError
-from synctrl.experiments import a460_pair, planar_four
+from synctrl.experiments import a460_pair, mixed_four, planar_four
 from synctrl.paper.judge import joint_pair
 from synctrl.robots import pseudo_inertia as pi
 
@@ -233,6 +233,12 @@ def test_friction_is_learned_beside_bodies_by_a_gradient_or_named_as_model_error
 def test_natural_refuses_what_has_no_bodies_by_name():
     with refused(InputError, "robot 1, adaptation"):
         Natural(0.1).bind(planar_four().cell)
+
+
+def test_natural_refuses_robots_of_different_numbers_of_bodies():
+    cell = mixed_four().cell
+    with refused(InputError, "adaptation", found=tuple(len(p.theta) // 10 for p in cell.parameters)):
+        Natural(0.1).bind(cell)
 
 
 def test_natural_refuses_a_first_estimate_that_no_body_can_have():
