@@ -14,12 +14,13 @@ from refusals import refused
 from synctrl import Cell, load_robot
 from synctrl.control.adaptation import Gradient, Natural, Seen
 from synctrl.errors import InputError
-from synctrl.experiments import a460_pair, planar_four
+from synctrl.experiments import a460_pair, mixed_four, planar_four
 from synctrl.paper.judge import joint_pair
 from synctrl.robots import pseudo_inertia as pi
 
 SEEDS = st.integers(0, 2**32 - 1)
 CELL = a460_pair().cell
+RUBBING = a460_pair(adapt_friction=True).cell
 ADAPTATIONS = {
     "gradient": Gradient(0.3),
     "gradient of some entries": Gradient(np.where(np.arange(30) % 3, 0.4, 0.0)),
@@ -27,10 +28,10 @@ ADAPTATIONS = {
 }
 
 
-def seen(rng: np.random.Generator) -> Seen:
+def seen(rng: np.random.Generator, P: int = 30) -> Seen:
     """Random signals with a gradient that belongs to them."""
     q, v, v_ref, a_ref, s_q = rng.standard_normal((5, 2, 3))
-    Y = rng.standard_normal((2, 3, 30))
+    Y = rng.standard_normal((2, 3, P))
     return Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Y, s_q, s_q)
 
 
@@ -183,23 +184,61 @@ def test_the_rate_of_natural_estimates_is_gamma_p_b_p(seed, gamma):
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-8 * np.abs(expected).max())
 
 
-@given(SEEDS)
-def test_natural_adaptation_does_not_depend_on_the_unit_of_length(seed):
-    """P in other units is A P A with A = diag(k, k, k, 1); then P_hat' is that of the first units as well."""
+@given(seed=SEEDS, h=st.floats(1e-3, 0.1))
+def test_natural_adaptation_depends_on_no_unit_and_no_frame_of_the_bodies(seed, h):
+    """In millimetres, and about other axes elsewhere, P is A P A^T, and B is A^-T B A^-1."""
     rng = np.random.default_rng(seed)
-    A = np.diag([1e3, 1e3, 1e3, 1.0])
-    P = pi.pseudo_inertia(CELL.theta[0].reshape(3, 10))
-    g = rng.standard_normal((3, 10))
-    B = pi.dual(g)
-    P_mm, B_mm = A @ P @ A, np.linalg.inv(A) @ B @ np.linalg.inv(A)
+    turn, _ = np.linalg.qr(rng.standard_normal((3, 3)))
+    A = np.block([[1e3 * turn, rng.standard_normal((3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]])
+    back = np.linalg.inv(A)
+    gradient = seen(rng).gradient.reshape(-1, 10)
+    moved = np.einsum("kij,bji->bk", pi.E, back.T @ pi.dual(gradient) @ back)
+    theta = CELL.theta_hat0.reshape(-1, 10)
+    expected = A @ after_a_sample(theta, gradient, h) @ A.T
+    found = after_a_sample(pi.inertial_parameters(A @ pi.pseudo_inertia(theta) @ A.T), moved, h)
+    size = np.sqrt(np.diagonal(expected, axis1=-2, axis2=-1))
     np.testing.assert_allclose(
-        np.linalg.inv(A) @ (P_mm @ B_mm @ P_mm) @ np.linalg.inv(A), P @ B @ P, rtol=1e-9
+        found / (size[:, None] * size[..., None]), expected / (size[:, None] * size[..., None]), atol=1e-8
     )
+
+
+def after_a_sample(theta_hat0: np.ndarray, gradient: np.ndarray, h: float) -> np.ndarray:
+    """P_hat of the bodies of both robots, (6, 4, 4), a sample of h s after a first estimate, (6, 10)."""
+    members = [
+        replace(member, theta_hat0=row)
+        for member, row in zip(CELL.members, theta_hat0.reshape(2, 30), strict=True)
+    ]
+    bound = Natural(0.1).bind(Cell(members, CELL.coupling, CELL.space, CELL.name))
+    now = replace(seen(np.random.default_rng(0)), gradient=gradient.reshape(2, 30))
+    z = bound.start()
+    return pi.pseudo_inertia(bound.estimate(bound.leap(z, bound.rate(z, now), h)).reshape(-1, 10))
+
+
+@pytest.mark.parametrize("gamma_friction", [0.0, 0.3])
+@given(seed=SEEDS)
+def test_friction_is_learned_beside_bodies_by_a_gradient_or_named_as_model_error(gamma_friction, seed):
+    rng = np.random.default_rng(seed)
+    theta, P = RUBBING.theta, RUBBING.theta.shape[1]
+    bound, now = Natural(0.1, gamma_friction).bind(RUBBING), seen(rng, P)
+    z = some_state(bound, rng)
+    z_dot, powers = bound.rate(z, now), bound.powers(z, theta, now)
+    np.testing.assert_allclose(z_dot[:, 30:], gamma_friction * now.gradient[:, 30:])
+    model = float(np.sum(now.gradient * (theta - bound.estimate(z))))
+    found = bound.storage_rate(z, z_dot, theta)
+    expected = -model + sum(powers.values())
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-9 * np.abs(now.gradient).max())
+    assert (powers["model error"] == 0) == (gamma_friction > 0)
 
 
 def test_natural_refuses_what_has_no_bodies_by_name():
     with refused(InputError, "robot 1, adaptation"):
         Natural(0.1).bind(planar_four().cell)
+
+
+def test_natural_refuses_robots_of_different_numbers_of_bodies():
+    cell = mixed_four().cell
+    with refused(InputError, "adaptation", found=tuple(len(p.theta) // 10 for p in cell.parameters)):
+        Natural(0.1).bind(cell)
 
 
 def test_natural_refuses_a_first_estimate_that_no_body_can_have():

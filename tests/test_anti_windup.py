@@ -196,6 +196,17 @@ def test_estimates_drift_without_bounds_where_there_is_less_torque_than_gravity_
     assert (drift[0] > 2 * drift[1]).any()
 
 
+def test_a_leak_keeps_integrals_within_what_epsilon_was_over_the_leak_and_without_one_they_grow():
+    leak, experiment = 5.0, below_gravity()
+    leaking = replace(experiment, gains=experiment.gains.replace(leak=leak))
+    runs = [run(each, 2.0) for each in (leaking, experiment)]
+    held, free = (np.abs(each.sync_integral).max(axis=(1, 2)) for each in runs)
+    allowed, much = (np.maximum.accumulate(np.abs(r.sync_error).max(axis=(1, 2))) / leak for r in runs)
+    assert all((each.outputs["applied_torque"] != each.tau).any() for each in runs)
+    assert (held <= allowed * (1 + 1e-3)).all()
+    assert free[-1] > 2 * much[-1]
+
+
 def test_after_a_push_above_its_limits_an_arm_comes_back_only_with_bounds():
     experiment = pushed_above_limits()
     short = replace(experiment.disturbances[0], start=0.1, stop=0.6)

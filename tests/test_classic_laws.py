@@ -178,11 +178,12 @@ def test_the_balance_of_v_closes_and_says_what_has_no_proof(name):
     assert ("law" in record.power) == (name != "SlotineLi")
 
 
+@pytest.mark.parametrize("control", [{}, {"control_period": 2e-3}], ids=["continuous", "sampled"])
 @pytest.mark.parametrize("name", ["SlotineLi", "ComputedTorque", "PDGravity"])
-def test_both_engines_agree(name):
+def test_both_engines_agree(name, control):
     pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
     experiment = under(LAWS[name], planar_four())
-    one, other = (experiment.simulate(0.1, engine=engine) for engine in ("pinocchio", "compiled"))
+    one, other = (experiment.simulate(0.1, engine=engine, **control) for engine in ("pinocchio", "compiled"))
     for array in LAYOUT:
         scale = np.abs(getattr(one, array)).max() + 1e-6
         assert np.abs(getattr(one, array) - getattr(other, array)).max() <= 1e-9 * scale, array

@@ -16,7 +16,7 @@ from synctrl.analysis.comparison import sizes_of, undisturbed
 from synctrl.analysis.free_gain import factor_for, free_gain, scaled, slowest_rate, under
 from synctrl.analysis.trial_rows import Row
 from synctrl.analysis.verdict import about_gravity, sentences, summary
-from synctrl.control.laws import ChungSlotine, PDGravity, SlotineLi
+from synctrl.control.laws import ChungSlotine, PDGravity, SlotineLi, SunMills
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, planar_four
 
@@ -91,6 +91,23 @@ def test_the_slowest_mode_of_a_spring_and_a_damper_is_that_of_its_quadratic() ->
     assert slowest_rate(scaled(run, 0.5)) < slowest_rate(run)
 
 
+def test_the_pole_that_is_made_equal_is_that_of_the_first_law_whichever_it_is() -> None:
+    first = under(small(), PDGravity(0.2))
+    row = compare(first, [SlotineLi()], ["equal pole"], **RUN).rows[1]
+    assert row.value == pytest.approx(slowest_rate(first)) != first.gains.Lambda
+
+
+def test_damping_in_task_space_stays_there_and_is_in_the_slowest_mode() -> None:
+    """With M q'' + J^T (K_r q' + K_p q) = 0 and K_p = a K_r, modes tend to a pole at -a as K_r grows."""
+    arms = planar_four()
+    stiff = arms.gains.replace(K_r=1e4)
+    for said in ({"k_r_space": "task"}, {"law": SunMills(k_r_space="task")}):
+        run = under(replace(arms, gains=stiff, **said), PDGravity(5e4))
+        assert run.closed_loop().controller.k_r_space == "task"
+        assert slowest_rate(run) == pytest.approx(5.0, rel=1e-2)
+    assert under(arms, PDGravity(5e4)).closed_loop().controller.k_r_space == "joint"
+
+
 @pytest.mark.parametrize(
     "law", [SlotineLi(), ChungSlotine(0.4), PDGravity(3.0)], ids=lambda law: type(law).__name__
 )
@@ -136,6 +153,18 @@ def test_rules_that_are_left_out_have_no_rows_and_unknown_ones_are_refused() -> 
     assert [row.rule for row in few.rows] == ["as given", "equal pole"]
     with refused(InputError, "rules"):
         compare(small(), [SlotineLi()], ["equal luck"], **RUN)
+
+
+def test_a_law_that_wants_exact_gravity_is_compared_without_adaptation() -> None:
+    pushed = small(disturbances=[PUSH])
+    (row,) = compare(pushed, [PDGravity(3.0)], ["equal pole"], **RUN).rows[1:]
+    gains = pushed.gains.independent()
+    still, learning = (
+        replace(pushed, law=PDGravity(row.value), gains=gains.replace(Gamma=Gamma))
+        for Gamma in (0.0, gains.Gamma)
+    )
+    assert sizes_of(still.simulate(**RUN)) == row.disturbed != sizes_of(learning.simulate(**RUN))
+    assert sizes_of(undisturbed(still).simulate(**RUN)) == row.quiet
 
 
 def test_experiments_side_by_side_are_rows_of_what_each_does(found: Comparison) -> None:

@@ -14,7 +14,7 @@ from synctrl import Experiment, load_robot
 from synctrl.analysis.certify import certify
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.control.adaptation import Ball, Box, EModification, Gradient, Leakage, Seen, Switching
-from synctrl.control.adaptation.metric import make_metric
+from synctrl.control.adaptation.metric import make_metric, read_metric
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, mixed_four, planar_four
 from synctrl.robots.pseudo_inertia import inertial_parameters, inverse_hessian, pseudo_inertia
@@ -276,6 +276,14 @@ def test_the_metric_of_bodies_is_the_inverse_hessian_of_minus_log_det(seed):
     np.testing.assert_allclose(product, np.eye(10), atol=1e-6)
 
 
+def test_friction_stands_beside_the_metric_of_bodies_with_rates_of_its_own():
+    robot, rates = load_robot("a460"), [0.1, 0.2, 0.3, 1.0, 2.0, 3.0]
+    (bodies,), (whole,) = (Gradient.pullback(robot, 0.1, friction).Gamma for friction in ((), rates))
+    expected = np.zeros((36, 36))
+    expected[:30, :30], expected[30:, 30:] = bodies, np.diag(rates)
+    np.testing.assert_array_equal(whole, expected)
+
+
 @given(SEEDS)
 def test_the_metric_of_bodies_follows_the_unit_of_length(seed):
     """theta in mm is T theta, and Gamma there is T Gamma T."""
@@ -315,6 +323,15 @@ def test_the_metric_of_bodies_follows_the_unit_of_length(seed):
 def test_what_cannot_be_meant_is_refused(wrong, subject):
     with refused(InputError, subject):
         wrong()
+
+
+def test_of_as_many_robots_as_parameters_a_diagonal_matrix_is_refused_and_rows_are_rows():
+    sizes, rows = [3, 3, 3], [[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    with refused(InputError, "Gamma"):
+        make_metric(read_metric(2 * np.eye(3)), sizes)
+    for kept in (rows, np.zeros((3, 3))):
+        np.testing.assert_array_equal(make_metric(read_metric(kept), sizes).Gamma, kept)
+    assert make_metric(read_metric([[0.3]]), [1]).Gamma == 0.3
 
 
 def test_maps_without_bodies_have_leakage_and_projection_too():

@@ -29,13 +29,15 @@ from ..robots.friction import Friction
 from ..robots.parameters import FrictionParameters
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .free_gain import LARGEST_FACTOR, factor_for, free_gain, scaled, under, with_pole
+from .free_gain import LARGEST_FACTOR, factor_for, free_gain, pole_of, scaled, under, with_pole
 from .metrics import metrics
 from .trial_rows import AS_GIVEN, Row, Sizes
 from .verdict import about_gravity, sentences, summary, table
 
 #: what is made equal, and by which size of the quiet run
 RULES = {"equal pole": None, "equal peak torque": "peak_torque", "equal tracking": "tracking_rms"}
+#: what a disturbed run has from the quiet one
+OF_THE_CONTROLLER = ("law", "gains", "adaptation", "reference_acceleration", "k_r_space")
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +211,7 @@ class _Bench:
 
     def rows(self, name: str, base: Experiment, ours: Sizes, rules: Sequence[str]) -> Iterator[Row]:
         """A row of a law for each rule; `base` is the quiet experiment under it."""
-        pole = with_pole(base, float(np.min(self.experiment.gains.Lambda)))
+        pole = with_pole(base, pole_of(self.calm))
         for rule in rules:
             size = RULES[rule]
             found = pole if size is None else self.solved(pole or base, size, getattr(ours, size))
@@ -229,7 +231,7 @@ class _Bench:
         """A law with its gains, run quietly and, if there is anything to disturb it, disturbed."""
         runs = {"quiet": quiet}
         if self.calm is not self.experiment:
-            changes = {key: getattr(quiet, key) for key in ("law", "gains", "reference_acceleration")}
+            changes = {key: getattr(quiet, key) for key in OF_THE_CONTROLLER}
             runs["disturbed"] = replace(self.experiment, **changes)
         found = {situation: self.sizes(run) for situation, run in runs.items()}
         stopped = {key: error for key, error in found.items() if isinstance(error, SimulationError)}

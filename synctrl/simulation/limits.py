@@ -95,8 +95,9 @@ def saturation_report(plant: Plant, arrays: Mapping[str, np.ndarray]) -> list[di
 
     Returns:
         One entry per joint: `robot` and `joint`, counted from 0; `limit`, in `unit`; `share` of the logged
-        instants at which the controller asked for more; `largest`, the largest torque that it asked for; and
-        `theta_hat`, the largest magnitude of the robot's estimates at the start and over the run.
+        instants at which the controller asked for more; `largest`, the largest torque that it asked for at
+        these; and `theta_hat`, the largest magnitude of the robot's estimates at the start and over the run.
+        A cut between two logged instants is in none.
     """
     if not plant.saturate or not len(arrays["tau"]):
         return []

@@ -112,7 +112,7 @@ def make_metric(gain: Gain, sizes: Sequence[int]) -> DiagonalMetric | FullMetric
         InputError: Gamma of another size.
     """
     if not isinstance(gain, tuple):
-        if isinstance(gain, np.ndarray) and gain.shape == 2 * (max(sizes),) and len(gain) != len(sizes):
+        if isinstance(gain, np.ndarray) and _is_meant_as_matrix(gain, len(sizes), max(sizes)):
             wanted = "expected a matrix for each robot, (n, P, P), or one for all of them, (1, P, P)"
             raise InputError(f"{wanted}, found {gain.shape}", subject="Gamma", found=gain.shape)
         return DiagonalMetric(spread_rows("Gamma", gain, sizes))
@@ -124,6 +124,13 @@ def make_metric(gain: Gain, sizes: Sequence[int]) -> DiagonalMetric | FullMetric
     for matrix, place in zip(matrices, full, strict=True):
         place[: len(matrix), : len(matrix)] = matrix
     return FullMetric(full)
+
+
+def _is_meant_as_matrix(gain: np.ndarray, n: int, P: int) -> bool:
+    """Whether rows are one matrix for all: as many as parameters, not robots, or nothing off a diagonal."""
+    if gain.shape != (P, P):
+        return False
+    return n != P or (n > 1 and bool(gain.any()) and np.array_equal(gain, np.diag(np.diag(gain))))
 
 
 def listed(gain: Gain) -> list:

@@ -46,7 +46,7 @@ class Natural:
         """This adaptation for a cell.
 
         Raises:
-            InputError: parameters that are not those of bodies, or a first estimate that no body can have.
+            InputError: parameters that are not those of bodies, or robots of different numbers of them.
         """
         bodies = [
             count_bodies(f"{name}, adaptation", p)

@@ -96,7 +96,7 @@ class PDGravity:
         tau = g_hat + J^T K_p e - K_r v
 
     In joint space with K_p = K_r Lambda it is K_r (e' + Lambda e) + g_hat for a target that stands still.
-    s_q is -v, from which (14) would learn away from exact gravity: it wants Gamma = 0.
+    s_q is -v, from which (14) would learn away from exact gravity: it wants Gamma = 0. `compare` sees to it.
 
     Args:
         K_p: stiffness, a number or (m,), N/m or N·m/rad, above 0.
@@ -107,6 +107,7 @@ class PDGravity:
     """
 
     independent = True
+    adaptive = False
     statement = (
         "e goes to zero for a target that stands still, with gravity that is exact and not adapted; moving "
         "targets are followed late"
