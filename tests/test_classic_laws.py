@@ -212,5 +212,6 @@ def test_a_certificate_says_when_the_law_converges(law):
 def test_ready_cells_leave_out_the_gains_that_a_law_has_no_place_for(law):
     gains = a460_pair(law=law).gains
     assert not gains.beta.any() and not gains.K_eps.any()
+    assert bool(gains.Gamma.any()) == (type(law) is not PDGravity)
     with refused(InputError, "gains"):
         a460_pair(law=law, gains=a460_pair().gains)

@@ -45,8 +45,7 @@ def ready_experiment(
     Args:
         cell: robots, task and coupling.
         duration: of the experiment, s.
-        default: gains of the cell; without Gamma where another adaptation takes its place, and without beta
-            and K_eps where the law has no place for them.
+        default: gains of the cell, of which `_own` leaves out what other parts have no place for.
         gains: what is used instead of them, or None.
         synchronized: False sets beta = K_eps = 0, independent adaptive control.
         parts: parts and options of the controller, see `ControllerParts`.
@@ -58,10 +57,19 @@ def ready_experiment(
     """
     boolean("synchronized", synchronized)
     if gains is None:
-        gains = default if parts.get("adaptation") is None else default.replace(Gamma=None)
-        gains = gains.independent() if getattr(parts.get("law"), "independent", False) else gains
+        gains = _own(default, parts)
     instance("gains", gains, Gains, "Gains")
     kind = "synchronized" if synchronized else "independent"
     title = ", ".join([cell.name, kind, *remarks, *["disturbed"] * bool(disturbances)])
     gains = gains if synchronized else gains.independent()
     return Experiment(cell, gains, duration, disturbances, title=title, **parts)
+
+
+def _own(gains: Gains, parts: ControllerParts) -> Gains:
+    """Gains of a cell without Gamma, beta and K_eps where another adaptation or law has no place for them."""
+    law = parts.get("law")
+    if parts.get("adaptation") is not None:
+        gains = gains.replace(Gamma=None)
+    elif not getattr(law, "adaptive", True):
+        gains = gains.replace(Gamma=0.0)
+    return gains.independent() if getattr(law, "independent", False) else gains

@@ -175,7 +175,7 @@ class Law(Protocol):
 
     One that is `independent` has no place for the gains beta and K_eps; ready cells then leave theirs out.
     For comparisons it may name its `free_gain`, with `scaled(factor)`, itself with that gain multiplied. One
-    whose `adaptive` is False is compared without adaptation.
+    whose `adaptive` is False is compared, and put into ready cells, without adaptation.
     """
 
     def bind(self, cell: Cell, gains: Gains) -> BoundLaw:
