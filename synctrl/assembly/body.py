@@ -69,6 +69,9 @@ class CarriedObject(Inertia):
         InputError: numbers that no body can have.
     """
 
+    mass: float
+    com: Any = (0.0, 0.0, 0.0)
+    inertia: Any = None
     box: Any = None
     center: Any = None
     name: str = "object"
