@@ -18,6 +18,7 @@ import numpy as np
 from ..assembly.body import CarriedObject, with_share
 from ..assembly.grasp import Fixture, Grasp
 from ..assembly.plant import CarryingPlant
+from ..assembly.tare import tared
 from ..checks import boolean, choice, finite_array
 from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
@@ -60,6 +61,7 @@ def carry_ur5(
     friction: bool = False,
     push: bool = False,
     leak: float | bool = 0.0,
+    tare: bool = False,
     gains: Gains | None = None,
     **parts: Unpack[ControllerParts],
 ) -> Experiment:
@@ -73,12 +75,13 @@ def carry_ur5(
         friction: whether the joints rub, which the controller does not know.
         push: whether joints 1 to 3 of arm 1 are pushed for half a second.
         leak: of the integrals of epsilon, 1/s, see `Gains`; True for Lambda.
+        tare: whether both arms take over at closure where arm 1 believes the payload, see `tared`.
 
     Raises:
         InputError: a value that is none of these.
     """
     fixture = _fixture(grasp)
-    boolean("friction", friction), boolean("push", push)
+    boolean("friction", friction), boolean("push", push), boolean("tare", tare)
     error = GEOMETRIC_ERROR * geometric_error if isinstance(geometric_error, bool) else geometric_error
     error = finite_array("geometric_error", error, (6,))
     grasps = [Grasp(i, *hand_on_payload(i), fixture) for i in range(2)]
@@ -88,6 +91,7 @@ def carry_ur5(
     members = [_member(arms[i], grasps[i], at, error * (i == 0), rubs, SHARES_KNOWN[i]) for i in range(2)]
     cell = Cell(members, Coupling.pair(), PoseSpace(), name="UR5 pair that carries a payload")
     pushes = [PUSH] * bool(push)
+    cell = tared(cell) if tare else cell
     made = ready_experiment(cell, DURATION, GAINS, gains, synchronized, parts, disturbances=pushes)
     plant = partial(CarryingPlant, body=PAYLOAD, grasps=grasps, at=at, robots=arms, desired=payload_motion())
     return replace(made, gains=_leaking(made.gains, leak), plant_type=plant)
