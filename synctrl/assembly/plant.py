@@ -87,6 +87,13 @@ class CarryingPlant(Plant):
         v_dot, _ = super().move(q, v, pulled, hidden[:0])
         return v_dot, self._object_rate(hidden, wrenches)
 
+    def felt(self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray) -> np.ndarray:
+        """Internal wrenches about the object's origin, (n, 6); zeros for robots that do not hold it."""
+        levers, found = self._levers(hidden[None])[0], np.zeros((len(q), 6))
+        inner = internal_wrenches(self._wrenches(q, v, hidden)[0], levers)
+        found[self._hands] = np.matvec(grasp_matrix(levers), inner)
+        return found
+
     def outputs_along(
         self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray, t: np.ndarray
     ) -> dict[str, Output]:
