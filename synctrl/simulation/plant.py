@@ -75,6 +75,7 @@ class Plant:
     - `outputs`: arrays over time that the result gets beside those of every run, with units and axes; or
       `outputs_along`, if the motion of the robots is needed for them;
     - `felt`: the internal wrenches that hands measure, if any do;
+    - `chain`: what is proved if the robots hold one object together;
     - `longest_step`: how long a step of "rk4" may be, if that is known beforehand;
     - `report`: what `result.info` says of the state in plain data.
 
@@ -194,6 +195,16 @@ class Plant:
         """
         text = f"an admittance expects a plant that measures wrenches, found {type(self).__qualname__}"
         raise InputError(text, subject="admittance", found=type(self).__qualname__)
+
+    def chain(self, controller: Any) -> Any:
+        """What theorems say of a controller whose robots hold one object together; None if they do not.
+
+        It has `theorem`, `warnings` and `outside`, see `ClosedChain` of the assembly.
+
+        Raises:
+            InputError: robots and object with which a run of this controller means nothing.
+        """
+        return None
 
     def friction(self, v: np.ndarray) -> np.ndarray:
         """Torque by which friction opposes the velocities v, (n, nv), N·m."""

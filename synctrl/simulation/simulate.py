@@ -156,6 +156,7 @@ class Experiment:
 
         Warns:
             SaturationWarning, StepWarning: torque was cut off; the step of "rk4" was too long.
+            GainWarning: gains with which forces inside what robots hold may grow.
             RobotWarning: a robot's description states friction, and nobody says whether it acts.
         """
         run = self.plan(duration, dt, control_period, plant, log_dt)
@@ -273,6 +274,7 @@ def _carry_out(
         run.check_step()
     run.check()
     warn_of_unasked_friction(run.experiment.cell)
+    run.loop.warn()
     result = run_adaptive(run, integrator, rtol, atol, progress) if adaptive else by.run(run, progress)
     warn_of_step(result.info["step_error"], result.names, run.info["dt"])
     warn_of_saturation(result)
