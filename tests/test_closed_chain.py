@@ -8,11 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from held import carried_along, evaluate_held
+from hypothesis import given
+from hypothesis import strategies as st
 from refusals import refused
 
 from synctrl.analysis import certify
+from synctrl.analysis.lyapunov import lyapunov
+from synctrl.analysis.replay import _state
 from synctrl.assembly.body import with_share
-from synctrl.assembly.grasp import Fixture
+from synctrl.assembly.grasp import Fixture, grasp_matrix
 from synctrl.assembly.theorems import THEOREMS, shares
 from synctrl.control.admittance import Admittance
 from synctrl.control.laws import ChungSlotine
@@ -24,6 +29,78 @@ from synctrl.robots.robot import Robot
 from synctrl.simulation.simulate import Experiment
 
 HEAVY = Admittance(mass=(150.0, 3.0))
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_the_power_of_fixtures_is_the_rate_of_an_energy_and_losses(seed):
+    """sum (J s_i - s_o) h_i = -W' - losses, with h = K d + D d', in one direction and for any S."""
+    rng = np.random.default_rng(seed)
+    S, (K, D, Lambda, beta) = rng.normal(size=(3, 4)), rng.uniform(0.1, 5, 4)
+    leak, L = rng.uniform(0, Lambda), S.T @ S
+    L_plus, A = np.linalg.pinv(L), Lambda * np.eye(4) + beta * L
+    d, d_dot, E = rng.normal(size=4), rng.normal(size=4), L @ rng.normal(size=4)
+    E_dot, rest = -L @ d - leak * E, (Lambda - leak) * beta
+    power = (-d_dot - A @ d + rest * E) @ (K * d + D * d_dot)
+    rate = K * d @ d_dot + D * d @ A @ d_dot - rest * D * (d_dot @ E + d @ E_dot)
+    rate += rest * (K + leak * D) * E @ L_plus @ E_dot
+    lost = D * d_dot @ d_dot + Lambda * K * d @ d + (K - (Lambda - leak) * D) * beta * d @ L @ d
+    lost += leak * rest * (K + leak * D) * E @ L_plus @ E
+    assert power == pytest.approx(-rate - lost, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"leak": 3.0},
+        {"leak": True, "gains": GAINS.replace(K_eps=[2e4] * 3 + [200.0] * 3)},
+        {"geometric_error": True, "admittance": True},
+        {"geometric_error": True, "tare": True, "synchronized": False, "admittance": True},
+    ],
+)
+def test_fixtures_and_an_admittance_take_from_v_and_every_power_has_its_name(options):
+    record = lyapunov(carry_ur5(**options).simulate(0.02, dt=1e-3))
+    rounding, powers = record.rounding, record.power
+    assert record.closes
+    assert (np.abs(powers["other"]) <= rounding).all()
+    assert (powers["fixtures"] <= rounding).all() and powers["fixtures"].min() < -0.1
+    assert (record.V_dot <= rounding).all()
+    giving = [record.energy["fixtures"]]
+    if "admittance" in options:
+        giving.append(record.energy["admittance"])
+        assert (powers["admittance"] <= 0).all() and powers["admittance"].min() < 0
+    assert min(energy.min() for energy in giving) >= 0
+
+
+def test_of_the_independent_controller_fixtures_lose_what_the_theorem_says():
+    """d'^T D d' + Lambda d^T K d at the grasps, to the first order in deflections that are small."""
+    made = carry_ur5(synchronized=False)
+    result = made.simulate(0.03, dt=1e-3)
+    loop, record = made.closed_loop(), lyapunov(result)
+    for k in (10, 20, 30):
+        y = loop.state(_state(result, k))
+        signals = loop.look(loop.cell.references(result.t[k : k + 1])[0], y)
+        d, d_dot = loop.chain.energies._deflections(y, signals)
+        G = grasp_matrix(loop.plant._levers(y.hidden[None])[0])
+        d, d_dot = np.vecmat(d, G), np.vecmat(d_dot, G)
+        lost = np.sum(d_dot * loop.plant.D * d_dot) + np.sum(loop.controller.Lambda * d * loop.plant.K * d)
+        assert record.power["fixtures"][k] == pytest.approx(-lost, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("options", "vanishes"),
+    [({}, True), ({"geometric_error": True}, False), ({"geometric_error": True, "tare": True}, True)],
+)
+def test_forces_inside_have_no_power_through_velocity_errors_where_arms_agree(options, vanishes):
+    """Of a rigid loop, whatever the forces are: both reference motions are one rigid motion."""
+    made, exact = carry_ur5(**options), carry_ur5().cell
+    rng = np.random.default_rng(1)
+    q, v = carried_along(carry_ur5(), 0.01 * rng.normal(size=6), 0.1 * rng.normal(size=6))
+    _, s = evaluate_held(made, q, v)
+    inside = 30.0 * rng.normal(size=6)
+    moved = [robot.jacobian(q_i) @ s_i for robot, q_i, s_i in zip(exact.robots, q, s.s_q, strict=True)]
+    power = (moved[0] - moved[1]) @ inside
+    assert (abs(power) < 1e-3) == vanishes
 
 
 def chain(**options):

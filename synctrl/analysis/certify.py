@@ -167,8 +167,9 @@ def _outside(run: Replay, record: Lyapunov, condition: GainCondition) -> list[st
     found += [*_events(run), *getattr(run.loop.chain, "outside", ())]
     for name in (name for name in record.power if name not in record.inside):
         power = record.power[name]
-        if name in run.learning and name not in _WORDS and not (power > record.rounding).any():
-            continue  # a power of the adaptation that only takes from V
+        only_takes = not (power > record.rounding).any()
+        if only_takes and (name == "fixtures" or (name in run.learning and name not in _WORDS)):
+            continue
         if name != "weight rate" and (np.abs(power) > record.rounding).any():
             words = _in_words(run, name)
             found.append(f"{words}: power from {power.min():.3g} to {power.max():.3g}")
@@ -216,6 +217,8 @@ _WORDS = {
     "saturation": "torque that saturation takes away, for which no adaptation makes up while it lasts",
     "model error": "parameters that are wrong and not adapted",
     "damped inverse": "a reference that damped inverse kinematics do not follow",
+    "fixtures": "fixtures that give, of which the theorem is to the first order",
+    "object": "an object that does not move as the hands do",
     "other": "forces that the model does not contain",
 }
 

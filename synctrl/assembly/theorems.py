@@ -12,6 +12,7 @@ The proofs are on the page about assembly in `docs`.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from ..control.laws.sun_mills import BoundSunMills
 from ..errors import InputError
 from ..tasks.pose import PoseSpace
 from .body import moved_parameters, place_of
+from .energies import Energies
 from .tare import disagreement
 
 #: how far arms may believe the object apart and still agree, m and rad
@@ -62,6 +64,11 @@ class ClosedChain:
         self.outside = (*self.warnings, *self._unknown(), *nobodys)
         number = 3 if controller.admittance is not None else 1 if self.rigid else 2
         self.theorem = THEOREMS[0 if self.outside else number]
+
+    @cached_property
+    def energies(self) -> Energies | None:
+        """What the chain has in V and V'; None where that is not known, or nothing."""
+        return Energies(self.plant, self.controller) if self._posed and not self.rigid else None
 
     @property
     def gain(self) -> np.ndarray:
