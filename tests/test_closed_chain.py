@@ -27,6 +27,7 @@ from synctrl.experiments import carry_ur5, planar_four
 from synctrl.experiments.carry import GAINS
 from synctrl.robots.robot import Robot
 from synctrl.simulation.simulate import Experiment
+from synctrl.tasks.rotations import exp
 
 HEAVY = Admittance(mass=(150.0, 3.0))
 
@@ -85,6 +86,47 @@ def test_of_the_independent_controller_fixtures_lose_what_the_theorem_says():
         d, d_dot = np.vecmat(d, G), np.vecmat(d_dot, G)
         lost = np.sum(d_dot * loop.plant.D * d_dot) + np.sum(loop.controller.Lambda * d * loop.plant.K * d)
         assert record.power["fixtures"][k] == pytest.approx(-lost, rel=0.03)
+
+
+def with_changed(made: Experiment, memory: np.ndarray, gave: np.ndarray) -> tuple:
+    """Power of the fixtures after 30 ms, with other integrals and arms that gave way; and of what it is."""
+    loop, result = made.closed_loop(), made.simulate(0.03, dt=1e-3)
+    y = loop.state(_state(result, -1))
+    y.memory[...], y.z[:, -12:] = memory, gave
+    signals = loop.look(loop.cell.references(result.t[-1:])[0], y)
+    terms = loop.chain.energies.terms(y, np.zeros_like(y.q), signals)
+    return terms.powers["fixtures"], loop, y, signals
+
+
+def test_integrals_that_leak_lose_to_fixtures_what_the_theorem_says():
+    made = carry_ur5(admittance=True, leak=3.0, gains=GAINS.replace(K_eps=2e4))
+    memory, none = np.zeros((1, 6)), np.zeros((2, 12))
+    alone = with_changed(made, memory, none)[0]
+    memory[:, :3] = 0.05 * np.random.default_rng(0).normal(size=3)
+    found, _, _, signals = with_changed(made, memory, none)
+    E = signals.E[:, :3] * [[1.0], [-1.0]]  # without the weights of the pair
+    L_plus, (K, D) = np.array([[1.0, -1.0], [-1.0, 1.0]]) / 4, (1e5, 500.0)
+    assert found - alone == pytest.approx(
+        -3.0 * 3.0 * 6.0 * (K + 3.0 * D) * np.sum(E * (L_plus @ E)), rel=1e-2
+    )
+
+
+def test_an_admittance_stores_what_forces_inside_give_it_and_the_load_is_left():
+    """Through y' + A y hands have the power of the load beside that of forces inside."""
+    made, rest, none = carry_ur5(admittance=True), np.zeros((1, 6)), np.zeros((2, 12))
+    alone, loop, y, _ = with_changed(made, rest, none)
+    one = np.random.default_rng(0).normal(size=(2, 6)) * [[0.02], [0.1]]
+    one[:, 3:] = 0.0
+    found = with_changed(made, rest, np.stack((one.ravel(), -one.ravel())))[0]
+    h = np.matvec(
+        grasp_matrix(loop.plant._levers(y.hidden[None])[0]), loop.plant._wrenches(y.q, y.v, y.hidden)[0]
+    )
+    load = h - loop.plant.felt(y.q, y.v, y.hidden)
+    R_d = exp(loop.cell.references(np.array([0.03]))[0].xd[0, 3:])
+    moved = R_d @ (one[1] + (6.0 + 2 * 6.0) * one[0])[:3]  # A y = (Lambda + 2 beta) y
+    inside = float(moved @ (h - load)[0, :3] - moved @ (h - load)[1, :3])
+    left = float(moved @ (load[0] - load[1])[:3])
+    assert found - alone == pytest.approx(left, abs=0.02 * abs(inside))
 
 
 @pytest.mark.parametrize(

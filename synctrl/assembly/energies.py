@@ -50,8 +50,8 @@ class Energies:
     def __init__(self, plant: Any, controller: Controller):
         self._plant, self._controller = plant, controller
         cell, (p, R) = controller.cell, place_of(plant.hidden0[:7])
-        S = cell.coupling.matrix
-        self._L, self._L_plus = S.T @ S, np.linalg.pinv(S.T @ S)
+        c, S = cell.references(np.zeros(1))[0].c, cell.coupling.matrix
+        self._c, self._L, self._L_plus = c, S.T @ S, np.linalg.pinv(S.T @ S)
         places, turns = believed_poses(cell)
         self._believed = (places - p) @ R, R.T @ turns  # the object in its own axes, as each arm believes it
         self._bodies = [forests(robots) for robots in (cell.robots, plant.schedule.free)]
@@ -107,7 +107,7 @@ class Energies:
         plant, controller = self._plant, self._controller
         hands, leak = plant._hands, controller.leak
         K, D, rest = plant.K, plant.D, (controller.Lambda - leak) * controller.beta
-        E = np.stack((signals.E, signals.sigma - leak * signals.E))
+        E = self._unweighted(np.stack((signals.E, signals.sigma - leak * signals.E)))
         d = self._deflections(y, signals)
         levers, w = plant._levers(y.hidden[None])[0], y.hidden[10:13]
 
@@ -119,7 +119,7 @@ class Energies:
             return moved
 
         d_g, b_g = carried(d), carried(0.5 * self._A(d) - rest * E)
-        E_g, F_g = carried(E), carried(rest * (self._L_plus @ E))
+        E_g, F_g = carried(E), carried(rest * self._among(self._L_plus, E))
         pairs = (0.5 * K * d_g, d_g), (D * d_g, b_g), (0.5 * (K + leak * D) * E_g, F_g)
         return (
             float(sum(np.sum(a[0] * b[0]) for a, b in pairs)),
@@ -143,7 +143,14 @@ class Energies:
 
     def _A(self, x: np.ndarray) -> np.ndarray:  # noqa: N802
         """(Lambda + beta L) x."""
-        return self._controller.Lambda * x + self._controller.beta * (self._L @ x)
+        return self._controller.Lambda * x + self._controller.beta * self._among(self._L, x)
+
+    def _among(self, L: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """c^-1 L c x, for L between robots and one row of x, (..., n, 6), per robot."""
+        return self._unweighted(L @ np.matvec(self._c, x))
+
+    def _unweighted(self, w: np.ndarray) -> np.ndarray:
+        return np.linalg.solve(self._c, w[..., None])[..., 0]
 
     def _deflections(self, y: Any, signals: Signals) -> np.ndarray:
         """d and d', (2, n, 6): errors of the object, as each arm believes it, less those of the arm."""
