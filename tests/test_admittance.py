@@ -17,6 +17,7 @@ from synctrl.control.admittance import Admittance, BoundAdmittance
 from synctrl.coupling.cell import Reference
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, carry_ur5
+from synctrl.experiments.carry import GAINS
 from synctrl.simulation.plant import Plant
 from synctrl.simulation.result import Result
 from synctrl.simulation.simulate import Experiment
@@ -98,9 +99,13 @@ def test_arms_give_way_against_each_other_and_take_the_force_out_of_a_wrong_geom
     assert force[-1] < 0.6 * stiff[-1]
 
 
-def test_an_admittance_helps_the_independent_controller_too():
-    forces = [squeezed(synchronized=False, admittance=way) for way in (False, True)]
-    assert forces[1][-1] < 0.9 * forces[0][-1]
+def test_an_admittance_helps_and_with_a_tare_and_stiff_synchronization_takes_two_thirds_of_the_force():
+    wrong = {"geometric_error": True}
+    alone = squeezed(synchronized=False, **wrong)[-1]
+    giving = squeezed(synchronized=False, admittance=True, **wrong)[-1]
+    stiff = GAINS.replace(K_eps=[2e4] * 3 + [200.0] * 3)
+    best = squeezed(tare=True, admittance=True, gains=stiff, **wrong)[-1]
+    assert giving < 0.95 * alone and best < alone / 3
 
 
 def test_integrals_leak_at_lambda_with_an_admittance_unless_told_otherwise():

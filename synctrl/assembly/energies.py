@@ -6,8 +6,8 @@ is divided into
     fixtures = sum_i (J_i s_i - s_o)^T G_i h_i,    object = what is left: it does not move as the hands do.
 
 To the first order J_i s_i - s_o = -d_i' - (A d)_i + (Lambda - l) beta E_i + y_i' + (A yt)_i, where
-A = Lambda + beta S^T S, d_i is the deflection of fixture i, and yt_i what arm i gives way by, less what it is
-wrong by about the object. So V has the energies
+A = Lambda + beta L, L = c^-1 S^T S c with weights of 1 or -1, d_i is the deflection of fixture i, and yt_i
+what arm i gives way by, less what it is wrong by about the object. So V has the energies
 
     W = 1/2 d^T K d + d^T D (1/2 A d - (Lambda - l) beta E) + 1/2 (Lambda - l) beta E^T L^+ (K + l D) E
     U = 1/2 y'^T M_a y' + y'^T M_a A yt + 1/2 yt^T D_a A yt
