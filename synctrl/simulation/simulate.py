@@ -156,8 +156,7 @@ class Experiment:
 
         Warns:
             SaturationWarning, StepWarning: torque was cut off; the step of "rk4" was too long.
-            GainWarning: gains with which forces inside what robots hold may grow.
-            RobotWarning: a robot's description states friction, and nobody says whether it acts.
+            GainWarning, RobotWarning: forces inside an object may grow; nobody says if stated friction acts.
         """
         run = self.plan(duration, dt, control_period, plant, log_dt)
         return _carry_out(run, integrator, engine, (rtol, atol), progress)
