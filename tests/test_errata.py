@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from held import carried_along, evaluate_held
 from scipy.optimize import brentq
 from theory_cells import GAINS, coupling, experiment, planar_arm
 
@@ -14,15 +15,18 @@ from synctrl import Cell, Coupling, Experiment, Friction, FunctionTrajectory, Ho
 from synctrl.analysis import certify
 from synctrl.analysis.gain_condition import margins, rate_matrix
 from synctrl.analysis.lyapunov import first_growth, lyapunov
+from synctrl.assembly.grasp import Fixture
 from synctrl.control.controller import Controller
 from synctrl.coupling.synchronization import SynchronizationFunction
 from synctrl.errors import SimulationError, SynchronizationError, UnreachableError
-from synctrl.experiments import a460_pair, planar_four
+from synctrl.experiments import a460_pair, carry_ur5, planar_four
 from synctrl.experiments.a460_pair import FINAL, INITIAL
+from synctrl.experiments.carry import GAINS as CARRY
 from synctrl.experiments.planar_four import Q0, TURN, D, R
 from synctrl.experiments.quadratic import quadratic_analysis
 from synctrl.simulation.closed_loop import ClosedLoop
 from synctrl.simulation.plant import Plant
+from synctrl.tasks.inverse_kinematics import TOLERANCE
 
 pytestmark = pytest.mark.filterwarnings("ignore::synctrl.errors.CouplingWarning")  # odd rings, rings of two
 rng = np.random.default_rng(7)
@@ -416,6 +420,38 @@ def test_20_equations_21_and_22_print_y_transposed() -> None:
     np.vdot(s.s_q, np.matvec(s.Y, tilde))  # r^T c^-T Y tilde is a number
     with pytest.raises(ValueError, match="mismatch"):  # numpy's words
         s.s_q[0] @ s.Y[0].T @ tilde[0]  # r^T c^-T Y^T tilde is not
+
+
+def test_21_in_a_rigid_loop_epsilon_is_zero_and_synchronization_does_nothing() -> None:
+    """Wherever a rigid object goes, both arms are wrong by the same, and torque is the independent one."""
+    pair = [carry_ur5(synchronized=way) for way in (True, False)]
+    for seed in range(3):
+        moved, twist = np.random.default_rng(seed).normal(size=(2, 6)) * [[0.02], [0.1]]
+        q, v = carried_along(pair[0], moved, twist)
+        (_, s), (_, alone) = (evaluate_held(run, q, v) for run in pair)
+        assert np.abs(s.e).max() > 1e-2 and np.abs(s.e_dot).max() > 1e-2
+        assert max(np.abs(s.epsilon).max(), np.abs(s.epsilon_dot).max()) < 5 * TOLERANCE
+        np.testing.assert_allclose(s.tau, alone.tau, rtol=1e-4, atol=1e-3)
+
+
+@pytest.mark.filterwarnings("ignore::synctrl.errors.GainWarning", "ignore::synctrl.errors.StepWarning")
+@pytest.mark.parametrize(("stiffness", "error"), [(2e4, 1e-3), (1e4, -1e-3)])
+def test_22_the_integral_turns_an_error_of_the_geometry_into_the_whole_force_of_the_fixtures(
+    stiffness: float, error: float
+) -> None:
+    """It grows until both fixtures, springs in a row, give all of the error: K/2 times that.
+
+    With soft fixtures and a high beta that takes half a second, and minutes of computing with others. What
+    the error adds is the difference of two runs.
+    """
+
+    def inside(g: float) -> np.ndarray:
+        gains = CARRY.replace(beta=40.0)
+        made = carry_ur5(grasp=Fixture((stiffness, 1e3)), geometric_error=[g, 0, 0, 0, 0, 0], gains=gains)
+        return made.simulate(0.5, dt=2e-3, log_dt=0.1).outputs["internal_force"][-1, 0, :3]
+
+    added = np.linalg.norm(inside(error) - inside(0.0))
+    assert added == pytest.approx(stiffness / 2 * abs(error), rel=0.05)
 
 
 def test_what_the_paper_calls_asymptotic_holds_with_any_of_beta_and_k_eps_switched_off() -> None:

@@ -41,6 +41,7 @@ class Certificate:
         consistency: whether the estimates are those of bodies that can exist, which the theorem does not
             need; None where what is adapted are not the parameters of bodies.
         statement: when the law converges, in words; None if it does not say.
+        theorem: of robots that hold one object together, which theorem covers the run, in words; else None.
         every: steps of the run per logged instant. With more than one the log is thinned: what V did between
             two instants, and whether its balance closes, cannot be seen.
     """
@@ -56,6 +57,7 @@ class Certificate:
     every: int = 1
     consistency: Consistency | None = None
     statement: str | None = None
+    theorem: str | None = None
 
     @property
     def certified(self) -> bool:
@@ -86,6 +88,7 @@ class Certificate:
             "convergence": asdict(self.convergence),
             "consistency": None if self.consistency is None else self.consistency.as_dict(),
             "statement": self.statement,
+            "theorem": self.theorem,
         }
 
     def __str__(self) -> str:
@@ -108,6 +111,8 @@ class Certificate:
         ]
         if self.statement is not None:
             lines.append(f"  law: {self.statement}")
+        if self.theorem is not None:
+            lines.append(f"  closed chain: {self.theorem}")
         if self.growth is not None:
             lines.append(f"  V first grows at t = {self.growth.time:g} s, by the term '{self.growth.term}'")
         return "\n".join(lines)
@@ -134,6 +139,7 @@ def certify(result: Result, experiment: Experiment | None = None) -> Certificate
     return Certificate(
         title, verdict, found, doubts, growth, record, condition, errors, _every(result),
         _consistency(run), getattr(run.loop.controller.law, "statement", None),
+        getattr(run.loop.chain, "theorem", None),
     )  # fmt: skip
 
 
@@ -158,11 +164,12 @@ def _outside(run: Replay, record: Lyapunov, condition: GainCondition) -> list[st
     period = run.result.info.get("control_period")
     if period is not None:
         found.append(f"torque and adaptation are held for {period:g} s at a time")
-    found += _events(run)
+    found += [*_events(run), *getattr(run.loop.chain, "outside", ())]
     for name in (name for name in record.power if name not in record.inside):
         power = record.power[name]
-        if name in run.learning and name not in _WORDS and not (power > record.rounding).any():
-            continue  # a power of the adaptation that only takes from V
+        only_takes = not (power > record.rounding).any()
+        if only_takes and (name == "fixtures" or (name in run.learning and name not in _WORDS)):
+            continue
         if name != "weight rate" and (np.abs(power) > record.rounding).any():
             words = _in_words(run, name)
             found.append(f"{words}: power from {power.min():.3g} to {power.max():.3g}")
@@ -210,6 +217,8 @@ _WORDS = {
     "saturation": "torque that saturation takes away, for which no adaptation makes up while it lasts",
     "model error": "parameters that are wrong and not adapted",
     "damped inverse": "a reference that damped inverse kinematics do not follow",
+    "fixtures": "fixtures that give, of which the theorem is to the first order",
+    "object": "an object that does not move as the hands do",
     "other": "forces that the model does not contain",
 }
 

@@ -33,6 +33,7 @@ from ..renamed import names_elsewhere
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
+from .balance import drift, supplied
 from .replay import Replay, replay
 
 #: energies of the paper's law; those of another law stand in place of the last two
@@ -41,6 +42,8 @@ ENERGIES = ("kinetic", "parameter", "synchronization", "integral")
 THEOREM = ("damping", "synchronization rate", "coupling", "friction in Y")
 #: what it does not: each may have either sign
 OUTSIDE = ("friction", "disturbance", "saturation", "weight rate", "damped inverse", "other")
+#: what it knows of a closed chain, beside what fixtures and the object do
+GIVING = ("admittance",)
 #: the powers of the paper's law; those of the adaptation come beside them
 POWERS = THEOREM + OUTSIDE
 EPS = float(np.finfo(float).eps)
@@ -55,8 +58,8 @@ class Lyapunov:
         energy: terms of V by name, each (T,): "kinetic", "parameter", and the law's; with the paper's law
             those in `ENERGIES`.
         power: terms of V' by name, each (T,): with the paper's law those in `POWERS`, and those of the
-            adaptation. A law without a proof has the power of its force here, as "law"; what a network does
-            that is not ideal is "network".
+            adaptation and of a closed chain, see `assembly/energies.py`. A law without a proof has the power
+            of its force here, as "law"; what a network does that is not ideal is "network".
         rounding: bound of the rounding error of V', (T,).
         drift: V(t) - V(0) - integral of V', (T,), without jumps at events; 0 but for the error of the run and
             of the quadrature.
@@ -133,17 +136,18 @@ def lyapunov(result: Result | Replay, experiment: Experiment | None = None) -> L
     x, power = run.rows, _power(run, proof)
     energy = {"kinetic": 0.5 * _sum(x.s_q * np.matvec(x.M, x.s_q)), "parameter": x.storage}
     energy |= {name: _sum(term) for name, term in proof.energies.items()}
+    energy |= dict(zip(run.stored, x.stored.T, strict=True))
     V, V_dot = (np.sum(list(terms.values()), axis=0) for terms in (energy, power))
-    drift, bound = _drift(run, proof, V, V_dot)
+    missed, bound = drift(run, _rates(run, proof), V, V_dot)
     return Lyapunov(
         run.result.t,
         {name: term[run.logged] for name, term in energy.items()},
         {name: term[run.logged] for name, term in power.items()},
         operations(run.loop) * EPS * _magnitude(run, proof)[run.logged],
-        drift,
+        missed,
         bound + operations(run.loop) * EPS * float(np.max(V)),
-        {name: _supplied(run, term) for name, term in power.items()},
-        ("damping", *proof.powers, "friction in Y"),
+        {name: supplied(run, term) for name, term in power.items()},
+        ("damping", *proof.powers, "friction in Y", *GIVING),
         run.events,
     )
 
@@ -193,7 +197,7 @@ def _proof(run: Replay) -> Proof:
 
 def _rates(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
     """Time derivatives of the terms of V by the chain rule, (R,) each."""
-    return (*map(_sum, _summands(run, proof)), run.rows.storage_rate)
+    return (*map(_sum, _summands(run, proof)), run.rows.storage_rate, *run.rows.stored_rate.T)
 
 
 def _summands(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
@@ -219,7 +223,7 @@ def _power(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
         "damped inverse": (s - moved) * x.force,
     }
     power = {name: _sum(term) for name, term in terms.items()}
-    power |= dict(zip(run.learning, x.learning.T, strict=True))
+    power |= dict(zip((*run.learning, *run.chained), (*x.learning.T, *x.chained.T), strict=True))
     pushed = _sum(s * x.force)  # the rates of the proof less its powers, where it holds
     if not hasattr(controller.law, "proof"):
         power["law"] = -pushed
@@ -248,53 +252,13 @@ def _magnitude(run: Replay, proof: Proof) -> np.ndarray:
     command = np.abs(x.u) + np.abs(x.r) + controller.Lambda * np.abs(x.e_star)
     coupling = command * np.abs(np.vecmat(x.force, x.c_inv))
     per_robot = condition * (kinetic.sum(axis=-1) + coupling.sum(axis=-1))
-    learned = _sum(np.abs(x.s_q) * x.Y_size)
+    learned = _sum(np.abs(x.s_q) * x.Y_size) + np.abs(x.stored_rate).sum(-1) + np.abs(x.chained).sum(-1)
     return per_robot.sum(axis=-1) + learned + sum(_sum(np.abs(summand)) for summand in _summands(run, proof))
 
 
 def _sum(term: np.ndarray) -> np.ndarray:
     """Over all axes but the first."""
     return term.sum(axis=(1, 2))
-
-
-# -- the balance over time --------------------------------------------------------------------------------
-
-
-def _drift(run: Replay, proof: Proof, V: np.ndarray, V_dot: np.ndarray) -> tuple[np.ndarray, float]:
-    """V - V(0) - integral of V', (T,), and a bound of its numerical error.
-
-    V' is integrated by a cubic spline, which like the Runge-Kutta method errs with the fourth power of the
-    step and with a larger constant. What an integral changes when every second instant is left out is about
-    15 times its error. Summed over the terms of V, which exchange much, it stands for both errors.
-    """
-    drift, bound = np.zeros(len(run.logged)), 0.0
-    rates = _rates(run, proof)
-    for first, last, rows in run.pieces:
-        t = run.result.t[first : last + 1]
-        missing = V[rows] - V[rows][0] - _integral(t, V_dot[rows])
-        drift[last + 1 :] = drift[first] + missing[-1]
-        drift[first : last + 1] = drift[first] + missing
-        bound += sum(_halving(t, rate[rows]) for rate in rates)
-    return drift, bound
-
-
-def _supplied(run: Replay, rate: np.ndarray) -> float:
-    """Integral of a power over all pieces of the run."""
-    t = run.result.t
-    return sum(float(_integral(t[first : last + 1], rate[rows])[-1]) for first, last, rows in run.pieces)
-
-
-def _integral(t: np.ndarray, rate: np.ndarray) -> np.ndarray:
-    """Integral of a smooth rate from the first instant to each."""
-    from scipy.interpolate import make_interp_spline
-
-    return make_interp_spline(t, rate, k=min(3, len(t) - 1)).antiderivative()(t)
-
-
-def _halving(t: np.ndarray, rate: np.ndarray) -> float:
-    """How much the integral of a rate changes when every second instant is left out."""
-    half = np.unique(np.append(np.arange(0, len(t), 2), len(t) - 1))
-    return float(np.abs(_integral(t[half], rate[half]) - _integral(t, rate)[half]).max())
 
 
 __getattr__ = names_elsewhere(__name__, ".lyapunov", lyapunov_of="lyapunov")

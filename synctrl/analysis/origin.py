@@ -55,7 +55,7 @@ def _settings(info: Mapping[str, Any]) -> dict[str, Any]:
     gains = dict(info["gains"])
     learning = {"name": "Gradient", "Gamma": gains.pop("Gamma", None)}
     parts = {name: info[name] for name in PARTS if name in info}
-    return {"adaptation": learning, "gains": gains, **parts}
+    return {"adaptation": learning, "gains": gains, "admittance": info.get("admittance"), **parts}
 
 
 def _alike(a: Any, b: Any) -> bool:

@@ -45,6 +45,8 @@ class Moment(NamedTuple):
         cut_off: torque that saturation takes from tau, (n, nv).
         storage, storage_rate: V_th of the adaptation, and its rate by the chain rule, N·m and N·m/s.
         learning: what V_th' has beside -s_q^T Y tilde, in the order of `Replay.learning`, N·m/s.
+        stored, stored_rate: energies of a closed chain, in the order of `Replay.stored`, and their rates.
+        chained: its powers, in the order of `Replay.chained`, N·m/s.
         epsilon, epsilon_dot: (p, m).
         E, sigma, sigma_dot, e_star, u, r: (n, m).
         force: what the law asks for in task space, (n, m).
@@ -68,6 +70,9 @@ class Moment(NamedTuple):
     storage: np.ndarray
     storage_rate: np.ndarray
     learning: np.ndarray
+    stored: np.ndarray
+    stored_rate: np.ndarray
+    chained: np.ndarray
     epsilon: np.ndarray
     epsilon_dot: np.ndarray
     E: np.ndarray
@@ -100,6 +105,7 @@ class Replay:
         pieces: parts of the log in which nothing jumps.
         events: instants between which and the next one the state jumps, by events of plant or network.
         learning: names of the powers of the adaptation.
+        stored, chained: names of the energies and powers of a closed chain, none if there is none.
     """
 
     result: Result
@@ -110,6 +116,8 @@ class Replay:
     pieces: tuple[SmoothPart, ...]
     events: tuple[int, ...]
     learning: tuple[str, ...]
+    stored: tuple[str, ...]
+    chained: tuple[str, ...]
 
 
 def replay(result: Result | Replay, experiment: Experiment | None = None) -> Replay:
@@ -137,9 +145,9 @@ def replay(result: Result | Replay, experiment: Experiment | None = None) -> Rep
     instants = np.arange(len(result.t))
     logged = instants + np.searchsorted(jumps, instants, side="right")
     _check_same(result, Moment(*(column[logged] for column in rows)))
-    learning = _learning(loop, result)
+    names = _names(loop, result)
     parts = pieces(logged, jumps, crossed)
-    return Replay(result, experiment, loop, rows, logged, parts, tuple(events), learning)
+    return Replay(result, experiment, loop, rows, logged, parts, tuple(events), *names)
 
 
 def experiment_of(result: Result, experiment: Experiment | None) -> Experiment:
@@ -188,8 +196,8 @@ def _row(
         disturbance, friction, friction_damping,
         s.tau - loop.plant.applied(s.tau), np.array(adaptation.storage(z, theta)),
         np.array(adaptation.storage_rate(z, s.z_dot, theta)),
-        np.array([*adaptation.powers(z, theta, s.seen).values()]), s.epsilon, s.epsilon_dot,
-        s.E, s.sigma, s.sigma_dot, s.e_star, s.u, s.r, s.force, reference.c,
+        np.array([*adaptation.powers(z, theta, s.seen).values()]), *_chain(loop, y, y_dot, s),
+        s.epsilon, s.epsilon_dot, s.E, s.sigma, s.sigma_dot, s.e_star, s.u, s.r, s.force, reference.c,
         reference.c_dot, reference.c_inv, J, J_inv, M, C_s,
         np.matvec(np.abs(s.Y), np.abs(s.theta_hat) + np.abs(theta)),
     )  # fmt: skip
@@ -209,12 +217,27 @@ def _state(result: Result, k: int) -> np.ndarray:
     return np.concatenate([part.ravel() for part in parts])
 
 
-def _learning(loop: ClosedLoop, result: Result) -> tuple[str, ...]:
-    """Names of what the storage of the adaptation changes by, beside -s_q^T Y tilde."""
+def _names(loop: ClosedLoop, result: Result) -> tuple[tuple[str, ...], ...]:
+    """What the storage of the adaptation changes by, and energies and powers of a closed chain, by name."""
     y = loop.initial_state()
-    _, signals = loop.evaluate(loop.cell.references(result.t[:1])[0], y, result.disturbance[0])
-    z = loop.state(y).z
-    return tuple(loop.controller.adaptation.powers(z, loop.cell.theta, signals.seen))
+    y_dot, signals = loop.evaluate(loop.cell.references(result.t[:1])[0], y, result.disturbance[0])
+    state, energies = loop.state(y), getattr(loop.chain, "energies", None)
+    powers = tuple(loop.controller.adaptation.powers(state.z, loop.cell.theta, signals.seen))
+    if energies is None:
+        return powers, (), ()
+    terms = energies.terms(state, loop.state(y_dot).v, signals)
+    return powers, tuple(terms.energies), tuple(terms.powers)
+
+
+def _chain(
+    loop: ClosedLoop, y: np.ndarray, y_dot: np.ndarray, s: Signals
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Energies, their rates, and powers of a closed chain; nothing if there is none."""
+    energies = getattr(loop.chain, "energies", None)
+    if energies is None:
+        return np.zeros(0), np.zeros(0), np.zeros(0)
+    stored, rates, powers = energies.terms(loop.state(y), loop.state(y_dot).v, s)
+    return np.array([*stored.values()]), np.array([*rates.values()]), np.array([*powers.values()])
 
 
 def _jacobians(loop: ClosedLoop, s: Signals) -> tuple[np.ndarray, np.ndarray]:

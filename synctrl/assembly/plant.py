@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..checks import finite_array, instance, rotation_matrix
+from ..control.controller import Controller
 from ..coupling.cell import Cell
 from ..errors import InputError
 from ..robots.robot import Robot
@@ -20,6 +21,7 @@ from .body import CarriedObject, body_rate, place_of, pose_of
 from .forces import internal_wrenches
 from .grasp import Grasp, fixture_wrenches, grasp_matrix, places_on
 from .step import largest_step
+from .theorems import ClosedChain
 
 #: how far a hand may be off its place on the object at t = 0, m and rad
 CLOSED = 1e-6
@@ -86,6 +88,16 @@ class CarryingPlant(Plant):
         pulled[self._hands] += np.vecmat(back, J)
         v_dot, _ = super().move(q, v, pulled, hidden[:0])
         return v_dot, self._object_rate(hidden, wrenches)
+
+    def chain(self, controller: Controller) -> ClosedChain:
+        return ClosedChain(self, controller)
+
+    def felt(self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray) -> np.ndarray:
+        """Internal wrenches about the object's origin, (n, 6); zeros for robots that do not hold it."""
+        levers, found = self._levers(hidden[None])[0], np.zeros((len(q), 6))
+        inner = internal_wrenches(self._wrenches(q, v, hidden)[0], levers)
+        found[self._hands] = np.matvec(grasp_matrix(levers), inner)
+        return found
 
     def outputs_along(
         self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray, t: np.ndarray

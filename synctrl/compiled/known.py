@@ -70,6 +70,8 @@ def check_known(loop: ClosedLoop) -> None:
     Raises:
         InputError: naming the part, its class, and the way out.
     """
+    if loop.controller.admittance is not None:
+        raise _refusal("admittance", "Admittance", "an admittance")
     for part in _parts(loop):
         _check_type(part)
         _check_own_methods(part)

@@ -6,18 +6,17 @@ to read the package: every line of it is one part that can be exchanged, asked a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
+from types import NoneType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, instance, limits, offers, shaped
+from ..checks import finite_array, instance, limits, offers
 from ..coupling.cell import Cell, Reference
-from ..errors import InputError, SynctrlError
 from ..renamed import argument, names_elsewhere, tell
 from ..robots.momentum import momentum_of_all
 from ..robots.regressors import Regressors, make_regressors
@@ -25,9 +24,11 @@ from ..tasks.algebra import limited
 from ..tasks.spaces import Measurement
 from . import law, laws
 from .adaptation import Adaptation, Seen, chosen, shift_of
+from .admittance import Admittance, BoundAdmittance
 from .gains import Gains, spread, spread_rows
-from .laws import Asked, BoundLaw, Errors, Law, completed, no_errors
-from .network import BoundNetwork, Ideal, Network, Received, check_leak
+from .laws import Asked, Errors, Law, completed
+from .network import Ideal, Network, Received, check_leak
+from .parts import check_parts, settings_of
 
 
 @dataclass(slots=True)
@@ -105,6 +106,8 @@ class Controller:
         network: what the robots know of each other; by default `Ideal`.
         torque_limits: (n, nv), N·m, at which the robots cut torque off, as far as an adaptation is to know of
             it; infinite by default. `tau` is what is asked for, whatever the limits.
+        admittance: how the robots give way to the forces inside what they hold together; by default they do
+            not.
         reference_acceleration, k_r_space: shorthand for the options of `SunMills`. Where the damping acts,
             "joint" or "task", may be said beside any law.
 
@@ -123,6 +126,7 @@ class Controller:
         law: Law | None = None,
         network: Network | None = None,
         torque_limits: ArrayLike | None = None,
+        admittance: Admittance | None = None,
         reference_acceleration: str | None = None,
         k_r_space: str | None = None,
     ):
@@ -146,10 +150,20 @@ class Controller:
         offers("network", connection, ("bind",), "a network, for example Ideal()")
         self.network, self.network_settings = connection.bind(cell), settings_of(connection)
         self._shift = shift_of(self.adaptation, self.network)
+        self._give_way(admittance)
         self.torque_limits = limits("torque_limits", torque_limits, (cell.n, cell.nv))
         self._cuts = bool(np.isfinite(self.torque_limits).any())
         check_parts(self.law, self.network, cell.n, cell.coupling.pairs, m)
         check_leak(self.network, self.leak)
+
+    def _give_way(self, admittance: Admittance | None) -> None:
+        """Take an admittance, if there is one, for the adaptation that it goes along with."""
+        instance("admittance", admittance, (Admittance, NoneType), "an Admittance")
+        self.admittance: BoundAdmittance | None = None
+        self.admittance_settings: dict[str, Any] | None = None
+        if admittance is not None:
+            self.admittance = admittance.bind(self.cell, self.adaptation, self.network)
+            self.adaptation, self.admittance_settings = self.admittance, admittance.as_dict()
 
     @property
     def Gamma(self) -> np.ndarray:  # noqa: N802
@@ -170,6 +184,7 @@ class Controller:
         integral: ArrayLike | None = None,
         *,
         theta_hat: ArrayLike | None = None,
+        wrenches: ArrayLike | None = None,
     ) -> Signals:
         """The law at one instant.
 
@@ -180,9 +195,11 @@ class Controller:
             integral: integrals of the synchronization errors, (p, m); with another network than `Ideal`
                 its memory.
             theta_hat: deprecated name of z.
+            wrenches: internal wrenches that are measured, about the object's origin in world axes, (n, 6),
+                N and N·m, for an admittance.
 
         Raises:
-            InputError: another size, or numbers that are not finite.
+            InputError: another size, numbers that are not finite, or none where an admittance needs some.
         """
         cell = self.cell
         instance("reference", reference, Reference, "a Reference, for example of Cell.references")
@@ -194,10 +211,11 @@ class Controller:
             finite_array("motion", motion, (2, cell.n, cell.nv)),
             finite_array("z", state, self.adaptation.start().shape),
             finite_array("integral", memory, np.shape(self.network.start())),
+            None if wrenches is None else finite_array("wrenches", wrenches, (cell.n, 6)),
         )
 
     @property
-    def unchecked(self) -> Callable[[Reference, np.ndarray, np.ndarray, np.ndarray], Signals]:
+    def unchecked(self) -> Callable[..., Signals]:
         """What a simulation calls: `signals`, which is `evaluate` without its checks.
 
         A user's subclass may have an `evaluate` of its own; then that is called instead.
@@ -205,7 +223,12 @@ class Controller:
         return self.signals if type(self).evaluate is Controller.evaluate else self.evaluate
 
     def signals(
-        self, reference: Reference, motion: np.ndarray, z: np.ndarray, integral: np.ndarray
+        self,
+        reference: Reference,
+        motion: np.ndarray,
+        z: np.ndarray,
+        integral: np.ndarray,
+        wrenches: np.ndarray | None = None,
     ) -> Signals:
         """`evaluate` without its checks, for many evaluations: numbers that are not finite go through.
 
@@ -215,7 +238,9 @@ class Controller:
         (q, v), cell = motion, self.cell
         space, weights = cell.task, reference.weights
         desired = reference.desired if self._shift is None else self._shift(z, reference)
-        task = space.measure(motion, desired)
+        task, felt = space.measure(motion, desired), None
+        if self.admittance is not None:
+            task, felt = self.admittance.moved(task, z, reference, wrenches)
         w = law.compute_weighted_errors(weights, task.error)
         received = self.network.exchange(reference.t, w, integral)
         errors = Errors(reference.t, task.error, task.motion[1], task.rates, w, received.shares, weights)
@@ -228,72 +253,11 @@ class Controller:
         tau = np.matvec(Y, theta_hat) + feedback  # (13), (32)
         applied = limited(tau, -self.torque_limits, self.torque_limits) if self._cuts else tau
         momentum = partial(momentum_of_all, cell.robots, cell.parameters, q, v)
-        seen = Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Y, tau, applied, momentum)
+        seen = Seen(q, v, v_ref, a_ref, s_q, np.vecmat(s_q, Y), Y, tau, applied, momentum, felt)
         z_dot = self.adaptation.rate(z, seen)
         return Signals(
             reference, task, received, errors, asked, v_ref, a_ref, s_q, Y, tau, theta_hat, z_dot, seen
         )
-
-
-def settings_of(part: Adaptation | Law | Network) -> dict[str, Any]:
-    """Name and settings of a part, by default the name of its type.
-
-    Raises:
-        InputError: its `as_dict` gives no mapping.
-    """
-    settings, where = part.as_dict(), f"{type(part).__qualname__}, as_dict"
-    instance(where, settings, Mapping, "names and settings, for example {'gain': 1.0}")
-    return {"name": type(part).__name__, **settings}
-
-
-def check_parts(law: BoundLaw, network: BoundNetwork, n: int, p: int, m: int) -> None:
-    """Look at what law and network give where there are no errors.
-
-    Args:
-        law, network: for the robots of one cell.
-        n, p, m: numbers of robots, of synchronization errors and of task coordinates.
-
-    Raises:
-        InputError: something of another shape than it should have, or one that fails where there are no
-            errors.
-    """
-    with _named("network", network):
-        memory = network.start()
-        integral = network.integral(memory)
-        received = network.exchange(0.0, np.zeros((2, n, m)), memory)
-    with _named("law", law):
-        asked = law.command(no_errors(n, m))
-    instance(f"network {type(network).__qualname__}, exchange", received, Received, "a Received")
-    instance(f"law {type(law).__qualname__}, command", asked, Asked, "an Asked")
-    _check_shapes("network", network, {
-        "epsilon": (received.epsilon, (p, m)), "epsilon_dot": (received.epsilon_dot, (p, m)),
-        "shares": (received.shares, (3, n, m)), "memory_dot": (received.memory_dot, np.shape(memory)),
-        "integral": (integral, (p, m)),
-    })  # fmt: skip
-    _check_shapes("law", law, {
-        "xref_dot": (asked.xref_dot, (n, m)), "xref_ddot": (asked.xref_ddot, (n, m)),
-        "force": (asked.force, (n, m)),
-    })  # fmt: skip
-
-
-@contextmanager
-def _named(role: str, part: Any) -> Iterator[None]:
-    """Name the part that fails in between."""
-    try:
-        yield
-    except SynctrlError:
-        raise
-    except Exception as error:  # whatever a user's code raises
-        raise InputError(
-            f"expected one that works where there are no errors, found {type(error).__name__}: {error}",
-            subject=f"{role} {type(part).__qualname__}",
-            found=type(error).__name__,
-        ) from error
-
-
-def _check_shapes(role: str, part: Any, parts: Mapping[str, tuple[Any, tuple[int, ...]]]) -> None:
-    for name, (value, shape) in parts.items():
-        shaped(f"{role} {type(part).__qualname__}, {name}", value, shape)
 
 
 __getattr__ = names_elsewhere(__name__, ".laws.sun_mills", "REFERENCE_ACCELERATIONS")

@@ -25,8 +25,6 @@ from .network import Messages
 LATE = 0.1
 #: how far from a sample a message may be that comes with it, as a share of the period
 GRID = 1e-9
-#: periods up to which samples can be told from each other
-LONGEST = 2.0**50
 FAULTS = "error", "hold"
 
 
@@ -102,13 +100,21 @@ class DiscreteController:
         finite_array("q", q, self._shape), finite_array("v", v, self._shape)
         self._start(start)
 
-    def step(self, t: float, q: ArrayLike, v: ArrayLike, desired: ArrayLike | None = None) -> np.ndarray:
+    def step(
+        self,
+        t: float,
+        q: ArrayLike,
+        v: ArrayLike,
+        desired: ArrayLike | None = None,
+        wrenches: ArrayLike | None = None,
+    ) -> np.ndarray:
         """Torque for the period that begins now, (n, nv), N·m; the caller's to keep.
 
         Args:
             t: time, s, within a tenth of a period of the grid that `reset` began.
             q, v: what is measured, (n, nv), rad (or m) and rad/s (or m/s).
             desired: xd, xd', xd'', (3, n, m), as the cell's trajectories give them; by default theirs at t.
+            wrenches: internal wrenches that an admittance needs, see `Controller.evaluate`.
 
         Raises:
             InputError: another shape, or a time that is no number; and, unless faults are held, a measurement
@@ -119,6 +125,7 @@ class DiscreteController:
         """
         time, motion = self._time(t), measured.measurement(q, v, self._shape)
         wanted = None if desired is None else finite_array("desired", desired, (3, self.cell.n, self.cell.m))
+        felt = None if wrenches is None else finite_array("wrenches", wrenches, (self.cell.n, 6))
         missed = self._missed(time)
         fault = self._off_the_grid(time, missed) or measured.not_finite(self.cell, time, motion)
         if fault is not None:
@@ -126,24 +133,25 @@ class DiscreteController:
         with np.errstate(all="ignore"):  # what is not finite is named
             reference = self._reference(time, wanted)
             memory = self._heard(reference, motion, self._samples + missed)
-            signals = self.controller.unchecked(reference, motion, self.z, memory)
+            signals = self.controller.unchecked(reference, motion, self.z, memory, felt)
         measured.check_signals(self.cell, time, signals)
         self._advance(motion[0], memory, signals, missed)
         return self._tau.copy()
 
-    def sample(self, t: float, motion: np.ndarray) -> Signals:
+    def sample(self, t: float, motion: np.ndarray, wrenches: np.ndarray | None = None) -> Signals:
         """What `step` does with a measurement that is in order, for a simulation that watches by itself.
 
         Args:
             t: time of the sample, s.
             motion: joint positions and velocities, (2, n, nv), of which the signals may keep views.
+            wrenches: internal wrenches, (n, 6), if any are measured.
 
         Returns:
             What the law computed, its torque neither cut off nor without gravity.
         """
         reference = self._reference(t)
         memory = self._heard(reference, motion, self._samples)
-        signals = self.controller.unchecked(reference, motion, self.z, memory)
+        signals = self.controller.unchecked(reference, motion, self.z, memory, wrenches)
         self._advance(motion[0], memory, signals)
         return signals
 
@@ -183,7 +191,7 @@ class DiscreteController:
         if new["period"] != self.period:
             own = f"that of the controller, {self.period:g} s"
             raise InputError.expected(own, new["period"], "state, period")
-        samples, held = (_count(name, float(new[name])) for name in ("samples", "held"))
+        samples, held = (measured.whole_number(name, float(new[name])) for name in ("samples", "held"))
         self.z, self.memory, self._tau = (new[k].copy() for k in ("z", self._memory_name, "tau"))
         self._t0, self._samples, self.held = float(new["start"]), samples, held
         self.signals = None
@@ -231,7 +239,7 @@ class DiscreteController:
 
     def _time(self, t: float) -> float:
         time = finite_number("t", t)
-        if not abs(time / self.period - self._t0 / self.period) < LONGEST:
+        if not abs(time / self.period - self._t0 / self.period) < measured.LONGEST:
             near = f"expected a time near the start at {self._t0:g} s"
             raise InputError(f"{near}, found {time:g} s", subject="t", found=time)
         return time
@@ -288,9 +296,3 @@ class DiscreteController:
         self._tau, self.z, self.signals = tau, z, signals
         self.memory = memory + self.period * signals.memory_dot
         self._samples, self.held = self._samples + missed + 1, self.held + missed
-
-
-def _count(name: str, value: float) -> int:
-    if not 0 <= value < LONGEST or value != int(value):
-        raise InputError.expected("a whole number of at least 0", value, f"state, {name}")
-    return int(value)

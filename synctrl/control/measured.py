@@ -32,6 +32,8 @@ from .controller import Controller, Signals
 
 #: bytes of an archive beside its arrays, per array: names, sizes and numpy's header
 OVERHEAD = 1024
+#: periods up to which samples can be told from each other
+LONGEST = 2.0**50
 #: what the package's spaces watch: the kind of error, and what it is about
 _ENDS = {
     "condition": (SingularJacobianError, "condition number of the Jacobian"),
@@ -124,6 +126,17 @@ def check_adaptation(controller: Controller) -> None:
     with suppress(Exception), np.errstate(all="ignore"):
         rate = controller.unchecked(reference, motion, z, controller.network.start()).z_dot
     shaped(f"{where}, rate", rate, z.shape)
+
+
+def whole_number(name: str, value: float) -> int:
+    """A number of a controller's state that counts something.
+
+    Raises:
+        InputError: none that does.
+    """
+    if not 0 <= value < LONGEST or value != int(value):
+        raise InputError.expected("a whole number of at least 0", value, f"state, {name}")
+    return int(value)
 
 
 def write_state(path: str | Path, state: Mapping[str, np.ndarray]) -> Path:

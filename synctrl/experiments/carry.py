@@ -18,7 +18,9 @@ import numpy as np
 from ..assembly.body import CarriedObject, with_share
 from ..assembly.grasp import Fixture, Grasp
 from ..assembly.plant import CarryingPlant
-from ..checks import boolean, choice, finite_array
+from ..assembly.tare import tared
+from ..checks import boolean, choice, finite_array, instance
+from ..control.admittance import Admittance
 from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
@@ -35,6 +37,8 @@ from .parts import ControllerParts, ready_experiment
 from .ur5_payload import DISTANCE, DURATION, POSTURE, hand_on_payload, payload_motion
 from .ur5_payload import GAINS as HANDS_ALONE
 
+Pose = tuple[np.ndarray, np.ndarray]
+"""A position, (3,), m, and an orientation, (3, 3)."""
 PAYLOAD = CarriedObject(
     4.0, (0.03, 0.01, 0.0), 4.0 / 12 * np.array([0.12**2 + 0.12**2, 0.4**2 + 0.12**2, 0.4**2 + 0.12**2]),
     box=(0.4, 0.12, 0.12), center=(0.0, 0.0, 0.0), name="payload",
@@ -59,7 +63,9 @@ def carry_ur5(
     geometric_error: bool | Any = False,
     friction: bool = False,
     push: bool = False,
-    leak: float | bool = 0.0,
+    leak: float | bool | None = None,
+    tare: bool = False,
+    admittance: bool | Admittance = False,
     gains: Gains | None = None,
     **parts: Unpack[ControllerParts],
 ) -> Experiment:
@@ -72,25 +78,23 @@ def carry_ur5(
             how much: displacement, m, and rotation vector, rad, (6,), in the payload's axes.
         friction: whether the joints rub, which the controller does not know.
         push: whether joints 1 to 3 of arm 1 are pushed for half a second.
-        leak: of the integrals of epsilon, 1/s, see `Gains`; True for Lambda.
+        leak: of the integrals of epsilon, 1/s, see `Gains`; True for Lambda, which is the default with an
+            admittance; without one it is 0.
+        tare: whether both arms take over at closure where arm 1 believes the payload, see `tared`.
+        admittance: whether the arms give way to the forces inside, as `Admittance()` does, or how.
 
     Raises:
         InputError: a value that is none of these.
     """
-    fixture = _fixture(grasp)
-    boolean("friction", friction), boolean("push", push)
-    error = GEOMETRIC_ERROR * geometric_error if isinstance(geometric_error, bool) else geometric_error
-    error = finite_array("geometric_error", error, (6,))
-    grasps = [Grasp(i, *hand_on_payload(i), fixture) for i in range(2)]
-    at = _start_of_payload()
-    arms = [_arm(i) for i in range(2)]
-    rubs = FRICTION if friction else Friction()
-    members = [_member(arms[i], grasps[i], at, error * (i == 0), rubs, SHARES_KNOWN[i]) for i in range(2)]
-    cell = Cell(members, Coupling.pair(), PoseSpace(), name="UR5 pair that carries a payload")
-    pushes = [PUSH] * bool(push)
+    boolean("friction", friction), boolean("push", push), boolean("tare", tare)
+    grasps = [Grasp(i, *hand_on_payload(i), _fixture(grasp)) for i in range(2)]
+    at, arms = _start_of_payload(), [_arm(i) for i in range(2)]
+    cell = _cell(arms, grasps, at, _error(geometric_error), friction)
+    cell, pushes, yielding = tared(cell) if tare else cell, [PUSH] * bool(push), _admittance(admittance)
     made = ready_experiment(cell, DURATION, GAINS, gains, synchronized, parts, disturbances=pushes)
     plant = partial(CarryingPlant, body=PAYLOAD, grasps=grasps, at=at, robots=arms, desired=payload_motion())
-    return replace(made, gains=_leaking(made.gains, leak), plant_type=plant)
+    leaking = _leaking(made.gains, yielding is not None if leak is None else leak)
+    return replace(made, gains=leaking, plant_type=plant, admittance=yielding)
 
 
 def _fixture(grasp: str | Fixture) -> Fixture:
@@ -98,6 +102,16 @@ def _fixture(grasp: str | Fixture) -> Fixture:
         choice("grasp", grasp, ("compliant",))
         return Fixture()
     return grasp
+
+
+def _error(given: bool | Any) -> np.ndarray:
+    error = GEOMETRIC_ERROR * given if isinstance(given, bool) else given
+    return finite_array("geometric_error", error, (6,))
+
+
+def _admittance(admittance: bool | Admittance) -> Admittance | None:
+    instance("admittance", admittance, (bool, Admittance), "a bool or an Admittance")
+    return (Admittance() if admittance else None) if isinstance(admittance, bool) else admittance
 
 
 def _leaking(gains: Gains, leak: float | bool) -> Gains:
@@ -109,15 +123,22 @@ def _arm(i: int) -> Robot:
     return load_robot("ur5").placed((side * DISTANCE, 0.0, 0.0), (0.0, 0.0, heading), name=f"UR5 {i + 1}")
 
 
-def _start_of_payload() -> tuple[np.ndarray, np.ndarray]:
+def _start_of_payload() -> Pose:
     desired = payload_motion()(0.0).x
     return desired[:3] - OFFSET[:3], exp(-OFFSET[3:]) @ exp(desired[3:])
+
+
+def _cell(arms: list[Robot], grasps: list[Grasp], at: Pose, error: np.ndarray, friction: bool) -> Cell:
+    """Both arms, of which the first is wrong by `error` about the payload in its hand."""
+    rubs = FRICTION if friction else Friction()
+    members = [_member(arms[i], grasps[i], at, error * (i == 0), rubs, SHARES_KNOWN[i]) for i in range(2)]
+    return Cell(members, Coupling.pair(), PoseSpace(), name="UR5 pair that carries a payload")
 
 
 def _member(
     arm: Robot,
     grasp: Grasp,
-    at: tuple[np.ndarray, np.ndarray],
+    at: Pose,
     error: np.ndarray,
     friction: Friction,
     known: float,

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array, instance
+from ..checks import finite_array, instance, shaped
 from ..control.controller import Controller, Signals
 from ..control.measured import check_adaptation
 from ..control.network import Messages
 from ..coupling.cell import Cell, Reference
-from ..errors import InputError, NonFiniteError
+from ..errors import GainWarning, InputError, NonFiniteError, warn
 from .clock import before
 from .plant import Plant
 
@@ -77,10 +77,12 @@ class ClosedLoop:
     Attributes:
         events: instants at which the plant moves its state, s.
         messages: those of the network.
+        chain: what is proved where the robots hold one object together, see `Plant.chain`.
 
     Raises:
-        InputError: events that are no instants, or parts of one's own that start from no finite numbers or
-            give arrays that do not fit.
+        InputError: events that are no instants, parts of one's own that start from no finite numbers or
+            give arrays that do not fit, an admittance on a plant that measures no wrenches, or robots that
+            cannot hold what they do.
     """
 
     def __init__(self, controller: Controller, plant: Plant):
@@ -97,6 +99,10 @@ class ClosedLoop:
         self.size = self._layout.size
         self.events = finite_array(f"events of the plant {type(plant).__qualname__}", plant.events, (None,))
         self.messages = Messages(self.cell, controller.network)
+        if controller.admittance is not None:
+            felt = plant.felt(self.cell.q0, self.cell.v0, plant.hidden0)
+            shaped(f"plant {type(plant).__qualname__}, felt", felt, (self.cell.n, 6))
+        self.chain = plant.chain(controller)
         self._last = self
         seams = controller.adaptation, controller.law, controller.network
         parts = (controller, *seams, plant, self.cell.space, *self.cell.parameters)
@@ -179,7 +185,13 @@ class ClosedLoop:
 
     def look(self, reference: Reference, state: State) -> Signals:
         """What the controller computes in a state, of which it may keep views."""
-        return self._law(reference, state.motion, state.z, state.memory)
+        return self._law(reference, state.motion, state.z, state.memory, *self.felt(state))
+
+    def felt(self, state: State) -> tuple[np.ndarray, ...]:
+        """Internal wrenches that the plant measures for an admittance, (n, 6); nothing without one."""
+        if self.controller.admittance is None:
+            return ()
+        return (self.plant.felt(state.q, state.v, state.hidden),)
 
     def respond(self, state: State, tau: np.ndarray, disturbance: np.ndarray, rate: State) -> None:
         """Write how the plant moves into `rate`, and leave the rates of the controller's state as they are.
@@ -207,6 +219,11 @@ class ClosedLoop:
         if moved:
             state.z[...] = z
         return moved
+
+    def warn(self) -> None:
+        """Say which conditions of the theorem for a closed chain do not hold, and do harm."""
+        for text in () if self.chain is None else self.chain.warnings:
+            warn(text, GainWarning)
 
     def meet(self, t: float, state: State) -> None:
         """Make the state before the plant's event at time t the one after it.

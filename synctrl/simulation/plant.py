@@ -11,6 +11,7 @@ import numpy as np
 
 from ..checks import choice, instance
 from ..coupling.cell import Cell
+from ..errors import InputError
 from ..robots.forest import forests
 from ..robots.friction import friction_torque
 from ..robots.mechanism import joint_limits
@@ -73,6 +74,8 @@ class Plant:
       method asks at states where the run never comes; what the package's plant does is `super().move(...)`;
     - `outputs`: arrays over time that the result gets beside those of every run, with units and axes; or
       `outputs_along`, if the motion of the robots is needed for them;
+    - `felt`: the internal wrenches that hands measure, if any do;
+    - `chain`: what is proved if the robots hold one object together;
     - `longest_step`: how long a step of "rk4" may be, if that is known beforehand;
     - `report`: what `result.info` says of the state in plain data.
 
@@ -180,6 +183,28 @@ class Plant:
             K_r: damping of the controller in joint space, (n, nv), N·m·s/rad; zeros where it has none there.
         """
         return float("inf")
+
+    def felt(self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray) -> np.ndarray:
+        """Internal wrenches that the hands measure, for an admittance; arguments as of `move`.
+
+        Returns:
+            One row per robot, about the origin of what they hold, in world axes, (n, 6), N and N·m.
+
+        Raises:
+            InputError: this plant measures none.
+        """
+        text = f"an admittance expects a plant that measures wrenches, found {type(self).__qualname__}"
+        raise InputError(text, subject="admittance", found=type(self).__qualname__)
+
+    def chain(self, controller: Any) -> Any:
+        """What theorems say of a controller whose robots hold one object together; None if they do not.
+
+        It has `theorem`, `warnings` and `outside`, see `ClosedChain` of the assembly.
+
+        Raises:
+            InputError: robots and object with which a run of this controller means nothing.
+        """
+        return None
 
     def friction(self, v: np.ndarray) -> np.ndarray:
         """Torque by which friction opposes the velocities v, (n, nv), N·m."""

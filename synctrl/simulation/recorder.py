@@ -142,7 +142,7 @@ ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE = "adaptation_state", "network_stat
 #: further names of entries and outputs that a result gets from elsewhere
 OF_EVERY_RUN = (
     *("status", "outputs", "damping", "limits", "saturation", "step_error", "run", "format"),
-    *(APPLIED, "hedge"),
+    *(APPLIED, "hedge", "admittance"),
 )
 #: how every array is read from a sample and the parts of its state; the last one from int epsilon
 ROW: dict[str, Callable[[Sample, State, np.ndarray], Any]] = {
@@ -223,6 +223,8 @@ def describe_run(loop: ClosedLoop) -> dict[str, Any]:
         "k_r_space": controller.k_r_space,
         "versions": versions(),
     }
+    if controller.admittance_settings is not None:
+        about["admittance"] = controller.admittance_settings
     return {**about, "units": {name: array_unit(about, name) for name in LAYOUT}}
 
 

@@ -55,6 +55,15 @@ class Disturbance:
         finite_number("disturbance, stop", self.stop)  # it has an end, unlike a payload
         window("disturbance", self.start, self.stop)
 
+    def as_dict(self) -> dict[str, Any]:
+        """The same as plain data."""
+        return {
+            "robot": int(self.robot),
+            "torque": self.torque.tolist(),
+            "start": float(self.start),
+            "stop": float(self.stop),
+        }
+
 
 class DisturbanceSchedule(Windows):
     """Torques of all disturbances together, piecewise constant in time.

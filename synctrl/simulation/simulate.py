@@ -24,6 +24,7 @@ import numpy as np
 
 from ..checks import boolean, choice, instance, label, positive_number
 from ..control.adaptation import Adaptation, bounded
+from ..control.admittance import Admittance
 from ..control.controller import Controller
 from ..control.discrete import DiscreteController
 from ..control.gains import Gains
@@ -64,6 +65,7 @@ class Experiment:
             `bounded` if the plant saturates, so that estimates cannot run away.
         law: from errors to reference motion and force; by default `SunMills`.
         network: what the robots know of each other; by default `Ideal`.
+        admittance: how they give way to the forces inside what they hold; by default they do not.
 
     Raises:
         InputError: a part that is none, does not fit the others, or gives arrays that do not fit the cell.
@@ -82,6 +84,7 @@ class Experiment:
     adaptation: Adaptation | None = None
     law: Law | None = None
     network: Network | None = None
+    admittance: Admittance | None = None
 
     def __post_init__(self) -> None:
         instance("cell", self.cell, Cell, "a Cell")
@@ -103,6 +106,7 @@ class Experiment:
             adaptation=adaptation,
             law=self.law,
             network=self.network,
+            admittance=self.admittance,
             torque_limits=torque_limits(self.cell) if self.saturate else None,
             reference_acceleration=self.reference_acceleration,
             k_r_space=self.k_r_space,
@@ -152,7 +156,7 @@ class Experiment:
 
         Warns:
             SaturationWarning, StepWarning: torque was cut off; the step of "rk4" was too long.
-            RobotWarning: a robot's description states friction, and nobody says whether it acts.
+            GainWarning, RobotWarning: forces inside an object may grow; nobody says if stated friction acts.
         """
         run = self.plan(duration, dt, control_period, plant, log_dt)
         return _carry_out(run, integrator, engine, (rtol, atol), progress)
@@ -204,7 +208,7 @@ class Experiment:
         info["control_period"] = control_period
         info["start"] = list(self.cell.starts)
         info["friction"] = [member.friction_from for member in self.cell.members]
-        info["disturbances"] = [_describe(d) for d in self.disturbances]
+        info["disturbances"] = [disturbance.as_dict() for disturbance in self.disturbances]
         info["payloads"] = [payload.as_dict() for payload in self.payloads]
         events = [float(t) for t in np.sort(loop.events) if 0 <= t < clock.end - TIE * dt]
         info["events"] = [{"t": t, "part": type(loop.plant).__qualname__} for t in events]
@@ -228,6 +232,7 @@ def simulate(
     adaptation: Adaptation | None = None,
     law: Law | None = None,
     network: Network | None = None,
+    admittance: Admittance | None = None,
     engine: str | Engine = "pinocchio",
     plant: str = "pinocchio",
     control_period: float | None = None,
@@ -268,6 +273,7 @@ def _carry_out(
         run.check_step()
     run.check()
     warn_of_unasked_friction(run.experiment.cell)
+    run.loop.warn()
     result = run_adaptive(run, integrator, rtol, atol, progress) if adaptive else by.run(run, progress)
     warn_of_step(result.info["step_error"], result.names, run.info["dt"])
     warn_of_saturation(result)
@@ -281,15 +287,6 @@ def _needs_rk4(integrator: str, engine: str | Engine, control_period: float | No
     if control_period is not None:
         expected = "sampled control needs the integrator 'rk4'"
         raise InputError(f"{expected}, found {integrator!r}", subject="control_period", found=integrator)
-
-
-def _describe(disturbance: Disturbance) -> dict[str, Any]:
-    return {
-        "robot": int(disturbance.robot),
-        "torque": disturbance.torque.tolist(),
-        "start": float(disturbance.start),
-        "stop": float(disturbance.stop),
-    }
 
 
 __getattr__ = names_elsewhere(__name__, ".engines", "run_reference")

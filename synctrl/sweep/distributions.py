@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..checks import finite_number, positive_number
-from ..control.controller import settings_of
+from ..control.parts import settings_of
 from ..errors import InputError
 from ..renamed import names_elsewhere
 

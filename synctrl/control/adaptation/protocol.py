@@ -40,6 +40,7 @@ class Seen:
         tau: torque that the controller asks for, (n, nv), N·m.
         applied: what the limits that it knows leave of it, (n, nv), N·m.
         momentum: gives the regressors of momentum; a function, because they take time and few ask for them.
+        wrench: internal wrenches in the axes of the desired poses, (n, 6), N and N·m, if they are measured.
     """
 
     q: np.ndarray
@@ -52,6 +53,7 @@ class Seen:
     tau: np.ndarray
     applied: np.ndarray
     momentum: Callable[[], Momentum] = _unknown
+    wrench: np.ndarray | None = None
 
 
 class BoundAdaptation(Protocol):

@@ -1,0 +1,93 @@
+"""A tare of the grasps: at closure all arms take over where one of them believes the object."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from refusals import refused
+
+from synctrl.assembly.tare import believed_poses, disagreement, tared
+from synctrl.errors import InputError
+from synctrl.experiments import carry_ur5
+from synctrl.tasks.inverse_kinematics import reach
+from synctrl.tasks.pose import PoseSpace
+from synctrl.tasks.rotations import exp, log
+
+ERRORS = st.lists(st.floats(-0.02, 0.02), min_size=6, max_size=6)
+
+
+def first_epsilon(**options) -> np.ndarray:
+    run = carry_ur5(**options).simulate(0.01, dt=1e-3)
+    return run.sync_error[0, 0]
+
+
+def test_arms_disagree_by_the_geometric_error_and_with_a_tare_not_at_all():
+    error = np.array([1e-3, 0.0, 0.0, 0.0, np.deg2rad(0.5), 0.0])
+    apart = disagreement(carry_ur5(geometric_error=True).cell)[1]
+    np.testing.assert_allclose(np.linalg.norm(apart[:3]), np.linalg.norm(error[:3]), rtol=1e-5)
+    np.testing.assert_allclose(np.linalg.norm(apart[3:]), np.linalg.norm(error[3:]), rtol=1e-5)
+    assert np.abs(disagreement(carry_ur5(geometric_error=True, tare=True).cell)).max() < 1e-12
+    assert np.abs(first_epsilon(geometric_error=True)).max() > 5e-4
+    assert np.abs(first_epsilon(geometric_error=True, tare=True)).max() < 1e-12
+
+
+@settings(max_examples=5)
+@given(ERRORS, ERRORS)
+def test_after_a_tare_beliefs_agree_wherever_hands_carry_the_object_rigidly(error, moved):
+    """A constant error of a grasp vanishes for good, for the hands move as one."""
+    experiment = carry_ur5(geometric_error=np.array(error), tare=True)
+    kept, cell = experiment.plant_type.keywords, experiment.cell
+    (p, R), moved = kept["at"], np.array(moved)
+    p, R = p + moved[:3], exp(10 * moved[3:]) @ R
+    tips = []
+    for grasp, arm, robot, q0 in zip(kept["grasps"], kept["robots"], cell.robots, cell.q0, strict=True):
+        hand = np.concatenate((p + R @ grasp.xyz, log(R @ grasp.rotation)))
+        tips.append(robot.tip_pose(reach(arm, hand, q0, PoseSpace())))
+    np.testing.assert_allclose(tips[0].homogeneous, tips[1].homogeneous, atol=1e-6)
+
+
+def test_whose_belief_is_taken_over_can_be_said():
+    cell = carry_ur5(geometric_error=True).cell
+    before = believed_poses(cell)
+    for by in range(2):
+        places, turns = believed_poses(tared(cell, by))
+        np.testing.assert_allclose(places, [before[0][by]] * 2, atol=1e-12)
+        np.testing.assert_allclose(turns, [before[1][by]] * 2, atol=1e-12)
+
+
+def test_a_tare_of_exact_grasps_changes_what_rounding_may():
+    runs = [carry_ur5(tare=tare).simulate(0.05, dt=1e-3) for tare in (False, True)]
+    np.testing.assert_allclose(runs[1].q, runs[0].q, atol=1e-9)
+
+
+def test_with_a_tare_the_force_inside_is_that_of_exact_geometry():
+    """What is left of a millimetre is where the payload is led, which is the same for both hands."""
+
+    def force(**options) -> np.ndarray:
+        run = carry_ur5(**options).simulate(0.4, dt=2e-3, log_dt=0.02)
+        return np.linalg.norm(run.outputs["internal_force"][:, 0, :3], axis=1)
+
+    error = np.array([1e-3, 0.0, 0.0, 0.0, 0.0, 0.0])
+    exact, wrong, tare = force(), force(geometric_error=error), force(geometric_error=error, tare=True)
+    assert np.abs(tare - exact).max() < 0.1 * np.abs(wrong - exact).max()
+
+
+def test_what_cannot_be_tared_is_refused():
+    cell = carry_ur5().cell
+    with refused(InputError, "cell"):
+        tared(cell.members)
+    with refused(InputError, "by", found=2):
+        tared(cell, 2)
+    with refused(InputError, "tare"):
+        carry_ur5(tare=1)
+
+
+@pytest.mark.parametrize("by", [0, 1])
+def test_a_tare_leaves_loads_starts_and_names_as_they_are(by):
+    cell = carry_ur5(geometric_error=True).cell
+    after = tared(cell, by)
+    assert np.array_equal(after.q0, cell.q0) and after.names == cell.names and after.name == cell.name
+    np.testing.assert_allclose(after.theta, cell.theta, atol=1e-12)
+    assert np.array_equal(after.theta_hat0, cell.theta_hat0)
