@@ -91,9 +91,13 @@ class CarryingPlant(Plant):
         self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray, t: np.ndarray
     ) -> dict[str, Output]:
         """Pose, twist and desired motion of the object, and wrenches of the hands on it, all over time."""
+        h = [self._wrenches(*row)[0] for row in zip(q, v, hidden, strict=True)]
+        return self._told(np.array(h), hidden, t)
+
+    def _told(self, h: np.ndarray, hidden: np.ndarray, t: np.ndarray) -> dict[str, Output]:
+        """`outputs_along` with the wrenches of the hands, (T, k, 6), at their grasps."""
         pose, nu = hidden[:, :7].copy(), hidden[:, 7:].copy()
         pose[:, 3:] /= np.linalg.norm(pose[:, 3:], axis=1, keepdims=True)
-        h = np.array([self._wrenches(*row)[0] for row in zip(q, v, hidden, strict=True)])
         h = h.reshape(len(hidden), len(self.grasps), 6)
         place, forces = "m, and a unit quaternion", "N, N·m"
         along, at_hands = ("time", "coordinate"), ("time", "grasp", "coordinate")

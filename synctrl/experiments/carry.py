@@ -18,6 +18,7 @@ import numpy as np
 from ..assembly.body import CarriedObject, with_share
 from ..assembly.grasp import Fixture, Grasp
 from ..assembly.plant import CarryingPlant
+from ..assembly.rigid import RigidPlant
 from ..checks import boolean, choice, finite_array
 from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
@@ -67,7 +68,7 @@ def carry_ur5(
 
     Args:
         synchronized, gains, parts: see `ready_experiment`.
-        grasp: "compliant" for the fixtures of the cell, or a `Fixture`.
+        grasp: "compliant" for the fixtures of the cell, "rigid" for none that gives, or a `Fixture`.
         geometric_error: whether arm 1 is wrong about where it holds the payload, by 1 mm and 0.5 deg, or by
             how much: displacement, m, and rotation vector, rad, (6,), in the payload's axes.
         friction: whether the joints rub, which the controller does not know.
@@ -77,7 +78,7 @@ def carry_ur5(
     Raises:
         InputError: a value that is none of these.
     """
-    fixture = _fixture(grasp)
+    fixture, kind = _held(grasp)
     boolean("friction", friction), boolean("push", push)
     error = GEOMETRIC_ERROR * geometric_error if isinstance(geometric_error, bool) else geometric_error
     error = finite_array("geometric_error", error, (6,))
@@ -89,15 +90,16 @@ def carry_ur5(
     cell = Cell(members, Coupling.pair(), PoseSpace(), name="UR5 pair that carries a payload")
     pushes = [PUSH] * bool(push)
     made = ready_experiment(cell, DURATION, GAINS, gains, synchronized, parts, disturbances=pushes)
-    plant = partial(CarryingPlant, body=PAYLOAD, grasps=grasps, at=at, robots=arms, desired=payload_motion())
+    plant = partial(kind, body=PAYLOAD, grasps=grasps, at=at, robots=arms, desired=payload_motion())
     return replace(made, gains=_leaking(made.gains, leak), plant_type=plant)
 
 
-def _fixture(grasp: str | Fixture) -> Fixture:
-    if not isinstance(grasp, Fixture):
-        choice("grasp", grasp, ("compliant",))
-        return Fixture()
-    return grasp
+def _held(grasp: str | Fixture) -> tuple[Fixture, type[CarryingPlant]]:
+    """Fixtures, and the kind of plant that has them."""
+    if isinstance(grasp, Fixture):
+        return grasp, CarryingPlant
+    kinds = {"compliant": CarryingPlant, "rigid": RigidPlant}
+    return Fixture(), kinds[choice("grasp", grasp, tuple(kinds))]
 
 
 def _leaking(gains: Gains, leak: float | bool) -> Gains:

@@ -44,7 +44,7 @@ class Forest:
     def __init__(self, robots: Sequence[Robot], maps: np.ndarray | None = None):
         self.robots, self._maps = tuple(robots), maps
         self.n, self.nv = len(robots), robots[0].nv
-        self._model, tips = _side_by_side(robots)
+        self._model, tips = side_by_side(robots)
         self._weightless = pin.Model(self._model)
         self._weightless.gravity.setZero()
         self._scratch = PerThread(partial(_Scratch, self._model, tips, self.n))
@@ -207,7 +207,7 @@ def _size(robot: Robot) -> tuple[Any, ...]:
     return robot.nv, robot.model.nq, robot.body_count, tuple(robot.gravity_vector.tolist())
 
 
-def _side_by_side(robots: Sequence[Robot]) -> tuple[pin.Model, list[int]]:
+def side_by_side(robots: Sequence[Robot]) -> tuple[pin.Model, list[int]]:
     """One model with a tree per robot, and the frames of their tips."""
     model, tips = pin.Model(), []
     model.gravity = robots[0].model.gravity
