@@ -15,8 +15,7 @@ from functools import partial
 import numpy as np
 import pinocchio as pin
 
-from ..errors import InputError
-from .forest import side_by_side
+from .forest import common_gravity, side_by_side
 from .model import PerThread
 from .robot import Robot
 
@@ -50,7 +49,8 @@ class ClosedChain:
         joints = np.array([robot.nv for robot in robots])
         #: which entries of (n, nv) are joints
         self._mask = np.arange(joints.max()) < joints[:, None]
-        self._model, tips = side_by_side(_in_one_gravity(robots))
+        common_gravity(robots)
+        self._model, tips = side_by_side(robots)
         free = self._model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "body")
         self._model.appendBodyToJoint(free, pin.Inertia.FromDynamicParameters(body), pin.SE3.Identity())
         self._loops = pin.StdVec_RigidConstraintModel()
@@ -110,16 +110,3 @@ def _loop(model: pin.Model, tip: int, place: pin.SE3, body: int) -> pin.RigidCon
     loop = pin.RigidConstraintModel(kind, model, frame.parentJoint, carried, body, origin, axes)
     loop.setBaumgarteCorrectorParameters(pin.BaumgarteCorrectorParameters(STIFFNESS, DAMPING))
     return loop
-
-
-def _in_one_gravity(robots: Sequence[Robot]) -> Sequence[Robot]:
-    expected = robots[0].gravity_vector
-    for robot in robots:
-        if not np.array_equal(robot.gravity_vector, expected):
-            raise InputError(
-                f"expected robots that hold one body in one gravity, {expected.tolist()} m/s^2, found "
-                f"{robot.gravity_vector.tolist()}",
-                subject=f"robot '{robot.name}'",
-                found=robot.gravity_vector.tolist(),
-            )
-    return robots

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 import pinocchio as pin
 
+from ..errors import InputError
 from .model import PerThread
 from .robot import Robot
 
@@ -200,6 +201,23 @@ def as_selection(indices: Sequence[int]) -> Selection:
     step = others[0] - first if others else 1
     even = range(first, indices[-1] + 1, step)
     return slice(even.start, even.stop, step) if list(even) == list(indices) else np.array(indices)
+
+
+def common_gravity(robots: Sequence[Robot]) -> np.ndarray:
+    """The gravity that all robots have, (3,), m/s^2.
+
+    Raises:
+        InputError: robots in different gravity.
+    """
+    expected = robots[0].gravity_vector
+    for robot in robots:
+        found = robot.gravity_vector.tolist()
+        if found != expected.tolist():
+            text = (
+                f"expected one gravity, that of '{robots[0].name}', {expected.tolist()} m/s^2, found {found}"
+            )
+            raise InputError(text, subject=f"robot '{robot.name}'", found=found)
+    return expected
 
 
 def _size(robot: Robot) -> tuple[Any, ...]:
