@@ -7,23 +7,82 @@ too, see `robots/closed_chain.py`, and jump where these do.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 
 from ..errors import InputError
 from ..robots.closed_chain import ClosedChain
-from ..simulation.plant import Output
+from ..simulation.plant import Dynamics, Output
 from .body import pose_rate
+from .forces import internal_wrenches
 from .grasp import grasp_matrix
+from .judge import Motion, WeldedChain
 from .plant import CLOSED, CarryingPlant
 
 #: a hand can move in all directions if the condition of its Jacobian, in m and rad, is below this
 REGULAR = 1e4
 
 
-class RigidPlant(CarryingPlant):
+class Chain(Protocol):
+    """Arms and the object that they hold as one mechanism."""
+
+    def motion(
+        self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, pose: np.ndarray, nu: np.ndarray
+    ) -> Motion:
+        """See `ClosedChain.motion`."""
+
+
+class ChainPlant(CarryingPlant):
+    """`CarryingPlant` in which one library moves arms and object at once; which one, subclasses say."""
+
+    def prepare(self) -> Dynamics:
+        self._chain  # noqa: B018 (made here)
+        return super().prepare()
+
+    def move(
+        self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, hidden: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        v_dot, nu_dot, _ = self._moved(q, v, tau, hidden)
+        return v_dot, np.concatenate((pose_rate(hidden[:7], hidden[7:]), nu_dot))
+
+    def outputs_under(
+        self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray, t: np.ndarray, tau: np.ndarray
+    ) -> dict[str, Output]:
+        """What `CarryingPlant.outputs_along` has."""
+        rows = zip(q, v, tau, hidden, strict=True)
+        wrenches = [self.at(instant)._moved(*row)[2] for instant, row in zip(t, rows, strict=True)]
+        levers = self._levers(hidden)
+        about_origin = np.array(wrenches).reshape(*levers.shape[:2], 6)
+        h = np.linalg.solve(grasp_matrix(levers), about_origin[..., None])[..., 0]
+        return self._told(h, internal_wrenches(h, levers), hidden, t)
+
+    # -- internals ----------------------------------------------------------------------------------------
+
+    @cached_property
+    def _chain(self) -> Chain:
+        """Arms and object as they are now."""
+        return self._make_chain()
+
+    def _make_chain(self) -> Chain:
+        raise NotImplementedError
+
+    def _moved(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, hidden: np.ndarray) -> Motion:
+        """v', nu', and the wrenches of the hands about the object's origin."""
+        pose, nu = hidden[:7].copy(), hidden[7:]
+        pose[3:] /= np.linalg.norm(pose[3:])
+        return self._chain.motion(q, v, tau - self.friction(v) if self.rubs else tau, pose, nu)
+
+    def _stage(self, window: int) -> Self:
+        stage = super()._stage(window)
+        vars(stage).pop("_chain", None)
+        return stage
+
+
+class RigidPlant(ChainPlant):
     """`CarryingPlant` whose grasps do not give, whatever they say of their compliance.
+
+    Pinocchio computes it, or MuJoCo as a judge, whose welds give a little, see `judge.py`.
 
     Raises:
         InputError: as `CarryingPlant`; a hand that cannot move in all six directions; hands that do not move
@@ -38,22 +97,6 @@ class RigidPlant(CarryingPlant):
         """Grasps that do not give set no limit."""
         return float("inf")
 
-    def move(
-        self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, hidden: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        v_dot, nu_dot, _ = self._moved(q, v, tau, hidden)
-        return v_dot, np.concatenate((pose_rate(hidden[:7], hidden[7:]), nu_dot))
-
-    def outputs_under(
-        self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray, t: np.ndarray, tau: np.ndarray
-    ) -> dict[str, Output]:
-        """What `CarryingPlant.outputs_along` has."""
-        rows = zip(q, v, tau, hidden, strict=True)
-        h = [self.at(instant)._moved(*row)[2] for instant, row in zip(t, rows, strict=True)]
-        wrenches = np.array(h).reshape(len(t), len(self.grasps), 6)
-        G = grasp_matrix(self._levers(hidden))
-        return self._told(np.linalg.solve(G, wrenches[..., None])[..., 0], hidden, t)
-
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         about = super().report(hidden)
         held = [{name: grasp[name] for name in ("robot", "arm")} for grasp in about["grasps"]]
@@ -61,21 +104,13 @@ class RigidPlant(CarryingPlant):
 
     # -- internals ----------------------------------------------------------------------------------------
 
-    @cached_property
-    def _chain(self) -> ClosedChain:
-        """Arms and object as they are now."""
-        return ClosedChain(self.robots, self._hands.tolist(), self.body.parameters, (self.arms, self.turned))
-
-    def _moved(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, hidden: np.ndarray) -> tuple:
-        """v', nu', and the wrenches of the hands about the object's origin."""
-        pose, nu = hidden[:7].copy(), hidden[7:]
-        pose[3:] /= np.linalg.norm(pose[3:])
-        return self._chain.motion(q, v, tau - self.friction(v) if self.rubs else tau, pose, nu)
-
-    def _stage(self, window: int) -> Self:
-        stage = super()._stage(window)
-        vars(stage).pop("_chain", None)
-        return stage
+    def _make_chain(self) -> Chain:
+        hands, places = self._hands.tolist(), (self.arms, self.turned)
+        made: dict[str, Any] = {
+            "pinocchio": lambda: ClosedChain(self.robots, hands, self.body.parameters, places),
+            "mujoco": lambda: WeldedChain(self.robots, hands, self.body, places),
+        }
+        return made[self.physics]()
 
     def _check_hands(self) -> None:
         """Refuse hands that cannot follow every motion of the object, and those that do not at t = 0."""

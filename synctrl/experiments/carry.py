@@ -9,6 +9,7 @@ paper's.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any, Unpack
@@ -17,6 +18,7 @@ import numpy as np
 
 from ..assembly.body import CarriedObject, with_share
 from ..assembly.grasp import Fixture, Grasp
+from ..assembly.judged import fixture_plant
 from ..assembly.plant import CarryingPlant
 from ..assembly.rigid import RigidPlant
 from ..checks import boolean, choice, finite_array
@@ -94,11 +96,11 @@ def carry_ur5(
     return replace(made, gains=_leaking(made.gains, leak), plant_type=plant)
 
 
-def _held(grasp: str | Fixture) -> tuple[Fixture, type[CarryingPlant]]:
-    """Fixtures, and the kind of plant that has them."""
+def _held(grasp: str | Fixture) -> tuple[Fixture, Callable[..., CarryingPlant]]:
+    """Fixtures, and what makes a plant that has them."""
     if isinstance(grasp, Fixture):
-        return grasp, CarryingPlant
-    kinds = {"compliant": CarryingPlant, "rigid": RigidPlant}
+        return grasp, fixture_plant
+    kinds = {"compliant": fixture_plant, "rigid": RigidPlant}
     return Fixture(), kinds[choice("grasp", grasp, tuple(kinds))]
 
 
