@@ -154,7 +154,7 @@ def test_robots_without_a_description_and_tips_that_are_no_links_are_refused():
     joint = Robot(robot.model, "wrist_3_joint", name="joint", document=robot.document)
     with refused(InputError, "plant='mujoco', robot 'joint'", found="wrist_3_joint"):
         judged(joint).prepare()
-    assert isinstance(judged(robot)._chain._data, PerThread)
+    assert isinstance(judged(robot)._mover._data, PerThread)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -163,7 +163,7 @@ def test_thin_plates_are_objects_to_mujoco_whichever_way_they_are_turned(seed):
     R = exp(np.random.default_rng(seed).normal(size=3))
     plate = CarriedObject(2.0, inertia=R @ np.diag([0.02, 0.03, 0.05]) @ R.T)
     plant = judged(robot, plate)
-    model = plant._chain.model
+    model = plant._mover.model
     axes = np.zeros(9)
     pytest.importorskip("mujoco").mju_quat2Mat(axes, model.body("object").iquat)
     axes = axes.reshape(3, 3)

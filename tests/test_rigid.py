@@ -20,7 +20,7 @@ from synctrl.assembly.rigid import RigidPlant
 from synctrl.errors import InputError
 from synctrl.experiments import carry_ur5
 from synctrl.experiments.carry import PAYLOAD
-from synctrl.robots.closed_chain import ClosedChain
+from synctrl.robots.rigid_chain import RigidChain
 from synctrl.tasks.measurement import Tips
 from synctrl.tasks.poses import AxisRotation, PoseTrajectory
 from synctrl.tasks.rotations import exp, skew
@@ -63,8 +63,8 @@ class Held:
             v = rest + there @ (G_i.T @ self.nu - J[i, :, : self.joints[i]] @ rest)
             self.v[i, : self.joints[i]] = v
 
-    def chain(self) -> ClosedChain:
-        return ClosedChain(self.robots, self.hands, BODY.parameters, self.places)
+    def chain(self) -> RigidChain:
+        return RigidChain(self.robots, self.hands, BODY.parameters, self.places)
 
     @property
     def state(self):
@@ -146,7 +146,7 @@ def test_robots_in_different_gravity_hold_nothing_together():
     model.gravity.linear = np.zeros(3)
     floating = type(held.robots[1])(model, held.robots[1].tip, name="floating")
     with refused(InputError, "robot 'floating'", found=(0.0, 0.0, 0.0)):
-        ClosedChain([held.robots[0], floating], held.hands, BODY.parameters, held.places)
+        RigidChain([held.robots[0], floating], held.hands, BODY.parameters, held.places)
 
 
 # -- the plant --------------------------------------------------------------------------------------------
@@ -320,6 +320,13 @@ def test_fixtures_come_closer_to_grasps_that_do_not_give_the_stiffer_they_are():
 def test_the_compiled_engine_refuses_grasps_that_do_not_give_by_name():
     with refused(InputError, "plant", found="synctrl.assembly.rigid.RigidPlant"):
         carry_ur5(grasp="rigid").simulate(0.01, engine="compiled")
+
+
+def test_an_admittance_is_refused_since_its_force_would_depend_on_its_own_torque():
+    experiment = carry_ur5(grasp="rigid")
+    plant = experiment.closed_loop().plant
+    with refused(InputError, "admittance", found="rigid"):
+        plant.felt(experiment.cell.q0, experiment.cell.v0, plant.hidden0)
 
 
 def test_a_hand_off_its_place_is_refused():

@@ -82,7 +82,7 @@ class JudgedChain:
     def _written(
         self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, pose: np.ndarray, nu: np.ndarray
     ) -> Any:
-        """MuJoCo's data in a state, with torques, and with kinematics computed; see `ClosedChain.motion`."""
+        """MuJoCo's data in a state, with torques, and with kinematics computed; see `RigidChain.motion`."""
         data, mask = self._data.own, self._mask
         data.qpos[self._qpos], data.qpos[self._pose] = q[mask], pose[[0, 1, 2, 6, 3, 4, 5]]
         self._mujoco.mj_kinematics(self.model, data)
@@ -117,7 +117,7 @@ class WeldedChain(JudgedChain):
     def motion(
         self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, pose: np.ndarray, nu: np.ndarray
     ) -> Motion:
-        """See `ClosedChain.motion`."""
+        """See `RigidChain.motion`."""
         data = self._written(q, v, tau, pose, nu)
         v_dot, nu_dot = self._accelerations(data)
         rows = data.efc_J.reshape(data.nefc, -1)[:, self._twist] * data.efc_force[:, None]
@@ -152,7 +152,7 @@ class SprungChain(JudgedChain):
     def motion(
         self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, pose: np.ndarray, nu: np.ndarray
     ) -> Motion:
-        """See `ClosedChain.motion`."""
+        """See `RigidChain.motion`."""
         data = self._written(q, v, tau, pose, nu)
         h = np.array([self._push(data, k) for k in range(self._count)])
         return *self._accelerations(data), h

@@ -8,13 +8,13 @@ from ..checks import choice
 from ..coupling.cell import Cell
 from .judge import SprungChain
 from .plant import CarryingPlant
-from .rigid import Chain, ChainPlant
+from .rigid import ChainPlant, Mover
 
 
 class JudgedPlant(ChainPlant):
     """`CarryingPlant` of which MuJoCo computes all: arms, object, and where the fixtures' hands are."""
 
-    def _make_chain(self) -> Chain:
+    def _make_mover(self) -> Mover:
         parts = self.robots, self._hands.tolist(), self.body, (self.arms, self.turned)
         return SprungChain(self.K, self.D, *parts)
 

@@ -1,7 +1,7 @@
 """Robots that hold an object in grasps that do not give: arms and object are one mechanism with loops.
 
 The wrenches of the hands are no function of the state, as those of fixtures are: they follow from the torques
-too, see `robots/closed_chain.py`, and jump where these do.
+too, see `robots/rigid_chain.py`, and jump where these do.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from ..errors import InputError
-from ..robots.closed_chain import ClosedChain
+from ..robots.rigid_chain import RigidChain
 from ..simulation.plant import Dynamics, Output
 from .body import pose_rate
 from .forces import internal_wrenches
@@ -24,20 +24,20 @@ from .plant import CLOSED, CarryingPlant
 REGULAR = 1e4
 
 
-class Chain(Protocol):
+class Mover(Protocol):
     """Arms and the object that they hold as one mechanism."""
 
     def motion(
         self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, pose: np.ndarray, nu: np.ndarray
     ) -> Motion:
-        """See `ClosedChain.motion`."""
+        """See `RigidChain.motion`."""
 
 
 class ChainPlant(CarryingPlant):
     """`CarryingPlant` in which one library moves arms and object at once; which one, subclasses say."""
 
     def prepare(self) -> Dynamics:
-        self._chain  # noqa: B018 (made here)
+        self._mover  # noqa: B018 (made here)
         return super().prepare()
 
     def move(
@@ -60,22 +60,22 @@ class ChainPlant(CarryingPlant):
     # -- internals ----------------------------------------------------------------------------------------
 
     @cached_property
-    def _chain(self) -> Chain:
+    def _mover(self) -> Mover:
         """Arms and object as they are now."""
-        return self._make_chain()
+        return self._make_mover()
 
-    def _make_chain(self) -> Chain:
+    def _make_mover(self) -> Mover:
         raise NotImplementedError
 
     def _moved(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, hidden: np.ndarray) -> Motion:
         """v', nu', and the wrenches of the hands about the object's origin."""
         pose, nu = hidden[:7].copy(), hidden[7:]
         pose[3:] /= np.linalg.norm(pose[3:])
-        return self._chain.motion(q, v, tau - self.friction(v) if self.rubs else tau, pose, nu)
+        return self._mover.motion(q, v, tau - self.friction(v) if self.rubs else tau, pose, nu)
 
     def _stage(self, window: int) -> Self:
         stage = super()._stage(window)
-        vars(stage).pop("_chain", None)
+        vars(stage).pop("_mover", None)
         return stage
 
 
@@ -91,11 +91,23 @@ class RigidPlant(ChainPlant):
 
     def __init__(self, *args: Any, **options: Any):
         super().__init__(*args, **options)
+        del self.K, self.D  # nothing gives
         self._check_hands()
 
     def longest_step(self, K_r: np.ndarray) -> float:
         """Grasps that do not give set no limit."""
         return float("inf")
+
+    def felt(self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray) -> np.ndarray:
+        """Nothing: wrenches here follow from the torques that a controller would make of them.
+
+        Raises:
+            InputError: always.
+        """
+        text = (
+            "an admittance expects grasps that give, whose wrenches do not depend on torque, found rigid ones"
+        )
+        raise InputError(text, subject="admittance", found="rigid")
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         about = super().report(hidden)
@@ -104,10 +116,10 @@ class RigidPlant(ChainPlant):
 
     # -- internals ----------------------------------------------------------------------------------------
 
-    def _make_chain(self) -> Chain:
+    def _make_mover(self) -> Mover:
         hands, places = self._hands.tolist(), (self.arms, self.turned)
         made: dict[str, Any] = {
-            "pinocchio": lambda: ClosedChain(self.robots, hands, self.body.parameters, places),
+            "pinocchio": lambda: RigidChain(self.robots, hands, self.body.parameters, places),
             "mujoco": lambda: WeldedChain(self.robots, hands, self.body, places),
         }
         return made[self.physics]()

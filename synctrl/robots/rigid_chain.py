@@ -23,7 +23,7 @@ from .robot import Robot
 STIFFNESS, DAMPING = 100.0, 20.0
 
 
-class ClosedChain:
+class RigidChain:
     """Robots that hold a free body by hands that do not give.
 
     Every thread that uses it has scratch memory of its own.
