@@ -13,6 +13,8 @@ import pytest
 from refusals import refused
 
 from synctrl import CartesianSpace, Cell, Coupling, Experiment, Gains, Hold, Member, Payload, load_robot
+from synctrl.analysis import certify
+from synctrl.analysis.lyapunov import lyapunov
 from synctrl.assembly.body import CarriedObject, place_of, pose_of
 from synctrl.assembly.grasp import Fixture, Grasp, grasp_matrix
 from synctrl.assembly.plant import CLOSED, CarryingPlant
@@ -277,6 +279,13 @@ def test_forces_inside_have_no_power_through_velocity_errors_if_geometry_is_exac
     assert np.linalg.norm(inner[..., :3], axis=2).min() > 5.0
     power = np.sum(speed * inner, axis=(1, 2))
     assert np.abs(power).max() < 1e-8 < 1.0 < np.abs(speed * inner).sum(axis=(1, 2)).max()
+
+
+def test_the_certificate_finds_that_power_too_and_a_lyapunov_function_that_only_falls():
+    certificate = certify(closed())
+    V = lyapunov(closed()).V
+    assert (np.diff(V) < 1e-12 * V[0]).all() and V[-1] < 0.9 * V[0]
+    assert all("RigidPlant" in reason for reason in certificate.outside)
 
 
 def test_in_a_rigid_loop_of_exact_geometry_synchronization_does_nothing():
