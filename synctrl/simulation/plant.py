@@ -72,9 +72,10 @@ class Plant:
     - `move`: accelerations and the rate of that state, (k,), both finite and without side effects, for a
       method asks at states where the run never comes; what the package's plant does is `super().move(...)`;
     - `outputs`: arrays over time that the result gets beside those of every run, with units and axes; or
-      `outputs_along`, if the motion of the robots is needed for them, or `outputs_under`, if torque is too;
+      `outputs_along`, if the motion of the robots is needed for them;
     - `longest_step`: how long a step of "rk4" may be, if that is known beforehand;
-    - `report`: what `result.info` says of the state in plain data.
+    - `report`: what `result.info` says of the state in plain data;
+    - `outputs_under` in the place of `outputs_along`, if torque is needed for outputs too.
 
     Nothing else is asked of it. The state is logged as `outputs["plant_state"]`, so that a run can be gone
     through again; a certificate names the plant beside the power of what it does and the model does not.
