@@ -12,7 +12,18 @@ import pinocchio as pin
 import pytest
 from refusals import refused
 
-from synctrl import CartesianSpace, Cell, Coupling, Experiment, Gains, Hold, Member, Payload, load_robot
+from synctrl import (
+    CartesianSpace,
+    Cell,
+    Coupling,
+    Disturbance,
+    Experiment,
+    Gains,
+    Hold,
+    Member,
+    Payload,
+    load_robot,
+)
 from synctrl.analysis import certify
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.assembly.body import CarriedObject, place_of, pose_of
@@ -355,6 +366,23 @@ def test_an_admittance_is_refused_since_its_force_would_depend_on_its_own_torque
         plant.felt(experiment.cell.q0, experiment.cell.v0, plant.hidden0)
 
 
+def test_pushes_friction_samples_and_limits_act_on_a_rigid_loop_and_are_seen_in_its_wrenches():
+    push = Disturbance(0, np.full(6, 15.0), 0.004, 0.02)
+    experiment = replace(carry_ur5(grasp="rigid", friction=True), disturbances=[push], saturate=True)
+    result = experiment.simulate(0.016, dt=5e-4, control_period=2e-3)
+    plant, g = experiment.closed_loop().plant, experiment.cell.robots[0].gravity_vector
+    R, nu = place_of(result.outputs["object_pose"])[1], result.outputs["object_twist"]
+    G = grasp_matrix(plant.arms @ R.mT)
+    load = np.matvec(G, result.outputs["hand_wrench"]).sum(axis=1)
+    within = [k for k in range(1, len(result.t) - 1) if k % 4 in (1, 2, 3)]  # torque jumps at every fourth
+    for k in within:
+        nu_dot = (nu[k + 1] - nu[k - 1]) / 1e-3
+        found = PAYLOAD.mass_matrix(R[k]) @ nu_dot + PAYLOAD.bias(R[k], nu[k, 3:], g)
+        np.testing.assert_allclose(found, load[k], atol=0.02 * np.abs(load).max())
+    assert off_closure(result, plant).max() < 1e-9
+    assert np.linalg.norm(load[9] - load[7]) > 0.1 * np.linalg.norm(load[7])  # the push comes at 8
+
+
 def test_a_hand_off_its_place_is_refused():
     kept = carry_ur5(grasp="rigid").plant_type.keywords
     off = {**kept, "at": (kept["at"][0] + [0.0, 2e-6, 0.0], kept["at"][1])}
@@ -377,6 +405,19 @@ def test_hands_that_move_apart_at_the_start_are_refused():
             RigidPlant(cell, **experiment.plant_type.keywords)
 
 
+class Hinge(Fixture):
+    """A fixture that lets the object turn about z."""
+
+    K = np.array([1e5, 1e5, 1e5, 1e3, 1e3, 0.0])
+
+
+def test_a_grasp_that_leaves_a_direction_free_is_refused():
+    kept = carry_ur5(grasp="rigid").plant_type.keywords
+    loose = [kept["grasps"][0], replace(kept["grasps"][1], compliance=Hinge())]
+    with refused(InputError, "grasps, robot 'UR5 2'"):
+        RigidPlant(carry_ur5().cell, **{**kept, "grasps": loose})
+
+
 @pytest.mark.parametrize(("name", "q"), [("planar2r", (0.4, 0.9)), ("ur5", (0.0, -1.5, 2.0, -0.5, 0.0, 0.0))])
 def test_an_arm_with_too_few_joints_and_one_in_a_singular_posture_are_refused(name, q):
     robot, q = load_robot(name), np.array(q)
@@ -385,7 +426,7 @@ def test_an_arm_with_too_few_joints_and_one_in_a_singular_posture_are_refused(na
     members = [Member(one, Hold(q), q0=q) for one in (robot, other)]
     options = {
         "body": BODY,
-        "grasps": [Grasp(i, rotation=hand.rotation) for i in range(2)],
+        "grasps": [Grasp(i, (0.0, 0.0, 0.0), hand.rotation) for i in range(2)],
         "at": (hand.translation, np.eye(3)),
     }
     cell = Cell(members, Coupling.pair())

@@ -85,12 +85,13 @@ class RigidPlant(ChainPlant):
     Pinocchio computes it, or MuJoCo as a judge, whose welds give a little, see `judge.py`.
 
     Raises:
-        InputError: as `CarryingPlant`; a hand that cannot move in all six directions; hands that do not move
-            as one body at t = 0, to `CLOSED`; robots in different gravity.
+        InputError: as `CarryingPlant`; a grasp that leaves a direction free; a hand that cannot move in all
+            six; hands that do not move as one body at t = 0, to `CLOSED`; robots in different gravity.
     """
 
     def __init__(self, *args: Any, **options: Any):
         super().__init__(*args, **options)
+        self._check_grasps()
         del self.K, self.D  # nothing gives
         self._check_hands()
 
@@ -123,6 +124,14 @@ class RigidPlant(ChainPlant):
             "mujoco": lambda: WeldedChain(self.robots, hands, self.body, places),
         }
         return made[self.physics]()
+
+    def _check_grasps(self) -> None:
+        """Refuse those, for instance pins, that let the object turn or slide in the hand."""
+        for hand, stiffness in zip(self._hands, self.K, strict=True):
+            if not stiffness.all():
+                text = "expected rigid grasps to hold in all six directions, found the stiffness"
+                where = f"grasps, robot '{self.cell.names[hand]}'"
+                raise InputError(f"{text} {stiffness.tolist()}", subject=where, found=stiffness.tolist())
 
     def _check_hands(self) -> None:
         """Refuse hands that cannot follow every motion of the object, and those that do not at t = 0."""
