@@ -218,8 +218,8 @@ def test_a_cell_that_mujoco_cannot_have_is_refused():
         mujoco_model(holding(changed))
     model = arm.model.copy()
     model.gravity.linear = np.array([0.0, 0.0, -1.62])
-    moon = Robot(model, arm.tip, document=arm.document)
-    with refused(InputError, "cell"):
+    moon = Robot(model, arm.tip, name="moon", document=arm.document)
+    with refused(InputError, "robot 'moon'", found=(0.0, 0.0, -1.62)):
         mujoco_model(holding(arm, moon))
 
 

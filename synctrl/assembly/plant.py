@@ -103,10 +103,12 @@ class CarryingPlant(Plant):
         self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray, t: np.ndarray
     ) -> dict[str, Output]:
         """Pose, twist and desired motion of the object, and wrenches of the hands on it, all over time."""
-        pose, nu = hidden[:, :7].copy(), hidden[:, 7:].copy()
+        return self._told(*self._forces_along(q, v, hidden), hidden, t)
+
+    def _told(self, h: np.ndarray, inner: np.ndarray, hidden: np.ndarray, t: np.ndarray) -> dict[str, Output]:
+        """`outputs_along` with the wrenches of the hands and their internal part, (T, k, 6) each."""
+        pose, nu = hidden[:, :7].copy(), hidden[:, 7:13].copy()
         pose[:, 3:] /= np.linalg.norm(pose[:, 3:], axis=1, keepdims=True)
-        h = np.array([self._wrenches(*row)[0] for row in zip(q, v, hidden, strict=True)])
-        h = h.reshape(len(hidden), len(self.grasps), 6)
         place, forces = "m, and a unit quaternion", "N, N·m"
         along, at_hands = ("time", "coordinate"), ("time", "grasp", "coordinate")
         return {
@@ -114,7 +116,7 @@ class CarryingPlant(Plant):
             "object_twist": (nu, "m/s, rad/s", along),
             "object_desired": (self._desired_poses(t), place, along),
             "hand_wrench": (h, forces, at_hands),
-            "internal_force": (internal_wrenches(h, self._levers(hidden)), forces, at_hands),
+            "internal_force": (inner, forces, at_hands),
         }
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
@@ -160,6 +162,14 @@ class CarryingPlant(Plant):
         *hands, J = self._held(q, v)
         *places, _ = places_on(hidden, self.arms, self.turned)
         return *fixture_wrenches(hands, places, self.K, self.D), J
+
+    def _forces_along(
+        self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What the hands do to the object, and the internal part of it, (T, k, 6) each."""
+        h = np.array([self._wrenches(*row)[0] for row in zip(q, v, hidden, strict=True)])
+        h = h.reshape(len(hidden), len(self.grasps), 6)
+        return h, internal_wrenches(h, self._levers(hidden))
 
     def _object_rate(self, hidden: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
         levers = self.arms @ place_of(hidden[:7])[1].T

@@ -9,6 +9,7 @@ paper's.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any, Unpack
@@ -17,7 +18,9 @@ import numpy as np
 
 from ..assembly.body import CarriedObject, with_share
 from ..assembly.grasp import Fixture, Grasp
+from ..assembly.judged import fixture_plant
 from ..assembly.plant import CarryingPlant
+from ..assembly.rigid import RigidPlant
 from ..assembly.tare import tared
 from ..checks import boolean, choice, finite_array, instance
 from ..control.admittance import Admittance
@@ -73,7 +76,7 @@ def carry_ur5(
 
     Args:
         synchronized, gains, parts: see `ready_experiment`.
-        grasp: "compliant" for the fixtures of the cell, or a `Fixture`.
+        grasp: "compliant" for the fixtures of the cell, "rigid" for none that gives, or a `Fixture`.
         geometric_error: whether arm 1 is wrong about where it holds the payload, by 1 mm and 0.5 deg, or by
             how much: displacement, m, and rotation vector, rad, (6,), in the payload's axes.
         friction: whether the joints rub, which the controller does not know.
@@ -87,21 +90,23 @@ def carry_ur5(
         InputError: a value that is none of these.
     """
     boolean("friction", friction), boolean("push", push), boolean("tare", tare)
-    grasps = [Grasp(i, *hand_on_payload(i), _fixture(grasp)) for i in range(2)]
+    fixture, kind = _held(grasp)
+    grasps = [Grasp(i, *hand_on_payload(i), fixture) for i in range(2)]
     at, arms = _start_of_payload(), [_arm(i) for i in range(2)]
     cell = _cell(arms, grasps, at, _error(geometric_error), friction)
     cell, pushes, yielding = tared(cell) if tare else cell, [PUSH] * bool(push), _admittance(admittance)
     made = ready_experiment(cell, DURATION, GAINS, gains, synchronized, parts, disturbances=pushes)
-    plant = partial(CarryingPlant, body=PAYLOAD, grasps=grasps, at=at, robots=arms, desired=payload_motion())
+    plant = partial(kind, body=PAYLOAD, grasps=grasps, at=at, robots=arms, desired=payload_motion())
     leaking = _leaking(made.gains, yielding is not None if leak is None else leak)
     return replace(made, gains=leaking, plant_type=plant, admittance=yielding)
 
 
-def _fixture(grasp: str | Fixture) -> Fixture:
-    if not isinstance(grasp, Fixture):
-        choice("grasp", grasp, ("compliant",))
-        return Fixture()
-    return grasp
+def _held(grasp: str | Fixture) -> tuple[Fixture, Callable[..., CarryingPlant]]:
+    """Fixtures, and what makes a plant that has them."""
+    if isinstance(grasp, Fixture):
+        return grasp, fixture_plant
+    kinds = {"compliant": fixture_plant, "rigid": RigidPlant}
+    return Fixture(), kinds[choice("grasp", grasp, tuple(kinds))]
 
 
 def _error(given: bool | Any) -> np.ndarray:

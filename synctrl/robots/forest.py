@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 import pinocchio as pin
 
+from ..errors import InputError
 from .model import PerThread
 from .robot import Robot
 
@@ -44,7 +45,7 @@ class Forest:
     def __init__(self, robots: Sequence[Robot], maps: np.ndarray | None = None):
         self.robots, self._maps = tuple(robots), maps
         self.n, self.nv = len(robots), robots[0].nv
-        self._model, tips = _side_by_side(robots)
+        self._model, tips = side_by_side(robots)
         self._weightless = pin.Model(self._model)
         self._weightless.gravity.setZero()
         self._scratch = PerThread(partial(_Scratch, self._model, tips, self.n))
@@ -202,12 +203,29 @@ def as_selection(indices: Sequence[int]) -> Selection:
     return slice(even.start, even.stop, step) if list(even) == list(indices) else np.array(indices)
 
 
+def common_gravity(robots: Sequence[Robot]) -> np.ndarray:
+    """The gravity that all robots have, (3,), m/s^2.
+
+    Raises:
+        InputError: robots in different gravity.
+    """
+    expected = robots[0].gravity_vector
+    for robot in robots:
+        found = robot.gravity_vector.tolist()
+        if found != expected.tolist():
+            text = (
+                f"expected one gravity, that of '{robots[0].name}', {expected.tolist()} m/s^2, found {found}"
+            )
+            raise InputError(text, subject=f"robot '{robot.name}'", found=found)
+    return expected
+
+
 def _size(robot: Robot) -> tuple[Any, ...]:
     """What robots of one forest have in common, first of all their number of joints."""
     return robot.nv, robot.model.nq, robot.body_count, tuple(robot.gravity_vector.tolist())
 
 
-def _side_by_side(robots: Sequence[Robot]) -> tuple[pin.Model, list[int]]:
+def side_by_side(robots: Sequence[Robot]) -> tuple[pin.Model, list[int]]:
     """One model with a tree per robot, and the frames of their tips."""
     model, tips = pin.Model(), []
     model.gravity = robots[0].model.gravity

@@ -8,6 +8,7 @@ than those of the model would blame the law, so its mass matrix is compared with
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -18,6 +19,7 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, instance, positive_number
 from ..coupling.cell import Cell
 from ..errors import InputError, MissingDependencyError
+from ..robots.forest import common_gravity
 from ..robots.model import PerThread
 from ..robots.robot import Robot
 from ..robots.urdf.document import Document
@@ -222,12 +224,8 @@ def mujoco_model(cell: Cell, timestep: float = 1e-3) -> tuple[Any, JointMap]:
     """
     mujoco = require_mujoco()
     instance("cell", cell, Cell, "a Cell")
-    spec = mujoco.MjSpec()
+    spec = side_by_side(cell.robots)
     spec.option.timestep = positive_number("timestep", timestep)
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
-    spec.option.gravity = _common_gravity(cell)
-    for i, robot in enumerate(cell.robots):
-        spec.attach(_arm(mujoco, robot), prefix=f"{i}/", frame=spec.worldbody.add_frame())
     joints = [f"{i}/{name}" for i, robot in enumerate(cell.robots) for name in robot.joint_names]
     for name in joints:
         spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT).set_to_motor()
@@ -237,17 +235,19 @@ def mujoco_model(cell: Cell, timestep: float = 1e-3) -> tuple[Any, JointMap]:
     return model, joint_map
 
 
-def _common_gravity(cell: Cell) -> np.ndarray:
-    expected = cell.robots[0].gravity_vector
-    for name, robot in zip(cell.names, cell.robots, strict=True):
-        if not np.array_equal(robot.gravity_vector, expected):
-            raise InputError(
-                f"MuJoCo has one gravity for all robots, expected that of {cell.names[0]}, "
-                f"{expected.tolist()} m/s^2, for {name} as well, found {robot.gravity_vector.tolist()}",
-                subject="cell",
-                found=robot.gravity_vector.tolist(),
-            )
-    return expected
+def side_by_side(robots: Sequence[Robot]) -> Any:
+    """Robots in one editable description, each where it stands; names of robot k begin with "k/".
+
+    Raises:
+        MissingDependencyError, InputError: see `mujoco_model`.
+    """
+    mujoco = require_mujoco()
+    spec = mujoco.MjSpec()
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    spec.option.gravity = common_gravity(robots)
+    for i, robot in enumerate(robots):
+        spec.attach(_arm(mujoco, robot), prefix=f"{i}/", frame=spec.worldbody.add_frame())
+    return spec
 
 
 def _arm(mujoco: Any, robot: Robot) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -77,7 +77,8 @@ class Plant:
     - `felt`: the internal wrenches that hands measure, if any do;
     - `chain`: what is proved if the robots hold one object together;
     - `longest_step`: how long a step of "rk4" may be, if that is known beforehand;
-    - `report`: what `result.info` says of the state in plain data.
+    - `report`: what `result.info` says of the state in plain data;
+    - `outputs_under` in the place of `outputs_along`, if torque is needed for outputs too.
 
     Nothing else is asked of it. The state is logged as `outputs["plant_state"]`, so that a run can be gone
     through again; a certificate names the plant beside the power of what it does and the model does not.
@@ -124,11 +125,11 @@ class Plant:
         self.robots = self.schedule.robots[0]
         self._set_friction()
         self.torque_limits = torque_limits(cell) if saturate else np.full((cell.n, cell.nv), np.inf)
-        self._stages: dict[int, Plant] = {0: self}
+        self._stages: dict[int, Any] = {0: self}
 
     # -- what happens -------------------------------------------------------------------------------------
 
-    def at(self, t: float) -> Plant:
+    def at(self, t: float) -> Self:
         """The plant as it is at time t: with the payloads carried then; at an edge from the right."""
         if not self.schedule.edges:
             return self
@@ -230,6 +231,17 @@ class Plant:
         """
         return self.outputs(hidden)
 
+    def outputs_under(
+        self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray, t: np.ndarray, tau: np.ndarray
+    ) -> dict[str, Output]:
+        """`outputs_along` of a plant that needs torque for them; by default those of `outputs_along`.
+
+        Args:
+            q, v, hidden, t: see `outputs_along`.
+            tau: torque that reached the joints, with that from outside, (T, n, nv), N·m.
+        """
+        return self.outputs_along(q, v, hidden, t)
+
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         """What a result says of the plant's own state at its logged instants, (T, size of the state)."""
         return {}
@@ -248,7 +260,7 @@ class Plant:
         """What moves the robots that stand there now."""
         return PHYSICS[self.physics](self.robots)
 
-    def _stage(self, window: int) -> Plant:
+    def _stage(self, window: int) -> Self:
         """A copy with the loads of another window."""
         stage = copy(self)
         stage.robots = self.schedule.robots[window]

@@ -107,7 +107,8 @@ class Recorder:
         logged = self.logged()
         hidden, lengths = logged.get(PLANT_STATE, nothing), {"time": self.count, **sizes(loop)}
         taken = {*info, *describe_run(loop), *LAYOUT, *_STATE_AXES, *OF_EVERY_RUN}
-        outputs = loop.plant.outputs_along(logged["q"], logged["v"], hidden, logged["t"])
+        tau = loop.plant.applied(logged["tau"]) + logged["disturbance"]
+        outputs = loop.plant.outputs_under(logged["q"], logged["v"], hidden, logged["t"], tau)
         found = Account(loop.plant.report(hidden), outputs)
         for what, entries in found._asdict().items():
             _check_names(f"plant {type(loop.plant).__qualname__}, {what}", entries, taken)
