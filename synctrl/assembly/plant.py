@@ -31,8 +31,8 @@ class CarryingPlant(Plant):
         M_i v_i' + n_i = tau_i + J_i^T (what the fixture does to the hand)
         M_o nu' + c_o  = sum G_i (what the fixtures do to the object)
 
-    At t = 0 every hand is where its grasp says, to `CLOSED`. A fixture takes its rest pose then, so what is
-    left of the difference is no force.
+    At t = 0 every hand is where its grasp says, to `CLOSED`, if that says a place. A fixture takes its rest
+    pose then, so what is left of the difference is no force.
 
     Args:
         cell: what the controller knows, its robots with their shares of the object.
@@ -63,7 +63,7 @@ class CarryingPlant(Plant):
         super().__init__(cell, robots=cell.robots if robots is None else _fitting(robots, cell), **options)
         instance("body", body, CarriedObject, "a CarriedObject")
         instance("desired", desired, (PoseTrajectory, NoneType), "a PoseTrajectory")
-        self.body, self.grasps, self.desired = body, _checked(grasps, cell), desired
+        self.body, self.grasps, self.desired = body, self._checked(grasps), desired
         self._hands = np.array([grasp.robot for grasp in self.grasps])
         self._tips = Tips(self.robots)
         self.K, self.D = (np.stack([getattr(g.compliance, name) for g in self.grasps]) for name in "KD")
@@ -91,10 +91,9 @@ class CarryingPlant(Plant):
         self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray, t: np.ndarray
     ) -> dict[str, Output]:
         """Pose, twist and desired motion of the object, and wrenches of the hands on it, all over time."""
-        pose, nu = hidden[:, :7].copy(), hidden[:, 7:].copy()
+        pose, nu = hidden[:, :7].copy(), hidden[:, 7:13].copy()
         pose[:, 3:] /= np.linalg.norm(pose[:, 3:], axis=1, keepdims=True)
-        h = np.array([self._wrenches(*row)[0] for row in zip(q, v, hidden, strict=True)])
-        h = h.reshape(len(hidden), len(self.grasps), 6)
+        h, inner = self._forces_along(q, v, hidden)
         place, forces = "m, and a unit quaternion", "N, N·m"
         along, at_hands = ("time", "coordinate"), ("time", "grasp", "coordinate")
         return {
@@ -102,7 +101,7 @@ class CarryingPlant(Plant):
             "object_twist": (nu, "m/s, rad/s", along),
             "object_desired": (self._desired_poses(t), place, along),
             "hand_wrench": (h, forces, at_hands),
-            "internal_force": (internal_wrenches(h, self._levers(hidden)), forces, at_hands),
+            "internal_force": (inner, forces, at_hands),
         }
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
@@ -122,11 +121,28 @@ class CarryingPlant(Plant):
 
     # -- internals ----------------------------------------------------------------------------------------
 
+    def _checked(self, grasps: Sequence[Grasp]) -> tuple[Grasp, ...]:
+        """Grasps that this plant can have."""
+        check_grasps(grasps, self.cell)
+        held = [grasp.robot for grasp in grasps]
+        if len(set(held)) != len(held):
+            raise InputError(f"expected different robots, found {held}", subject="grasps", found=tuple(held))
+        for grasp in grasps:
+            if not grasp.lasting:
+                text = "expected grasps that hold from the beginning to the end; a HandlingPlant knows others"
+                found = grasp.since, grasp.until
+                raise InputError(
+                    f"{text}, found one from {found[0]} to {found[1]} s", subject="grasps", found=found
+                )
+        return tuple(grasps)
+
     def _closed(self, p: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Places, (k, 3), and orientations, (k, 3, 3), of the hands in the object's axes at t = 0."""
         hands, turned = self._held(self.cell.q0, self.cell.v0)[:2]
         arms, turned = (hands - p) @ R, R.T @ turned
         for grasp, arm, turn in zip(self.grasps, arms, turned, strict=True):
+            if grasp.xyz is None:
+                continue
             off = [float(np.linalg.norm(miss)) for miss in (arm - grasp.xyz, log(turn @ grasp.rotation.T))]
             if max(off) > CLOSED:
                 raise InputError(
@@ -154,6 +170,14 @@ class CarryingPlant(Plant):
             (p_h, R_h, nu_h), (p + levers, R @ self.turned, nu_g), self.K, self.D
         )
         return on_object, on_hands, J
+
+    def _forces_along(
+        self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What the hands do to the object, and the internal part of it, (T, k, 6) each."""
+        h = np.array([self._wrenches(*row)[0] for row in zip(q, v, hidden, strict=True)])
+        h = h.reshape(len(hidden), len(self.grasps), 6)
+        return h, internal_wrenches(h, self._levers(hidden))
 
     def _object_rate(self, hidden: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
         pose, nu = hidden[:7], hidden[7:]
@@ -213,15 +237,16 @@ def _place(at: tuple[Any, Any]) -> tuple[np.ndarray, np.ndarray]:
     return finite_array("at, position", at[0], (3,)), rotation_matrix("at, orientation", at[1])
 
 
-def _checked(grasps: Sequence[Grasp], cell: Cell) -> tuple[Grasp, ...]:
+def check_grasps(grasps: Sequence[Grasp], cell: Cell) -> None:
+    """Refuse what are no grasps by robots of a cell, or none at all.
+
+    Raises:
+        InputError: naming the robots.
+    """
     instance("grasps", grasps, Sequence, "a sequence of Grasp objects")
     for grasp in grasps:
         instance("grasps", grasp, Grasp, "Grasp objects")
     held = [grasp.robot for grasp in grasps]
-    if not held or len(set(held)) != len(held) or max(held) >= cell.n:
-        raise InputError(
-            f"expected different robots from 0 to {cell.n - 1}, at least one, found {held}",
-            subject="grasps",
-            found=tuple(held),
-        )
-    return tuple(grasps)
+    if not held or max(held) >= cell.n:
+        words = f"expected robots from 0 to {cell.n - 1}, at least one, found {held}"
+        raise InputError(words, subject="grasps", found=tuple(held))
