@@ -160,9 +160,9 @@ def energies(plant, q, v, hidden) -> float:
     g = plant.robots[0].gravity_vector
     total = 0.5 * nu @ plant.body.mass_matrix(R) @ nu - plant.body.mass * g @ (p + R @ plant.body.com)
     for robot, q_i, v_i in zip(plant.robots, q, v, strict=True):
-        data = robot.model.createData()
+        data, q_i, v_i = robot.model.createData(), q_i[: robot.nv], v_i[: robot.nv]
         total += 0.5 * v_i @ robot.mass_matrix(q_i) @ v_i
-        total += pin.computePotentialEnergy(robot.model, data, q_i)
+        total += pin.computePotentialEnergy(robot.model, data, robot.configuration(q_i))
     wrench = plant._wrenches(q, v, hidden)[0]
     damped = plant.D * rates_of_fixtures(plant, q, v, hidden)
     return float(total + 0.5 * np.sum((wrench - damped) ** 2 / plant.K))
