@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import count, finite_array, instance, rotation_matrix, window
+from ..checks import count, finite_array, instance, positive_number, rotation_matrix, window
 from ..errors import InputError
 from ..tasks.rotations import log, skew
 
@@ -58,6 +58,22 @@ class Fixture:
         return {"stiffness": self.stiffness.tolist(), "damping": self.damping.tolist()}
 
 
+class Pin(Fixture):
+    """A pin that gives a little: against displacement, while the object turns freely about it.
+
+    Args:
+        stiffness: N/m.
+        damping: N·s/m.
+
+    Raises:
+        InputError: not above 0.
+    """
+
+    def __init__(self, stiffness: float = 1e5, damping: float = 500.0):
+        for name, value in (("stiffness", stiffness), ("damping", damping)):
+            object.__setattr__(self, name, np.array([positive_number(f"pin, {name}", value), 0.0]))
+
+
 @dataclass(frozen=True, eq=False)
 class Grasp:
     """A hand that holds an object.
@@ -68,7 +84,7 @@ class Grasp:
             closes.
         rotation: orientation of the hand in the object's axes, (3, 3), where a place is given; by default
             that of the object.
-        compliance: the fixture between them.
+        compliance: the fixture between them; with a `Pin` it does not matter how the hand is turned.
         since, until: when the hand closes and when it opens, s; by default it holds from the beginning, and
             never lets go.
 

@@ -143,7 +143,8 @@ class CarryingPlant(Plant):
         for grasp, arm, turn in zip(self.grasps, arms, turned, strict=True):
             if grasp.xyz is None:
                 continue
-            off = [float(np.linalg.norm(miss)) for miss in (arm - grasp.xyz, log(turn @ grasp.rotation.T))]
+            turning = float(grasp.compliance.stiffness[1] > 0) * log(turn @ grasp.rotation.T)
+            off = [float(np.linalg.norm(miss)) for miss in (arm - grasp.xyz, turning)]
             if max(off) > CLOSED:
                 raise InputError(
                     f"expected its hand at t = 0 where its grasp says, to {CLOSED:g} m and rad, "
