@@ -197,7 +197,7 @@ def with_pins(**changed) -> PinnedPlant:
         (lambda: Pin(0.0), "pin, stiffness"),
         (lambda: Pin(1.0, -1.0), "pin, damping"),
         (lambda: with_pins(grasps=[Grasp(i, compliance=Fixture()) for i in range(4)]), "grasps"),
-        (lambda: with_pins(grasps=[Grasp(2, compliance=Pin())]), "grasps"),
+        (lambda: with_pins(grasps=[Grasp(i, compliance=Pin()) for i in (0, 2)]), "grasps"),
         (lambda: carry_planar(grasp="rigid"), "grasp"),
         (lambda: carry_planar(grasp=Fixture()), "grasp"),
         (lambda: carry_planar(geometric_error=1e-3), "geometric_error"),

@@ -12,13 +12,10 @@ import numpy as np
 
 from ..errors import InputError
 from ..simulation.plant import Output
-from ..tasks.rigid_motions import deformation, place_matrix
+from ..tasks.rigid_motions import deformation
 from .body import place_of
 from .grasp import Grasp, Pin
 from .plant import CarryingPlant
-
-#: how far from one point the pins are at least, m
-APART = 1e-6
 
 
 class PinnedPlant(CarryingPlant):
@@ -28,7 +25,7 @@ class PinnedPlant(CarryingPlant):
     which they give way to like a spring. All else is as in `CarryingPlant`.
 
     Raises:
-        InputError: as `CarryingPlant`; grasps that are no pins, or pins in one point.
+        InputError: as `CarryingPlant`; or grasps that are no pins.
     """
 
     def outputs_along(
@@ -49,11 +46,3 @@ class PinnedPlant(CarryingPlant):
                 found = type(grasp.compliance).__name__
                 raise InputError.expected("pins, compliance=Pin(...)", found, "grasps")
         return tuple(grasps)
-
-    def _closed(self, p: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        arms, turned = super()._closed(p, R)
-        rank = int(np.linalg.matrix_rank(place_matrix(arms[:, :2]), tol=APART))
-        if rank < 3:
-            text = f"expected pins in different points, which fix the object, found G of rank {rank}"
-            raise InputError(text, subject="grasps", found=rank)
-        return arms, turned

@@ -15,6 +15,7 @@ from ..robots.robot import Robot
 from ..simulation.plant import Output, Plant
 from ..tasks.measurement import Tips
 from ..tasks.poses import PoseTrajectory
+from ..tasks.rigid_motions import place_matrix
 from ..tasks.rotations import log, skew
 from .body import CarriedObject, place_of, pose_of, pose_rate
 from .forces import internal_wrenches
@@ -46,7 +47,7 @@ class CarryingPlant(Plant):
 
     Raises:
         InputError: grasps that do not fit the robots, robots that do not fit the cell, a pose that is none,
-            or a hand that is not where its grasp says.
+            a hand that is not where its grasp says, or pins on one line and nothing else.
     """
 
     def __init__(
@@ -152,7 +153,15 @@ class CarryingPlant(Plant):
                     subject=f"grasps, robot '{self.cell.names[grasp.robot]}'",
                     found=tuple(off),
                 )
+        self._check_rank(arms)
         return arms, turned
+
+    def _check_rank(self, arms: np.ndarray) -> None:
+        """Refuse pins, at arms from the object's origin, about which the object may turn as it likes."""
+        rank = int(np.linalg.matrix_rank(place_matrix(arms), tol=CLOSED))
+        if rank < 6 and not self.K[:, 3:].any():
+            text = f"expected three or more pins that are not on one line, found G of rank {rank}"
+            raise InputError(text, subject="grasps", found=rank)
 
     def _held(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Positions, orientations, twists and Jacobians of the hands that hold the object."""
