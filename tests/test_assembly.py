@@ -160,15 +160,15 @@ def energies(plant, q, v, hidden) -> float:
     g = plant.robots[0].gravity_vector
     total = 0.5 * nu @ plant.body.mass_matrix(R) @ nu - plant.body.mass * g @ (p + R @ plant.body.com)
     for robot, q_i, v_i in zip(plant.robots, q, v, strict=True):
-        data = robot.model.createData()
+        data, q_i, v_i = robot.model.createData(), q_i[: robot.nv], v_i[: robot.nv]
         total += 0.5 * v_i @ robot.mass_matrix(q_i) @ v_i
-        total += pin.computePotentialEnergy(robot.model, data, q_i)
+        total += pin.computePotentialEnergy(robot.model, data, robot.configuration(q_i))
     wrench = plant._wrenches(q, v, hidden)[0]
-    damped = plant.D * _rates(plant, q, v, hidden)
+    damped = plant.D * rates_of_fixtures(plant, q, v, hidden)
     return float(total + 0.5 * np.sum((wrench - damped) ** 2 / plant.K))
 
 
-def _rates(plant, q, v, hidden) -> np.ndarray:
+def rates_of_fixtures(plant, q, v, hidden) -> np.ndarray:
     """d', (k, 6), from two dampings."""
     kept = plant.D
     wrench = plant._wrenches(q, v, hidden)[0]
@@ -189,7 +189,7 @@ def test_arms_object_and_fixtures_together_keep_their_energy_but_for_torque_and_
     ends = [
         energies(plant, q + s * h * v, v + s * h * rates[0], hidden + s * h * rates[1]) for s in (1.0, -1.0)
     ]
-    power = float(np.sum(tau * v) - np.sum(plant.D * _rates(plant, q, v, hidden) ** 2))
+    power = float(np.sum(tau * v) - np.sum(plant.D * rates_of_fixtures(plant, q, v, hidden) ** 2))
     assert (ends[0] - ends[1]) / (2 * h) == pytest.approx(power, rel=1e-4)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -14,6 +15,9 @@ from seams.catching_plant import Catching
 from seams.posted_network import BoundPosted, Posted
 
 from synctrl import Cell, Coupling, Cubic, Disturbance, Experiment, Gains, Member, Payload, Result, load_robot
+from synctrl.assembly.body import CarriedObject
+from synctrl.assembly.grasp import Fixture, Grasp
+from synctrl.assembly.handling import HandlingPlant
 from synctrl.simulation.advance import due
 from synctrl.simulation.closed_loop import ClosedLoop
 from synctrl.simulation.plant import Plant
@@ -46,6 +50,15 @@ def catching(start: float, stop: float, **parts) -> Experiment:
     return loaded(start, stop, plant_type=Catching, **parts)
 
 
+def handling(start: float, stop: float) -> Experiment:
+    """Two arms that take hold of a plate where it lies, of which one lets go again."""
+    soft = Fixture((40.0, 0.5), (0.5, 0.01))
+    grasps = [Grasp(0, compliance=soft, since=0.05), Grasp(1, compliance=soft, since=start, until=stop)]
+    plate = CarriedObject(0.4, (0.01, 0.02, 0.0), (2e-3, 3e-3, 4e-3))
+    at = (0.35, 0.5, 0.0), np.eye(3)
+    return pair(plant_type=partial(HandlingPlant, body=plate, grasps=grasps, at=at))
+
+
 class Kicked(Plant):
     """A plant in which somebody kicks the robots, while nothing else changes."""
 
@@ -75,6 +88,7 @@ KINDS: dict[str, tuple[Callable[[], Experiment], dict, tuple[str, ...]]] = {
     "catch and release on the grid": (lambda: catching(0.08, 0.16), {}, BOTH[:1]),
     "catch and release off the grid": (lambda: catching(0.0803, 0.1607), {}, BOTH[:1]),
     "catch and release between samples": (lambda: catching(0.0803, 0.1607), SAMPLED, BOTH[:1]),
+    "grasp and letting go off the grid": (lambda: handling(0.0803, 0.1607), {}, BOTH[:1]),
     "kicks": (lambda: pair(plant_type=Kicked), {}, BOTH[:1]),
     "kicks between samples": (lambda: pair(plant_type=Kicked), SAMPLED, BOTH[:1]),
     "messages on the grid": (lambda: pair(network=Posted(0.024)), {}, BOTH[:1]),

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import count, finite_array, instance, rotation_matrix
+from ..checks import count, finite_array, instance, positive_number, rotation_matrix, window
 from ..errors import InputError
 from ..tasks.rotations import log, skew
 from .body import place_of
@@ -60,35 +60,80 @@ class Fixture:
         return {"stiffness": self.stiffness.tolist(), "damping": self.damping.tolist()}
 
 
+class Pin(Fixture):
+    """A pin that gives a little: against displacement, while the object turns freely about it.
+
+    Args:
+        stiffness: N/m.
+        damping: N·s/m.
+
+    Raises:
+        InputError: not above 0.
+    """
+
+    def __init__(self, stiffness: float = 1e5, damping: float = 500.0):
+        for name, value in (("stiffness", stiffness), ("damping", damping)):
+            object.__setattr__(self, name, np.array([positive_number(f"pin, {name}", value), 0.0]))
+
+
 @dataclass(frozen=True, eq=False)
 class Grasp:
     """A hand that holds an object.
 
     Args:
         robot: index of the robot whose tip is the hand, counted from 0.
-        xyz: where the hand holds it, in the object's axes, (3,), m.
-        rotation: orientation of the hand in the object's axes, (3, 3); by default that of the object.
-        compliance: the fixture between them.
+        xyz: where the hand holds it, in the object's axes, (3,), m; by default where the hand is when it
+            closes.
+        rotation: orientation of the hand in the object's axes, (3, 3), where a place is given; by default
+            that of the object.
+        compliance: the fixture between them; with a `Pin` it does not matter how the hand is turned.
+        since, until: when the hand closes and when it opens, s; by default it holds from the beginning, and
+            never lets go.
 
     Raises:
-        InputError: an index below 0, no place, or no rotation matrix.
+        InputError: an index below 0, no place, no rotation matrix, a window that is empty or starts before
+            0; an orientation without a place, or a place of a hand that closes later: it takes hold where it
+            is then.
     """
 
     robot: int
-    xyz: Any = (0.0, 0.0, 0.0)
+    xyz: Any = None
     rotation: Any = None
     compliance: Fixture = field(default_factory=Fixture)
+    since: float = 0.0
+    until: float | None = None
 
     def __post_init__(self) -> None:
         count("grasp, robot", self.robot, 0)
         instance("grasp, compliance", self.compliance, Fixture, "a Fixture")
+        window("grasp", self.since, self.until)
+        if self.xyz is not None:
+            self._check_place()
+        elif self.rotation is not None:
+            raise InputError.expected("none without a place, `xyz`", self.rotation, "grasp, rotation")
+
+    def _check_place(self) -> None:
+        if self.since > 0:
+            text = "expected no place for a hand that closes later, which takes hold where it is then"
+            raise InputError(f"{text}, found {self.xyz}", subject="grasp, xyz", found=self.xyz)
         object.__setattr__(self, "xyz", finite_array("grasp, xyz", self.xyz, (3,)))
         R = rotation_matrix("grasp, rotation", np.eye(3) if self.rotation is None else self.rotation)
         object.__setattr__(self, "rotation", R)
 
     @property
+    def lasting(self) -> bool:
+        """Whether it holds from the beginning, and never lets go."""
+        return self.since == 0 and self.until is None
+
+    @property
     def object_in_hand(self) -> tuple[np.ndarray, np.ndarray]:
-        """Place, (3,), and orientation, (3, 3), of the object in the hand's axes."""
+        """Place, (3,), and orientation, (3, 3), of the object in the hand's axes.
+
+        Raises:
+            InputError: no place was given.
+        """
+        if self.xyz is None:
+            raise InputError.expected("a place in the object's axes", None, "grasp, xyz")
         return -self.rotation.T @ self.xyz, self.rotation.T
 
 

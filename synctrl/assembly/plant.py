@@ -16,6 +16,7 @@ from ..robots.robot import Robot
 from ..simulation.plant import Output, Plant
 from ..tasks.measurement import Tips
 from ..tasks.poses import PoseTrajectory
+from ..tasks.rigid_motions import place_matrix
 from ..tasks.rotations import log
 from .body import CarriedObject, body_rate, place_of, pose_of
 from .forces import internal_wrenches
@@ -33,8 +34,8 @@ class CarryingPlant(Plant):
         M_i v_i' + n_i = tau_i + J_i^T (what the fixture does to the hand)
         M_o nu' + c_o  = sum G_i (what the fixtures do to the object)
 
-    At t = 0 every hand is where its grasp says, to `CLOSED`. A fixture takes its rest pose then, so what is
-    left of the difference is no force.
+    At t = 0 every hand is where its grasp says, to `CLOSED`, if that says a place. A fixture takes its rest
+    pose then, so what is left of the difference is no force.
 
     Args:
         cell: what the controller knows, its robots with their shares of the object.
@@ -48,7 +49,7 @@ class CarryingPlant(Plant):
 
     Raises:
         InputError: grasps that do not fit the robots, robots that do not fit the cell, a pose that is none,
-            or a hand that is not where its grasp says.
+            a hand that is not where its grasp says, or pins on one line and nothing else.
     """
 
     def __init__(
@@ -65,7 +66,7 @@ class CarryingPlant(Plant):
         super().__init__(cell, robots=cell.robots if robots is None else _fitting(robots, cell), **options)
         instance("body", body, CarriedObject, "a CarriedObject")
         instance("desired", desired, (PoseTrajectory, NoneType), "a PoseTrajectory")
-        self.body, self.grasps, self.desired = body, _checked(grasps, cell), desired
+        self.body, self.grasps, self.desired = body, self._checked(grasps), desired
         self._hands = np.array([grasp.robot for grasp in self.grasps])
         self._tips = Tips(self.robots)
         self.K, self.D = (np.stack([getattr(g.compliance, name) for g in self.grasps]) for name in "KD")
@@ -136,12 +137,30 @@ class CarryingPlant(Plant):
 
     # -- internals ----------------------------------------------------------------------------------------
 
+    def _checked(self, grasps: Sequence[Grasp]) -> tuple[Grasp, ...]:
+        """Grasps that this plant can have."""
+        check_grasps(grasps, self.cell)
+        held = [grasp.robot for grasp in grasps]
+        if len(set(held)) != len(held):
+            raise InputError(f"expected different robots, found {held}", subject="grasps", found=tuple(held))
+        for grasp in grasps:
+            if not grasp.lasting:
+                text = "expected grasps that hold from the beginning to the end; a HandlingPlant knows others"
+                found = grasp.since, grasp.until
+                raise InputError(
+                    f"{text}, found one from {found[0]} to {found[1]} s", subject="grasps", found=found
+                )
+        return tuple(grasps)
+
     def _closed(self, p: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Places, (k, 3), and orientations, (k, 3, 3), of the hands in the object's axes at t = 0."""
         hands, turned = self._held(self.cell.q0, self.cell.v0)[:2]
         arms, turned = (hands - p) @ R, R.T @ turned
         for grasp, arm, turn in zip(self.grasps, arms, turned, strict=True):
-            off = [float(np.linalg.norm(miss)) for miss in (arm - grasp.xyz, log(turn @ grasp.rotation.T))]
+            if grasp.xyz is None:
+                continue
+            turning = float(grasp.compliance.stiffness[1] > 0) * log(turn @ grasp.rotation.T)
+            off = [float(np.linalg.norm(miss)) for miss in (arm - grasp.xyz, turning)]
             if max(off) > CLOSED:
                 raise InputError(
                     f"expected its hand at t = 0 where its grasp says, to {CLOSED:g} m and rad, "
@@ -149,7 +168,15 @@ class CarryingPlant(Plant):
                     subject=f"grasps, robot '{self.cell.names[grasp.robot]}'",
                     found=tuple(off),
                 )
+        self._check_rank(arms)
         return arms, turned
+
+    def _check_rank(self, arms: np.ndarray) -> None:
+        """Refuse pins, at arms from the object's origin, about which the object may turn as it likes."""
+        rank = int(np.linalg.matrix_rank(place_matrix(arms), tol=CLOSED))
+        if rank < 6 and not self.K[:, 3:].any():
+            text = f"expected three or more pins that are not on one line, found G of rank {rank}"
+            raise InputError(text, subject="grasps", found=rank)
 
     def _held(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Positions, orientations, twists and Jacobians of the hands that hold the object."""
@@ -227,15 +254,16 @@ def _place(at: tuple[Any, Any]) -> tuple[np.ndarray, np.ndarray]:
     return finite_array("at, position", at[0], (3,)), rotation_matrix("at, orientation", at[1])
 
 
-def _checked(grasps: Sequence[Grasp], cell: Cell) -> tuple[Grasp, ...]:
+def check_grasps(grasps: Sequence[Grasp], cell: Cell) -> None:
+    """Refuse what are no grasps by robots of a cell, or none at all.
+
+    Raises:
+        InputError: naming the robots.
+    """
     instance("grasps", grasps, Sequence, "a sequence of Grasp objects")
     for grasp in grasps:
         instance("grasps", grasp, Grasp, "Grasp objects")
     held = [grasp.robot for grasp in grasps]
-    if not held or len(set(held)) != len(held) or max(held) >= cell.n:
-        raise InputError(
-            f"expected different robots from 0 to {cell.n - 1}, at least one, found {held}",
-            subject="grasps",
-            found=tuple(held),
-        )
-    return tuple(grasps)
+    if not held or max(held) >= cell.n:
+        words = f"expected robots from 0 to {cell.n - 1}, at least one, found {held}"
+        raise InputError(words, subject="grasps", found=tuple(held))

@@ -2,6 +2,7 @@
 
 from .a460_pair import a460_full_pair, a460_pair
 from .carry import carry_ur5
+from .carry_planar import carry_planar
 from .mixed_four import mixed_four
 from .mobile_robot import mobile_robot
 from .panda_four import panda_four
@@ -13,6 +14,7 @@ from .ur5_payload import ur5_payload
 __all__ = [
     "a460_full_pair",
     "a460_pair",
+    "carry_planar",
     "carry_ur5",
     "mixed_four",
     "mobile_robot",

@@ -5,6 +5,7 @@ from .classic import ComputedTorque, PDGravity, SlotineLi
 from .master_slave import MasterSlave
 from .options import Options, chosen
 from .protocol import Along, Asked, BoundLaw, Errors, Law, Proof, completed, no_errors
+from .shape_keeping import ShapeKeeping
 from .sun_mills import SunMills
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "Options",
     "PDGravity",
     "Proof",
+    "ShapeKeeping",
     "SlotineLi",
     "SunMills",
     "chosen",

@@ -1,0 +1,171 @@
+"""Four planar arms that carry a plate at pins: forces pass through it, and no moment.
+
+Each arm is told where its own pin should be. There are no weights with an inverse by which eps = 0 would say
+that the plate is not deformed, so differences of errors also resist when the plate turns. `ShapeKeeping` is
+the law that knows the difference. Each arm learns a quarter of the plate as a mass at its pin. All of this is
+our choice and not the paper's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..assembly.body import CarriedObject, with_share
+from ..assembly.grasp import Grasp, Pin
+from ..assembly.pinned import PinnedPlant
+from ..checks import boolean, choice, finite_array
+from ..control.gains import Gains
+from ..control.laws import ShapeKeeping
+from ..coupling.cell import Cell, Member
+from ..coupling.coupling import Coupling
+from ..errors import InputError
+from ..robots.catalog import load_robot
+from ..robots.friction import Friction
+from ..robots.robot import Robot
+from ..simulation.schedules import Disturbance
+from ..simulation.simulate import Experiment
+from ..tasks.inverse_kinematics import inverse_kinematics
+from ..tasks.poses import Attached, AxisRotation, PoseTrajectory
+from ..tasks.rotations import exp
+from ..tasks.spaces import CartesianSpace
+from ..tasks.trajectories import Motion
+from .parts import ControllerParts, ready_experiment
+
+MASS, EDGE = 2.0, 0.24  # kg, m
+_IZZ = 2 / 6 * EDGE**2  # kg·m^2
+PLATE = CarriedObject(
+    MASS, (0.02, -0.01, 0.0), (_IZZ / 2, _IZZ / 2, _IZZ),
+    box=(EDGE, EDGE, 0.01), center=(0.0, 0.0, 0.0), name="plate",
+)  # fmt: skip
+CORNERS = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+BASES, PINS = 0.45 * CORNERS, 0.12 * CORNERS  # m
+SWING, TURN, SPEED = (0.06, 0.04), 0.15, 2 * np.pi / 3  # m, rad, rad/s
+#: error of the plate at the start, desired less actual: position, m, and angle, rad
+OFFSET, TURNED = np.array([0.01, -0.005, 0.0]), 0.03
+#: what the first estimates know of the arms, and of the quarter of the plate at each pin
+ARMS_KNOWN, SHARES_KNOWN = 0.8, (1.0, 1.0, 1.0, 0.0)
+#: where each arm believes its pin on the plate beside the truth, m
+GEOMETRIC_ERROR = 1e-3 * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.7, -0.7]])
+FRICTION = Friction(0.05, 0.05, 0.01)
+PUSH = Disturbance(0, (1.0, 1.0), 1.0, 1.25)
+PIN = Pin(1e5, 100.0)
+GAINS = Gains(Lambda=10.0, beta=20.0, K_r=0.5, K_eps=20.0, Gamma=0.5)
+DURATION = 4.0  # s
+SPACE = CartesianSpace("xy")
+
+
+def carry_planar(
+    synchronized: bool = True,
+    grasp: str | Pin = "compliant",
+    geometric_error: bool | ArrayLike = False,
+    friction: bool = False,
+    push: bool = False,
+    leak: float | bool = 0.0,
+    tare: bool = False,
+    admittance: bool = False,
+    gains: Gains | None = None,
+    **parts: Unpack[ControllerParts],
+) -> Experiment:
+    """Four arms with two joints each that carry a plate of 2 kg, with epsilon_k = e_k - e_(k+1) in a ring.
+
+    Args:
+        synchronized, gains, parts: see `ready_experiment`; with `law=ShapeKeeping()`, which has no place for
+            it, the gains of the cell leave out K_eps.
+        grasp: "compliant" for the pins of the cell, or a `Pin`.
+        geometric_error: whether the arms are wrong about where their pins are on the plate, by about 1 mm, or
+            by how much, (4, 2), m, in the plate's axes.
+        friction: whether the joints rub, which the controller does not know.
+        push: whether both joints of arm 1 are pushed for a quarter of a second.
+        leak: of the integrals of epsilon, 1/s, see `Gains`; True for Lambda.
+        tare, admittance: False; pins have neither yet.
+
+    Raises:
+        InputError: a value that is none of these.
+    """
+    for name, wanted in {"tare": tare, "admittance": admittance}.items():
+        if wanted is not False:
+            raise InputError.expected("False, for pins have none yet", wanted, name)
+    boolean("friction", friction), boolean("push", push)
+    error = GEOMETRIC_ERROR * geometric_error if isinstance(geometric_error, bool) else geometric_error
+    error = finite_array("geometric_error", error, (4, 2))
+    arms = [load_robot("planar2r").placed((*BASES[i], 0.0), name=f"arm {i + 1}") for i in range(4)]
+    rubs = FRICTION if friction else Friction()
+    members = [_member(arms[i], i, error[i], rubs) for i in range(4)]
+    cell = Cell(members, Coupling.signed_ring(4), SPACE, name="four planar arms that carry a plate")
+    pushes = [PUSH] * bool(push)
+    default = GAINS.replace(K_eps=0.0) if isinstance(parts.get("law"), ShapeKeeping) else GAINS
+    made = ready_experiment(cell, DURATION, default, gains, synchronized, parts, disturbances=pushes)
+    grasps = [Grasp(i, (*PINS[i], 0.0), compliance=_pin(grasp)) for i in range(4)]
+    at = _start_of_plate()
+    plant = partial(PinnedPlant, body=PLATE, grasps=grasps, at=at, robots=arms, desired=plate_motion())
+    return replace(made, gains=_leaking(made.gains, leak), plant_type=plant)
+
+
+def plate_motion() -> PoseTrajectory:
+    """Desired motion of the plate: to and fro along x, away and back along y while it turns."""
+    way = Swing([SWING[0], 0.0, 0.0], [0.0, SWING[1], 0.0])
+    return PoseTrajectory(way, AxisRotation(np.eye(3), (0, 0, 1), Swing([0.0], [TURN])))
+
+
+class Swing:
+    """to sin(W t) + away (1 - cos(W t)), with W of `SPEED`; one number per component."""
+
+    breaks = ()
+
+    def __init__(self, to: ArrayLike, away: ArrayLike):
+        self.to, self.away = np.array(to, float), np.array(away, float)
+        self.dimension = self.to.size
+
+    def __call__(self, t: ArrayLike) -> Motion:
+        to, away, W = self.to, self.away, SPEED
+        sine, cosine = (f(W * np.asarray(t, float)[..., None]) for f in (np.sin, np.cos))
+        position, acceleration = to * sine + away * (1 - cosine), away * cosine - to * sine
+        return Motion(position, W * (to * cosine + away * sine), W * W * acceleration)
+
+
+class InPlane:
+    """The motion of a place on a body along x and y; the body turns about z."""
+
+    dimension = 2
+
+    def __init__(self, body: PoseTrajectory, place: np.ndarray):
+        self._motion = Attached(body, (*place, 0.0))
+        self.breaks = body.breaks
+
+    def __call__(self, t: ArrayLike) -> Motion:
+        x, x_dot, x_ddot = self._motion(t)
+        return Motion(x[..., :2], x_dot[..., :2], x_ddot[..., :2])
+
+
+def _start_of_plate() -> tuple[np.ndarray, np.ndarray]:
+    return -OFFSET, exp(np.array([0.0, 0.0, -TURNED]))
+
+
+def _member(arm: Robot, i: int, error: np.ndarray, friction: Friction) -> Member:
+    """An arm controlled at its pin, with a quarter of the plate's mass there, wherever it believes that."""
+    quarter = np.array([MASS / 4, *[0.0] * 9])
+    loaded = with_share(arm, quarter, np.zeros(3), np.eye(3))
+    p, R = _start_of_plate()
+    pin = p + R @ (*PINS[i], 0.0)
+    heading = np.arctan2(*(pin[:2] - BASES[i])[::-1])
+    q0 = inverse_kinematics(arm, pin[:2], np.array([heading - 0.7, 1.4]), SPACE)
+    known = ARMS_KNOWN * arm.inertial_parameters
+    share = SHARES_KNOWN[i] * (loaded.inertial_parameters - arm.inertial_parameters)
+    motion = InPlane(plate_motion(), PINS[i] + error)
+    return Member(loaded, motion, q0, theta_hat0=known + share, friction=friction, name=arm.name)
+
+
+def _pin(grasp: str | Pin) -> Pin:
+    if not isinstance(grasp, Pin):
+        choice("grasp", grasp, ("compliant",))
+        return PIN
+    return grasp
+
+
+def _leaking(gains: Gains, leak: float | bool) -> Gains:
+    return gains.replace(leak=gains.Lambda if leak is True else leak) if leak else gains
