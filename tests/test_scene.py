@@ -26,8 +26,7 @@ from hypothesis.extra.numpy import arrays
 from refusals import refused
 
 from synctrl.errors import InputError, RobotError, RobotWarning
-from synctrl.show import scene as scene_module
-from synctrl.show import shapes, view
+from synctrl.show import shapes, shown, view
 from synctrl.show.nodes import continuous, towards
 from synctrl.show.scene import Scene
 from synctrl.tasks.rotations import from_quaternion as matrices
@@ -118,7 +117,7 @@ class Elements(HTMLParser):
 
 
 def payload(page: str) -> list[bytes]:
-    packed = re.search(r'id="commands">([^<]*)<', page)
+    packed = re.search(r'class="commands">([^<]*)<', page)
     assert packed is not None
     return [base64.b64decode(line) for line in packed[1].split()]
 
@@ -579,7 +578,7 @@ def test_a_notebook_gets_the_page_in_a_closed_frame(monkeypatch: pytest.MonkeyPa
     assert tag == "iframe"
     assert attributes["srcdoc"] == scene.page()
     assert "allow-same-origin" not in str(attributes["sandbox"])
-    monkeypatch.setattr(scene_module, "NOTEBOOK_LIMIT", 1000)
+    monkeypatch.setattr(shown, "NOTEBOOK_LIMIT", 1000)
     with refused(InputError, found=len(scene.page())):
         scene.html()
 
