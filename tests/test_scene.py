@@ -489,7 +489,7 @@ def test_the_camera_sees_the_whole_box(box: tuple[np.ndarray, np.ndarray]) -> No
 def test_the_camera_looks_at_everything_that_moves_at_any_time() -> None:
     scene = Scene()
     scene.add_sphere("ball", 0.5, [[0, 0, 0], [10, 0, 0], [0, 0, 4.0]], "#ff0000")
-    np.testing.assert_allclose(scene._view()[2], [[-0.5, -0.5, -0.5], [10.5, 0.5, 4.5]])
+    np.testing.assert_allclose(scene.box(), [[-0.5, -0.5, -0.5], [10.5, 0.5, 4.5]])
     scene.camera((1, 2, 3), (0, 0, 1))
     page = scene.page()
     wanted = [c["value"] for c in decode(page)["set_property"] if c["property"] == "position"]

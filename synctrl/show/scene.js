@@ -58,6 +58,7 @@ async function show(view) {
   shade(shown.scene);
   arrangeControls(shown);
   if (viewers.length > 1) shown.gui.hide();
+  if (document.querySelectorAll(".view").length > 1) shown.gui.close();
 }
 
 async function start() {
