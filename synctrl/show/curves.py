@@ -13,7 +13,7 @@ from ..simulation.result import Result
 from . import plots
 from .legends import columns_that_fit, fitted, legend, legend_rows, plain
 from .panels import GAP, LEFT, LEGEND, RIGHT, TITLE, WIDTH, stacked_panels
-from .style import PALETTE, line_style, robot_color
+from .style import DESIRED, PALETTE, line_style, robot_color
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,9 +63,15 @@ def _draw(panel: Axes, result: Result, shown: Curves) -> list[Any]:
     for k, name in enumerate(shown.names):
         color, look = robot_color(k), line_style(k // len(PALETTE))  # another line where colours repeat
         lines += panel.plot(result.t, shown.values[:, k], ls=look, color=color, label=plain(name))
-        for level in shown.levels[k] if shown.levels else ():
-            panel.axhline(level, ls=(0, (5, 3)), color=color, linewidth=0.9)
+    _draw_levels(panel, shown, PALETTE)
     return lines
+
+
+def _draw_levels(panel: Axes, shown: Curves, colors: Sequence[str] = (DESIRED,)) -> None:
+    """Levels as dashed lines, in the colours of their curves if these have some."""
+    for k, levels in enumerate(shown.levels):
+        for level in levels:
+            panel.axhline(level, ls=(0, (5, 3)), color=colors[k % len(colors)], linewidth=0.9)
 
 
 def overlay(
@@ -93,6 +99,7 @@ def overlay(
             for panel, shown in zip(panels, _alike(own, panels_of), strict=True):
                 for k, values in enumerate(shown.values.T):
                     panel.plot(run.t, values, ls=line_style(k), color=robot_color(i))
+                _draw_levels(panel, shown)
                 panel.set_ylabel(shown.label)
                 panel.set_title(plots.titled(_styled(shown), width), loc="left")
         legend(figure, handles)
