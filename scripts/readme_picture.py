@@ -27,8 +27,8 @@ from browser import open_page
 #: the instant at which the arms are drawn, s, and what shows nothing but them
 INSTANT = 4.5
 BARE = """document.querySelectorAll(".words, .dg").forEach(each => each.style.display = "none");
-viewer.animator.pause(); viewer.animator.display_progress(%g);"""
-CAMERA = (0.55, -1.9, 1.0), (0.0, 0.0, 0.36)
+viewer.animator.pause(); viewer.animator.seek(%g); viewer.animator.display_progress(%g);"""
+CAMERA = (0.4, -1.55, 0.85), (0.0, 0.03, 0.3)
 TITLES = "both know where they hold it", "one is wrong by a millimetre"
 NAMES = "independent", "synchronized", "with a leak"
 
@@ -38,13 +38,13 @@ def main() -> None:
     cells = [carried(False, False), carried(False, True)], [carried(True, False), carried(True, True)]
     cells[1].append(carried(True, True, leak=True))
     with style():
-        figure, panels = new_figure(4.9, 2, 2, width=9.0, sharey="row", height_ratios=(1.45, 1))
+        figure, panels = new_figure(4.9, 2, 2, width=9.0, sharey="row", height_ratios=(1.5, 1))
         draw_arms(panels[0], [runs[1] for runs in cells])
         for panel, runs in zip(panels[1], cells, strict=True):
             for k, run in enumerate(runs):
                 panel.plot(run.t, force(run), color=robot_color(k), linewidth=1.8, label=NAMES[k])
-            panel.set(xlabel="time, s", xlim=(0, run.t[-1]), ylim=(0, None))
-        panels[1, 0].set_ylabel("force inside, N")
+            panel.set(xlabel="time, s", xlim=(0, run.t[-1]))
+        panels[1, 0].set(ylabel="force inside, N", ylim=(0, 1.05 * force(cells[1][1]).max()))
         figure.legend(*panels[1, 1].get_legend_handles_labels(), loc="outside lower right", ncols=3)
         with whole_file(path) as file:
             figure.savefig(file, metadata={"Software": None})
@@ -71,9 +71,9 @@ def draw_arms(panels, runs) -> None:
         scene.camera(*CAMERA)
     with TemporaryDirectory() as folder:
         page, picture = Path(folder, "page.html"), Path(folder, "page.png")
-        with open_page(shown.write(page), (1720, 620)) as browser:
+        with open_page(shown.write(page), (1720, 560)) as browser:
             browser.check_plays()
-            browser.evaluate(BARE % INSTANT)
+            browser.evaluate(BARE % (INSTANT, INSTANT))
             time.sleep(2.0)
             browser.screenshot(picture)
         pixels = imread(picture)
