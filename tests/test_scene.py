@@ -655,7 +655,7 @@ def test_the_page_plays_offline_and_moves_the_robot_as_pinocchio_says(tmp_path: 
         assert page.evaluate(f"{mark}.children[0].material.color.toArray()") == pytest.approx(
             [0, 1, 0], abs=1e-6
         )
-        assert page.evaluate("document.getElementById('failure').textContent") == ""
+        assert page.evaluate("document.querySelector('.failure').textContent") == ""
 
 
 def test_real_meshes_are_shaded_and_hostile_names_do_nothing(tmp_path: Path) -> None:

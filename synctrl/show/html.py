@@ -59,8 +59,8 @@ def page(title: str, *panes: Pane) -> str:
             f'<meta http-equiv="Content-Security-Policy" content="{_policy([library, PLAYER])}">',
             '<meta name="viewport" content="width=device-width"><link rel="icon" href="data:,">',
             f"<title>{escape(title) or 'Scene'}</title><style>{STYLE}</style></head><body>",
-            *map(_view, panes),
             f'<script type="text/plain" id="licences">{licences}</script>',
+            *map(_view, panes),
             f"<script>{library}</script><script>{PLAYER}</script></body></html>\n",
         ]
     )
