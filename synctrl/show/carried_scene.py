@@ -44,6 +44,23 @@ def largest_bead_error(*results: Result) -> float:
     return max((float(_size(run, "bead_error").max()) for run in results), default=0.0)
 
 
+def add_carried(
+    scene: Scene,
+    result: Result,
+    robots: Sequence[Robot],
+    frames: np.ndarray,
+    force: float | None,
+    bead_error: float | None,
+    scale: float,
+) -> list[str]:
+    """All that the functions below add to a scene; returns what a caption says of it."""
+    add_object(scene, result, robots, frames, scale)
+    return [
+        add_forces(scene, result, frames, force, scale),
+        add_beads(scene, result, frames, bead_error, scale),
+    ]
+
+
 def add_object(
     scene: Scene, result: Result, robots: Sequence[Robot], frames: np.ndarray, scale: float
 ) -> None:
@@ -76,9 +93,7 @@ def add_object(
         _add_hand(scene, result.names[i], wrist, hand, scale, robot_color(i))
 
 
-def add_forces(
-    scene: Scene, result: Result, frames: np.ndarray, limit: float | None, scale: float
-) -> str | None:
+def add_forces(scene: Scene, result: Result, frames: np.ndarray, limit: float | None, scale: float) -> str:
     """An arrow at every hand as long as the internal force there; returns what a caption says of it.
 
     Args:
@@ -90,7 +105,7 @@ def add_forces(
     """
     largest = largest_force(result) if limit is None else positive_number("force", limit)
     if not holders(result) or "internal_force" not in result.outputs or largest < NO_FORCE:
-        return None
+        return ""
     place, R = _poses(result, frames)
     length = ARROW * scale / largest
     forces = result.outputs["internal_force"][frames]
@@ -103,9 +118,7 @@ def add_forces(
     return "Arrows: what hands do to the object beyond carrying it, also where it hides them."
 
 
-def add_beads(
-    scene: Scene, result: Result, frames: np.ndarray, limit: float | None, scale: float
-) -> str | None:
+def add_beads(scene: Scene, result: Result, frames: np.ndarray, limit: float | None, scale: float) -> str:
     """Adhesive as it is laid, in the colour of its error; returns what a caption says of it.
 
     Beads of a run with an object are in its axes and go with it; else they are in the world.
@@ -118,7 +131,7 @@ def add_beads(
         scale: reach of the arms, m.
     """
     if "bead_points" not in result.outputs:
-        return None
+        return ""
     points = check_output(result, "bead_points")[frames]
     largest = largest_bead_error(result) if limit is None else positive_number("bead_error", limit)
     share = np.clip(_size(result, "bead_error")[frames] / max(largest, NO_ERROR), 0, 1)

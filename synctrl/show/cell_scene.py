@@ -46,9 +46,8 @@ def scene_of(
 
     It has the arms, the desired paths of their tips where the space says where these are, and a bar between
     the tips of every pair that is compared, in the pair's colour; it grows, and turns red, with the
-    synchronization error. Robots without shapes are drawn as plain links. What hands carry is drawn with the
-    hands that hold it and, as arrows, the internal force of each; adhesive is drawn as it is laid, in the
-    colour of its error.
+    synchronization error. Robots without shapes are drawn as plain links. `carried_scene` draws what hands
+    carry, forces inside it as arrows, and adhesive as it is laid.
 
     Args:
         result: a run in any space, also one that was loaded: its robots are then made again from what the
@@ -67,23 +66,28 @@ def scene_of(
     robots = _robots(result, experiment, package_dirs)
     frames = frame_indices(result, fps)
     scene = arms.arms_scene(result, robots, frames, fps)
-    tips, scale = arms.tip_positions(robots, result.q[frames]), _scale(robots)
-    holding = carried_scene.holders(result)
-    free = [i for i in range(len(robots)) if i not in holding]
-    for i in free:
-        scene.add_sphere(f"tip of {result.names[i]}", BALL * scale, tips[:, i], robot_color(i))
-    desired = _desired_tips(result, robots, frames, tips)
-    if desired is not None:
-        _add_paths(scene, result, desired, free, LINE * scale)
-    bars = _add_bars(scene, result, tips, frames, limit, scale)
-    carried_scene.add_object(scene, result, robots, frames, scale)
+    scale = _scale(robots)
+    said = _add_marks(scene, result, robots, frames, limit, scale)
+    said += carried_scene.add_carried(scene, result, robots, frames, force, bead_error, scale)
     arms.add_disturbances(scene, result, robots, frames)
-    said = [
-        carried_scene.add_forces(scene, result, frames, force, scale),
-        carried_scene.add_beads(scene, result, frames, bead_error, scale),
-    ]
-    scene.caption = " ".join([*_caption(robots, result, desired is not None, bars), *filter(None, said)])
+    scene.caption = " ".join(filter(None, said))
     return scene
+
+
+def _add_marks(
+    scene: Scene,
+    result: Result,
+    robots: Sequence[Robot],
+    frames: np.ndarray,
+    limit: float | None,
+    scale: float,
+) -> list[str]:
+    """Tips, their desired paths and bars between them; returns what a caption says of them."""
+    tips = arms.tip_positions(robots, result.q[frames])
+    desired = _desired_tips(result, robots, frames, tips)
+    _add_tips(scene, result, tips, desired, scale)
+    bars = _add_bars(scene, result, tips, frames, limit, scale)
+    return _caption(robots, result, desired is not None, bars)
 
 
 def _robots(
@@ -131,12 +135,19 @@ def _desired_tips(
     return desired
 
 
-def _add_paths(
-    scene: Scene, result: Result, desired: np.ndarray, robots: Sequence[int], width: float
+def _add_tips(
+    scene: Scene, result: Result, tips: np.ndarray, desired: np.ndarray | None, scale: float
 ) -> None:
-    drawn = [i for i in robots if np.ptp(desired[:, i], axis=0).max() > STILL]
+    """Tips of robots that hold no object, and where these should go, if that is known."""
+    holding = carried_scene.holders(result)
+    free = [i for i in range(len(result.names)) if i not in holding]
+    for i in free:
+        scene.add_sphere(f"tip of {result.names[i]}", BALL * scale, tips[:, i], robot_color(i))
+    if desired is None:
+        return
+    drawn = [i for i in free if np.ptp(desired[:, i], axis=0).max() > STILL]
     for i in drawn:
-        scene.add_line(f"desired path of {result.names[i]}", desired[:, i], DESIRED, width)
+        scene.add_line(f"desired path of {result.names[i]}", desired[:, i], DESIRED, LINE * scale)
     if drawn:
         scene.add_legend("desired paths", DESIRED)
 
@@ -187,7 +198,9 @@ def _passes_a_tip(pair: Sequence[int], tips: np.ndarray, ball: float) -> bool:
 
 
 def _caption(robots: Sequence[Robot], result: Result, has_paths: bool, has_bars: bool) -> list[str]:
-    lines = ["Bars between compared tips grow and turn red with the synchronization error."] * has_bars
+    lines = []
+    if has_bars:
+        lines.append("Bars between compared tips grow and turn red with the synchronization error.")
     if not has_paths:
         lines.append("Desired paths are not shown: the coordinates are not those of tips.")
     plain = [name for name, robot in zip(result.names, robots, strict=True) if not arms.has_shapes(robot)]
