@@ -1,53 +1,87 @@
-"""The picture in README: four arms, one of them pushed, synchronized and independent.
+"""The picture in README: two arms that carry a payload, with the forces inside it.
 
-python scripts/readme_picture.py [docs/disturbed.png]
+python scripts/readme_picture.py [docs/carried.png]
+
+It needs Chromium and the extra `test`, whose browser draws the arms.
 """
 
 from __future__ import annotations
 
 import sys
+import time
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from synctrl.experiments import planar_four
+import numpy as np
+
+from synctrl import Result
+from synctrl.experiments import carry_ur5
 from synctrl.files import whole_file
-from synctrl.show.plots import common_limits, new_figure, style
-from synctrl.show.style import ACCENT, display, line_style, robot_color
+from synctrl.show import side_by_side
+from synctrl.show.plots import new_figure, style
+from synctrl.show.style import robot_color
 
-ROWS = (("tracking_error", "tracking error e"), ("sync_error", "sync. error ε"))
-TITLES = ("synchronized", "independent")
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from browser import open_page
+
+#: the instant at which the arms are drawn, s, and what shows nothing but them
+INSTANT = 4.5
+BARE = """document.querySelectorAll(".words, .dg").forEach(each => each.style.display = "none");
+viewer.animator.pause(); viewer.animator.seek(%g); viewer.animator.display_progress(%g);"""
+CAMERA = (0.4, -1.55, 0.85), (0.0, 0.03, 0.3)
+TITLES = "both know where they hold it", "one is wrong by a millimetre"
+NAMES = "independent", "synchronized", "with a leak"
 
 
 def main() -> None:
-    path = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/disturbed.png")
-    runs = [planar_four(synchronized, disturbance="torque").simulate(3.0) for synchronized in (True, False)]
+    path = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/carried.png")
+    cells = [carried(False, False), carried(False, True)], [carried(True, False), carried(True, True)]
+    cells[1].append(carried(True, True, leak=True))
     with style():
-        figure, panels = new_figure(4.6, 2, 2, width=9.0, sharex=True, sharey="row")
-        for (kind, what), row in zip(ROWS, panels, strict=True):
-            unit, factor = display(runs[0].unit(kind))
-            low, high = common_limits(kind, *runs)
-            for run, panel in zip(runs, row, strict=True):
-                draw(panel, run, kind, factor)
-                panel.set(ylim=(factor * low, factor * high), xlim=(0, 3))
-            row[0].set_ylabel(f"{what}, {unit}")
-        for panel, title in zip(panels[0], TITLES, strict=True):
-            panel.set_title(title, loc="left")
-        for panel in panels[1]:
-            panel.set_xlabel("time, s")
-        for i in range(4):
-            panels[0, 0].plot([], [], color=robot_color(i), linewidth=2.4, label=f"robot {i + 1}")
-        figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=4)
+        figure, panels = new_figure(4.9, 2, 2, width=9.0, sharey="row", height_ratios=(1.5, 1))
+        draw_arms(panels[0], [runs[1] for runs in cells])
+        for panel, runs in zip(panels[1], cells, strict=True):
+            for k, run in enumerate(runs):
+                panel.plot(run.t, force(run), color=robot_color(k), linewidth=1.8, label=NAMES[k])
+            panel.set(xlabel="time, s", xlim=(0, run.t[-1]))
+        panels[1, 0].set(ylabel="force inside, N", ylim=(0, 1.05 * force(cells[1][1]).max()))
+        figure.legend(*panels[1, 1].get_legend_handles_labels(), loc="outside lower right", ncols=3)
         with whole_file(path) as file:
             figure.savefig(file, metadata={"Software": None})
     print(path)
 
 
-def draw(panel, run, kind, factor):
-    """All errors of one kind, and when robot 1 is pushed."""
-    error = getattr(run, kind)
-    panel.axvspan(0.5, 0.75, color=ACCENT, alpha=0.1, linewidth=0)
-    for k in range(error.shape[1]):
-        for axis in range(error.shape[2]):
-            panel.plot(run.t, factor * error[:, k, axis], line_style(axis), color=robot_color(k))
+def carried(geometric_error: bool, synchronized: bool, **options) -> Result:
+    """A run of the cell."""
+    experiment = carry_ur5(synchronized, geometric_error=geometric_error, **options)
+    return experiment.simulate(dt=2e-3, log_dt=1e-2)
+
+
+def force(run: Result) -> np.ndarray:
+    """Size of the internal force, N; both hands have the same."""
+    return np.linalg.norm(run.outputs["internal_force"][:, 0, :3], axis=1)
+
+
+def draw_arms(panels, runs) -> None:
+    """The arms of two runs at one instant, as a browser shows them."""
+    from matplotlib.image import imread
+
+    shown = side_by_side(dict(zip(TITLES, runs, strict=True)))
+    for scene in shown.scenes:
+        scene.camera(*CAMERA)
+    with TemporaryDirectory() as folder:
+        page, picture = Path(folder, "page.html"), Path(folder, "page.png")
+        with open_page(shown.write(page), (1720, 560)) as browser:
+            browser.check_plays()
+            browser.evaluate(BARE % (INSTANT, INSTANT))
+            time.sleep(2.0)
+            browser.screenshot(picture)
+        pixels = imread(picture)
+    half = pixels.shape[1] // 2
+    for panel, first, title in zip(panels, (0, half + 2), TITLES, strict=True):
+        panel.imshow(pixels[:, first : first + half - 2])
+        panel.set_axis_off()
+        panel.set_title(title, loc="left")
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from synctrl.analysis.convergence import Identification, identify
 from synctrl.analysis.metrics import as_data, metrics, settling_bands, write_metrics
 from synctrl.errors import SynctrlError
 from synctrl.paper.bodies import bodies_are_left, bodies_of, bodies_section
+from synctrl.paper.carry_task import CARRY
 from synctrl.paper.claims import Claim
 from synctrl.paper.claims_of_cells import a460_claims, own_findings, planar_four_claims
 from synctrl.paper.fairness import another_law_does_better, fair_section
@@ -39,6 +41,7 @@ from synctrl.paper.plant_sections import (
 )
 from synctrl.paper.report import Links, Section, write_page
 from synctrl.paper.reproduction import PLANNED, PlannedRun, judge_runs, judged, run_all
+from synctrl.paper.tasks import planned_runs, runs_of, task_section
 from synctrl.paper.theory import certificate_section, examine
 from synctrl.show.animation import payload_pair_scene, planar_scene
 from synctrl.show.style import display
@@ -52,6 +55,8 @@ ANIMATED = (
     "planar_four_synchronized_disturbed",
     "planar_four_independent_disturbed",
 )
+#: the tasks of the paper's introduction, with forces
+TASKS = (CARRY,)
 TRIAL = 1.0  # s
 #: the run whose estimated bodies are drawn
 BODIES = "a460_pair_synchronized"
@@ -64,7 +69,7 @@ def main() -> int:
     parser.add_argument("--workers", type=count, default=2, help="number of processes")
     parser.add_argument("--quick", action="store_true", help="no more than a second of every run, as a trial")
     options = parser.parse_args()
-    planned = {**PLANNED, **judge_runs()}
+    planned = {**PLANNED, **planned_runs(TASKS), **judge_runs()}
     if options.quick:
         planned = {name: run.shortened(TRIAL) for name, run in planned.items()}
     limit = 0.1 * TRIAL if options.quick else float("inf")
@@ -100,9 +105,12 @@ def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun], limit:
         sections, bodies, learned = drawn(runs, out), bodies_of(runs), identified(runs)
         certificates, compared = examined.result()
     claims, own = papers_claims(runs), our_findings(runs, bodies[BODIES], compared["planar_four"][0])
+    found, tasks = of_tasks(every, out)
+    checked = [*claims, *own, *found]
     sections = [
-        introduction([*claims, *own]),
+        introduction(checked),
         *sections,
+        *tasks,
         honesty_section(own),
         bodies_section(bodies, BODIES, out / "figures" / "bodies"),
         identification_section(learned),
@@ -114,15 +122,15 @@ def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun], limit:
     write_metrics(
         out / "metrics.json",
         {n: as_data(run, metrics(run, settling_bands(*peers(every, n)))) for n, run in every.items()},
-        [asdict(claim) for claim in (*claims, *own)],
+        [asdict(claim) for claim in checked],
         certificates={name: certificate.as_dict() for name, certificate in certificates.items()},
         comparisons={name: [each.as_dict() for each in pair] for name, pair in compared.items()},
         consistency={name: each.as_dict() for name, each in bodies.items()},
         identification={title: [robot.as_dict() for robot in robots] for title, robots in learned.items()},
     )
     print_table(runs)
-    held = sum(claim.holds for claim in (*claims, *own))
-    print(f"\n{held} of {len(claims) + len(own)} claims hold; the page says which do not, and why.")
+    held = sum(claim.holds for claim in checked)
+    print(f"\n{held} of {len(checked)} claims hold; the page says which do not, and why.")
     return write(out / "index.html", sections, max(run.t[-1] for run in runs.values()))
 
 
@@ -152,6 +160,15 @@ def drawn(runs: Mapping[str, Result], out: Path) -> list[Section]:
         planar_section(planar, layout, figures, animations(runs, out, "planar_four")),
         full_a460_section(a460, figures),
         friction_section(a460, figures),
+    ]
+
+
+def of_tasks(every: Mapping[str, Result], out: Path) -> tuple[list[Claim], list[Section]]:
+    """What is found of the tasks, and their sections."""
+    runs = {task: runs_of(task, every) for task in TASKS}
+    found = {task: task.claims(runs[task]) for task in TASKS}
+    return [*chain.from_iterable(found.values())], [
+        task_section(task, runs[task], found[task], out) for task in TASKS
     ]
 
 

@@ -175,7 +175,7 @@ def test_a_description_of_another_robot_or_no_description_is_refused_by_name(sta
 def test_a_notebook_shows_the_scene_or_says_that_it_is_too_large(star, monkeypatch):
     scene = scene_of(star)
     assert scene._repr_html_().startswith("<iframe sandbox=")
-    monkeypatch.setattr("synctrl.show.scene.NOTEBOOK_LIMIT", 10)
+    monkeypatch.setattr("synctrl.show.shown.NOTEBOOK_LIMIT", 10)
     assert "use write()" in scene._repr_html_() and "<iframe" not in scene._repr_html_()
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from synctrl.show.run_figures import FIGURES
+from synctrl.show.run_figures import FIGURES, OF_TASKS
 
 PAGE = (Path(__file__).parents[1] / "docs" / "looking.md").read_text("utf-8")
 
@@ -19,4 +19,4 @@ def test_the_page_runs_and_leaves_what_it_says(tmp_path, monkeypatch):
 
 
 def test_the_page_names_all_figures():
-    assert re.findall(r"^\| `(\w+)` \|", PAGE, flags=re.MULTILINE) == [*FIGURES]
+    assert re.findall(r"^\| `(\w+)` \|", PAGE, flags=re.MULTILINE) == [*FIGURES, *OF_TASKS]

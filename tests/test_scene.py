@@ -26,8 +26,7 @@ from hypothesis.extra.numpy import arrays
 from refusals import refused
 
 from synctrl.errors import InputError, RobotError, RobotWarning
-from synctrl.show import scene as scene_module
-from synctrl.show import shapes, view
+from synctrl.show import shapes, shown, view
 from synctrl.show.nodes import continuous, towards
 from synctrl.show.scene import Scene
 from synctrl.tasks.rotations import from_quaternion as matrices
@@ -118,7 +117,7 @@ class Elements(HTMLParser):
 
 
 def payload(page: str) -> list[bytes]:
-    packed = re.search(r'id="commands">([^<]*)<', page)
+    packed = re.search(r'class="commands">([^<]*)<', page)
     assert packed is not None
     return [base64.b64decode(line) for line in packed[1].split()]
 
@@ -490,7 +489,7 @@ def test_the_camera_sees_the_whole_box(box: tuple[np.ndarray, np.ndarray]) -> No
 def test_the_camera_looks_at_everything_that_moves_at_any_time() -> None:
     scene = Scene()
     scene.add_sphere("ball", 0.5, [[0, 0, 0], [10, 0, 0], [0, 0, 4.0]], "#ff0000")
-    np.testing.assert_allclose(scene._view()[2], [[-0.5, -0.5, -0.5], [10.5, 0.5, 4.5]])
+    np.testing.assert_allclose(scene.box(), [[-0.5, -0.5, -0.5], [10.5, 0.5, 4.5]])
     scene.camera((1, 2, 3), (0, 0, 1))
     page = scene.page()
     wanted = [c["value"] for c in decode(page)["set_property"] if c["property"] == "position"]
@@ -579,7 +578,7 @@ def test_a_notebook_gets_the_page_in_a_closed_frame(monkeypatch: pytest.MonkeyPa
     assert tag == "iframe"
     assert attributes["srcdoc"] == scene.page()
     assert "allow-same-origin" not in str(attributes["sandbox"])
-    monkeypatch.setattr(scene_module, "NOTEBOOK_LIMIT", 1000)
+    monkeypatch.setattr(shown, "NOTEBOOK_LIMIT", 1000)
     with refused(InputError, found=len(scene.page())):
         scene.html()
 
@@ -656,7 +655,7 @@ def test_the_page_plays_offline_and_moves_the_robot_as_pinocchio_says(tmp_path: 
         assert page.evaluate(f"{mark}.children[0].material.color.toArray()") == pytest.approx(
             [0, 1, 0], abs=1e-6
         )
-        assert page.evaluate("document.getElementById('failure').textContent") == ""
+        assert page.evaluate("document.querySelector('.failure').textContent") == ""
 
 
 def test_real_meshes_are_shaded_and_hostile_names_do_nothing(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from ..robots.payload import Payload
 from ..robots.pseudo_inertia import inertial_parameters, pseudo_inertia
 from ..robots.robot import Robot
 from ..tasks.rotations import from_quaternion, quaternion, skew
+from .outline import Outline
 
 Solve = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """M and b -> M^-1 b."""
@@ -61,8 +62,11 @@ class CarriedObject(Inertia):
         com: centre of mass in the object's axes, (3,), m.
         inertia: about the centre of mass in the object's axes, (3, 3), or (3,) for its diagonal, kg·m^2; by
             default that of a uniform ball of the density of water.
-        box: edges of the box about `center` that is drawn for it, (3,), m, above 0; by default none is.
-        center: of that box, (3,), m; by default the centre of mass.
+        shape: what is drawn for it: edges of a box, (3,), m, above 0, or the `Outline` of a plate; by default
+            nothing is.
+        box: edges of a box, another way to say `shape`.
+        center: of the box or the plate, (3,), m; by default the centre of mass of a box, and of a plate the
+            object's origin.
         name: what figures call it.
 
     Raises:
@@ -72,6 +76,7 @@ class CarriedObject(Inertia):
     mass: float
     com: Any = (0.0, 0.0, 0.0)
     inertia: Any = None
+    shape: Any = None
     box: Any = None
     center: Any = None
     name: str = "object"
@@ -81,12 +86,34 @@ class CarriedObject(Inertia):
         load = Payload(0, self.mass, self.com, self.inertia)
         for name in ("mass", "com", "inertia"):
             object.__setattr__(self, name, getattr(load, name))
-        if self.box is not None:
-            edges = finite_array("object, box", self.box, (3,))
-            positive_number("object, box", float(edges.min()))
-            object.__setattr__(self, "box", edges)
-        center = self.com if self.center is None else self.center
+        shape = self._shape()
+        plate = isinstance(shape, Outline)
+        object.__setattr__(self, "shape", shape)
+        object.__setattr__(self, "box", None if plate else shape)
+        middle = np.zeros(3) if plate else self.com
+        center = middle if self.center is None else self.center
         object.__setattr__(self, "center", finite_array("object, center", center, (3,)))
+
+    def _shape(self) -> np.ndarray | Outline | None:
+        """The shape as it was given, under either name."""
+        name, shape = ("shape", self.shape) if self.box is None else ("box", self.box)
+        if self.box is not None and self.shape is not None and not np.array_equal(self.shape, self.box):
+            raise InputError("expected one of shape and box, found both", subject="object, shape")
+        if shape is None or isinstance(shape, Outline):
+            return shape
+        edges = finite_array(f"object, {name}", shape, (3,))
+        positive_number(f"object, {name}", float(edges.min()))
+        return edges
+
+    def as_dict(self) -> dict[str, Any]:
+        """What it is called, weighs and looks like, as plain data."""
+        return {
+            "name": self.name,
+            "parameters": self.parameters.tolist(),
+            "box": None if self.box is None else self.box.tolist(),
+            "outline": self.shape.as_dict() if isinstance(self.shape, Outline) else None,
+            "center": self.center.tolist(),
+        }
 
     @property
     def parameters(self) -> np.ndarray:

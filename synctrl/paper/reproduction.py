@@ -34,11 +34,16 @@ _report: Any = None
 
 @dataclass(frozen=True)
 class PlannedRun:
-    """A run to be made: how its experiment is built, how long it takes, and what computes the plant."""
+    """A run to be made: how its experiment is built, how long it takes, and what computes the plant.
+
+    `dt` and `log_dt`, s, are those of `Experiment.simulate`.
+    """
 
     make: Callable[[], Experiment]
     duration: float | None = None
     plant: str = "pinocchio"
+    dt: float = 1e-3
+    log_dt: float | None = None
 
     def shortened(self, duration: float) -> Self:
         """This run, cut off where it would take longer than `duration`, s."""
@@ -130,7 +135,10 @@ def _work(name: str, run: PlannedRun, folder: Path) -> Path:
         progress = _reporter(name, duration)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StepWarning)  # the page has a section on steps
-            return experiment.simulate(duration, plant=run.plant, progress=progress).save(path)
+            made = experiment.simulate(
+                duration, run.dt, plant=run.plant, log_dt=run.log_dt, progress=progress
+            )
+            return made.save(path)
     except SimulationError as error:
         if error.result is not None:
             error.result.save(path)

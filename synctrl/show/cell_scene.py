@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ..analysis.metrics import row_names
-from ..assembly.body import place_of
 from ..errors import InputError, SynctrlError
 from ..robots.robot import Robot
 from ..robots.written import read_robot
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from ..tasks.rotations import quaternion
-from . import arms
+from . import arms, carried_scene
 from .legends import pair_colors, pair_symbols
 from .runs import check_run, frame_indices, shown_experiment
 from .scene import Scene
@@ -23,8 +21,6 @@ from .style import DESIRED, read_color, robot_color
 
 #: as shares of the reach of the arms: a tip, a desired path, and bars without and with the largest error
 BALL, LINE, THIN, THICK = 0.032, 0.006, 0.006, 0.02
-#: colour of an object that hands carry
-CARRIED = "#b9b2a3"
 #: colour of the bar where there is no other
 ONE_PAIR = "#a3acb7"
 #: reach that is assumed where arms have none, such as wheels, m
@@ -41,6 +37,8 @@ def scene_of(
     experiment: Experiment | None = None,
     *,
     limit: float | None = None,
+    force: float | None = None,
+    bead_error: float | None = None,
     fps: float = FPS,
     package_dirs: Iterable[str | Path] = (),
 ) -> Scene:
@@ -48,13 +46,16 @@ def scene_of(
 
     It has the arms, the desired paths of their tips where the space says where these are, and a bar between
     the tips of every pair that is compared, in the pair's colour; it grows, and turns red, with the
-    synchronization error. Robots without shapes are drawn as plain links, what hands carry as its box.
+    synchronization error. Robots without shapes are drawn as plain links. `carried_scene` draws what hands
+    carry, forces inside it as arrows, and adhesive as it is laid.
 
     Args:
         result: a run in any space, also one that was loaded: its robots are then made again from what the
             result says of them.
         experiment: what made it, for results whose robots cannot be made again.
         limit: synchronization error that is fully red, in its unit; by default the largest of the run.
+        force: internal force of the longest arrow, N; by default the largest of the run.
+        bead_error: error of adhesive that is fully red, m; by default the largest of the run.
         fps: frames per second.
         package_dirs: where else than in installed packages meshes of loaded results may be looked for.
 
@@ -65,17 +66,28 @@ def scene_of(
     robots = _robots(result, experiment, package_dirs)
     frames = frame_indices(result, fps)
     scene = arms.arms_scene(result, robots, frames, fps)
-    tips, scale = arms.tip_positions(robots, result.q[frames]), _scale(robots)
-    for i, name in enumerate(result.names):
-        scene.add_sphere(f"tip of {name}", BALL * scale, tips[:, i], robot_color(i))
-    desired = _desired_tips(result, robots, frames, tips)
-    if desired is not None:
-        _add_paths(scene, result, desired, LINE * scale)
-    _add_bars(scene, result, tips, frames, limit, scale)
-    _add_object(scene, result, frames)
+    scale = _scale(robots)
+    said = _add_marks(scene, result, robots, frames, limit, scale)
+    said += carried_scene.add_carried(scene, result, robots, frames, force, bead_error, scale)
     arms.add_disturbances(scene, result, robots, frames)
-    scene.caption = " ".join(_caption(robots, result, desired is not None))
+    scene.caption = " ".join(filter(None, said))
     return scene
+
+
+def _add_marks(
+    scene: Scene,
+    result: Result,
+    robots: Sequence[Robot],
+    frames: np.ndarray,
+    limit: float | None,
+    scale: float,
+) -> list[str]:
+    """Tips, their desired paths and bars between them; returns what a caption says of them."""
+    tips = arms.tip_positions(robots, result.q[frames])
+    desired = _desired_tips(result, robots, frames, tips)
+    _add_tips(scene, result, tips, desired, scale)
+    bars = _add_bars(scene, result, tips, frames, limit, scale)
+    return _caption(robots, result, desired is not None, bars)
 
 
 def _robots(
@@ -123,38 +135,47 @@ def _desired_tips(
     return desired
 
 
-def _add_paths(scene: Scene, result: Result, desired: np.ndarray, width: float) -> None:
-    drawn = [i for i in range(len(result.names)) if np.ptp(desired[:, i], axis=0).max() > STILL]
+def _add_tips(
+    scene: Scene, result: Result, tips: np.ndarray, desired: np.ndarray | None, scale: float
+) -> None:
+    """Tips of robots that hold no object, and where these should go, if that is known."""
+    holding = carried_scene.holders(result)
+    free = [i for i in range(len(result.names)) if i not in holding]
+    for i in free:
+        scene.add_sphere(f"tip of {result.names[i]}", BALL * scale, tips[:, i], robot_color(i))
+    if desired is None:
+        return
+    drawn = [i for i in free if np.ptp(desired[:, i], axis=0).max() > STILL]
     for i in drawn:
-        scene.add_line(f"desired path of {result.names[i]}", desired[:, i], DESIRED, width)
+        scene.add_line(f"desired path of {result.names[i]}", desired[:, i], DESIRED, LINE * scale)
     if drawn:
         scene.add_legend("desired paths", DESIRED)
 
 
 def _add_bars(
     scene: Scene, result: Result, tips: np.ndarray, frames: np.ndarray, limit: float | None, scale: float
-) -> None:
-    """Bars of each pair, in its colour until they redden."""
+) -> bool:
+    """Bars of each pair, in its colour until they redden; none between hands of one object.
+
+    Returns:
+        Whether there are any.
+    """
+    holding, drawn = {*carried_scene.holders(result)}, False
     share = arms.error_share(result, limit)[0][frames]
     names, colors = row_names(result, "sync_error"), pair_colors(result)
     colors = colors if len(colors) > 1 else [ONE_PAIR]
     marks = zip(result.info["pairs"], colors, pair_symbols(result), names, strict=True)
     lifts = _lifts(result.info["pairs"], tips[0], BALL * scale)
     for k, (robots, color, symbol, name) in enumerate(marks):
+        if holding.issuperset(robots):
+            continue
+        drawn = True
         calm = np.array(read_color(symbol, color)[:3])
         radius = scale * (THIN + share[:, k] * (THICK - THIN))
         lifted = tips + np.array([0.0, 0.0, lifts[k]])
         arms.add_bars(scene, result, symbol, robots, lifted, radius, arms.error_color(share[:, k], calm))
         scene.add_legend(f"{symbol}: {name.partition(': ')[2]}", color)
-
-
-def _add_object(scene: Scene, result: Result, frames: np.ndarray) -> None:
-    """The box of an object that hands carry, as it moved."""
-    about = result.info.get("object")
-    if "object_pose" in result.outputs and isinstance(about, Mapping) and about.get("box") is not None:
-        place, R = place_of(result.outputs["object_pose"][frames])
-        scene.add_box(about["name"], about["box"], place + R @ about["center"], CARRIED, quaternion(R))
-        scene.add_legend(about["name"], CARRIED)
+    return drawn
 
 
 def _lifts(pairs: Sequence[Sequence[int]], tips: np.ndarray, ball: float) -> list[float]:
@@ -176,8 +197,10 @@ def _passes_a_tip(pair: Sequence[int], tips: np.ndarray, ball: float) -> bool:
     return bool(((share > 0) & (share < 1) & (off < ball)).any())
 
 
-def _caption(robots: Sequence[Robot], result: Result, has_paths: bool) -> list[str]:
-    lines = ["Bars between compared tips grow and turn red with the synchronization error."]
+def _caption(robots: Sequence[Robot], result: Result, has_paths: bool, has_bars: bool) -> list[str]:
+    lines = []
+    if has_bars:
+        lines.append("Bars between compared tips grow and turn red with the synchronization error.")
     if not has_paths:
         lines.append("Desired paths are not shown: the coordinates are not those of tips.")
     plain = [name for name, robot in zip(result.names, robots, strict=True) if not arms.has_shapes(robot)]

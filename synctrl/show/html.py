@@ -7,6 +7,7 @@ import gzip
 import hashlib
 import json
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from html import escape
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,28 +21,35 @@ from .nodes import JSON, TINY
 STYLE, PLAYER = (Path(__file__).with_name(name).read_text("utf-8") for name in ("scene.css", "scene.js"))
 
 
-def page(
-    commands: Iterable[bytes],
-    target: Sequence[float],
-    title: str,
-    caption: str,
-    legend: Sequence[tuple[str, str]] = (),
-    remarks: Sequence[str] = (),
-) -> str:
-    """A self-contained HTML page that shows a scene and asks nothing of the network.
+@dataclass(frozen=True)
+class Pane:
+    """A scene of a page.
 
-    Args:
+    Attributes:
         commands: packed MeshCat commands, in order.
         target: what the camera aims at and turns about, in the viewer's axes.
         title: heading; text, never markup.
         caption: line below it; text, never markup.
         legend: label and colour (#rrggbb) pairs.
         remarks: lines below the legend; text, never markup.
+    """
+
+    commands: Sequence[bytes]
+    target: Sequence[float]
+    title: str = ""
+    caption: str = ""
+    legend: Sequence[tuple[str, str]] = ()
+    remarks: Sequence[str] = ()
+
+
+def page(title: str, *panes: Pane) -> str:
+    """A self-contained HTML page that shows scenes side by side and asks nothing of the network.
+
+    All scenes play at one time, and are seen from one place.
 
     Raises:
         MissingDependencyError: MeshCat's viewer is not installed.
     """
-    lines = "\n".join(base64.b64encode(gzip.compress(c, mtime=0)).decode() for c in commands)
     library = _viewer_source("dist/main.min.js")
     licences = "\n".join(map(_viewer_source, ("LICENSE", "dist/main.min.js.LICENSE.txt")))
     return "\n".join(
@@ -51,11 +59,22 @@ def page(
             f'<meta http-equiv="Content-Security-Policy" content="{_policy([library, PLAYER])}">',
             '<meta name="viewport" content="width=device-width"><link rel="icon" href="data:,">',
             f"<title>{escape(title) or 'Scene'}</title><style>{STYLE}</style></head><body>",
-            f'<div><div id="meshcat-pane" data-target="{json.dumps(list(target))}"></div></div>',
-            f'<div id="words">{_words(title, caption, legend, remarks)}</div>',
             f'<script type="text/plain" id="licences">{licences}</script>',
-            f'<script type="text/plain" id="commands">{lines}</script>',
+            *map(_view, panes),
             f"<script>{library}</script><script>{PLAYER}</script></body></html>\n",
+        ]
+    )
+
+
+def _view(pane: Pane) -> str:
+    """A part of the page: where the scene is drawn, what is said of it, and its commands."""
+    lines = "\n".join(base64.b64encode(gzip.compress(c, mtime=0)).decode() for c in pane.commands)
+    target = json.dumps(list(pane.target))
+    return "\n".join(
+        [
+            f'<div class="view"><div class="pane" data-target="{target}"></div>',
+            f'<div class="words">{_words(pane)}</div>',
+            f'<script type="text/plain" class="commands">{lines}</script></div>',
         ]
     )
 
@@ -68,12 +87,15 @@ def frame(page: str, height: int) -> str:
     )
 
 
-def _words(title: str, caption: str, legend: Sequence[tuple[str, str]], remarks: Sequence[str]) -> str:
-    entries = [f'<span><i style="background: {escape(c)}"></i>{escape(label)}</span>' for label, c in legend]
-    paragraphs = [escape(caption), "".join(entries), *map(escape, remarks)]
-    heading = f"<h1>{escape(title)}</h1>" if title else ""
+def _words(pane: Pane) -> str:
+    entries = [
+        f'<span><i style="background: {escape(color)}"></i>{escape(label)}</span>'
+        for label, color in pane.legend
+    ]
+    paragraphs = [escape(pane.caption), "".join(entries), *map(escape, pane.remarks)]
+    heading = f"<h1>{escape(pane.title)}</h1>" if pane.title else ""
     text = "".join(f"<p>{p}</p>" for p in paragraphs if p)
-    return f'{heading}{text}<p id="time"></p><p id="failure"></p>'
+    return f'{heading}{text}<p class="time"></p><p class="failure"></p>'
 
 
 def _policy(scripts: Iterable[str]) -> str:

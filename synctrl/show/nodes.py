@@ -143,7 +143,7 @@ class _Export:
 
     def _mesh(self, shape: Solid, number: int, rgb: np.ndarray | None) -> JSON:
         uuid = self._uuid()
-        material = _material(shape.color)
+        material = _material(shape.color) | (_IN_FRONT if shape.in_front else {})
         if rgb is not None:
             material["name"] = uuid  # not to be shared: this one changes its colour
             self._track(f"{uuid}.material.color", "color", rgb)
@@ -151,6 +151,7 @@ class _Export:
             "uuid": uuid,
             "type": "Mesh",
             "name": label("shape", str(number)),
+            **({"renderOrder": 1} if shape.in_front else {}),
             "geometry": _shared(self.geometries, shape.geometry),
             "material": _shared(self.materials, material),
             "matrix": _column_major(shape.matrix),
@@ -188,6 +189,10 @@ def _material(color: tuple[float, ...]) -> JSON:
         "shininess": 30,
         "specular": 0x222222,
     }
+
+
+#: of a material that nothing hides: drawn last, whatever is before it, and its front alone
+_IN_FRONT: JSON = {"depthTest": False, "transparent": True, "side": 0}
 
 
 def _first_pose(node: Node) -> np.ndarray:

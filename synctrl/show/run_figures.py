@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from html import escape
 from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,39 +17,22 @@ from ..checks import choice, finite_number
 from ..errors import InputError, SynctrlError
 from ..simulation.result import Result
 from . import plots
-from .legends import columns_that_fit, fitted, legend, legend_rows, plain
-from .panels import GAP, LEFT, LEGEND, RIGHT, TITLE, WIDTH, stacked_panels
+from .assembly_figures import CURVES, assembly_figure, has
+from .curves import Curves, curves_figure
+from .legends import legend, legend_rows, plain
+from .panels import LEGEND, TITLE, WIDTH, stacked_panels
 from .runs import check_run
-from .style import DESIRED, PALETTE, line_style, robot_color
+from .style import DESIRED, robot_color
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: heights of panels, inches
-PANEL, COORDINATE = 1.5, 1.1
+#: height of a panel, inches
+COORDINATE = 1.1
 #: a limit is drawn where torques come as close to it as this share
 NEAR = 0.5
 #: how many estimates of a robot are drawn: those that move most
 MOST_ESTIMATES = 6
-
-
-class Curves(NamedTuple):
-    """What one panel shows over time.
-
-    Attributes:
-        title: above it.
-        label: of the vertical axis.
-        values: (T, k).
-        names: what the legend calls the k curves.
-        levels: values that are drawn as a dashed line in the colour of each curve, if any.
-    """
-
-    title: str
-    label: str
-    values: np.ndarray
-    names: list[str]
-    levels: list[tuple[float, ...]]
 
 
 def torques(result: Result, *, width: float = WIDTH) -> Figure:
@@ -74,7 +58,7 @@ def torques(result: Result, *, width: float = WIDTH) -> Figure:
                     [_near(result.tau[:, i, k], limits[k]) for k in columns],
                 )
             )
-    return _figure(result, curves, width)
+    return curves_figure(result, curves, width)
 
 
 def estimates(result: Result, *, width: float = WIDTH) -> Figure:
@@ -99,7 +83,7 @@ def estimates(result: Result, *, width: float = WIDTH) -> Figure:
         names, true = ([robot[key][k] for k in moved] for key in ("parameters", "theta"))
         levels = _within_reach(theta_hat[:, moved], true)
         curves.append(Curves(title, "SI units", theta_hat[:, moved], names, levels))
-    return _figure(result, curves, width)
+    return curves_figure(result, curves, width)
 
 
 def paths(result: Result, *, width: float = WIDTH) -> Figure:
@@ -128,33 +112,6 @@ def paths(result: Result, *, width: float = WIDTH) -> Figure:
     return figure
 
 
-def _figure(result: Result, curves: Sequence[Curves], width: float) -> Figure:
-    """A panel for each group of curves, with a title and a legend of its own."""
-    room = width - LEFT - RIGHT
-    with plots.style():
-        rows = [-(-len(c.names) // columns_that_fit([plain(n) for n in c.names], room)) for c in curves]
-        above = [GAP + TITLE + LEGEND * count for count in rows]
-        figure, panels = stacked_panels([PANEL] * len(curves), above, width)
-        for panel, shown in zip(panels, curves, strict=True):
-            handles = _draw(panel, result, shown)
-            plots.shade_disturbances(panel, result)
-            panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), **fitted(handles, room))
-            y = 1 + LEGEND * legend_rows(handles, room) / PANEL  # above the legend
-            panel.set_title(plots.titled(shown.title, width), loc="left", y=y)
-            panel.set_ylabel(shown.label)
-    return figure
-
-
-def _draw(panel: Axes, result: Result, shown: Curves) -> list[Any]:
-    lines = []
-    for k, name in enumerate(shown.names):
-        color, look = robot_color(k), line_style(k // len(PALETTE))  # another line where colours repeat
-        lines += panel.plot(result.t, shown.values[:, k], ls=look, color=color, label=plain(name))
-        for level in shown.levels[k]:
-            panel.axhline(level, ls=(0, (5, 3)), color=color, linewidth=0.9)
-    return lines
-
-
 def _limited(name: str, limit: float | None) -> str:
     return name if limit is None else f"{name}, ±{limit:g}"
 
@@ -172,7 +129,7 @@ def _near(tau: np.ndarray, limit: float | None) -> tuple[float, ...]:
     return tuple(sign * limit for sign in (1, -1) if (sign * tau).max() > NEAR * limit)
 
 
-#: the figures that have a name, in the order in which they are shown
+#: the figures of any run, by name, in the order in which they are shown
 FIGURES: Mapping[str, Callable[..., Figure]] = MappingProxyType(
     {
         "tracking_error": plots.tracking_errors,
@@ -181,6 +138,10 @@ FIGURES: Mapping[str, Callable[..., Figure]] = MappingProxyType(
         "path": paths,
         "estimates": estimates,
     }
+)
+#: those of runs that log what they show
+OF_TASKS: Mapping[str, Callable[..., Figure]] = MappingProxyType(
+    {name: partial(assembly_figure, name=name) for name in CURVES}
 )
 #: the narrowest figure in which all words have their place, inches
 NARROWEST = 3.0
@@ -227,8 +188,8 @@ def gallery(result: Result, *names: str, width: float = WIDTH) -> Gallery:
 
     Args:
         result: the run.
-        names: which ones, see `FIGURES`; by default all. What a run does not have is then left out and named
-            in `missing`.
+        names: which ones, see `FIGURES` and `OF_TASKS`; by default all of the first, and of the others those
+            that the run has. Of the first, what a run does not have is left out and named in `missing`.
         width: of all figures, inches.
 
     Raises:
@@ -238,9 +199,11 @@ def gallery(result: Result, *names: str, width: float = WIDTH) -> Gallery:
     if not finite_number("width", width) >= NARROWEST:
         raise InputError.expected(f"at least {NARROWEST:g} inches", width, "width")
     found = Gallery(str(result.info["title"]))
-    for name in names or FIGURES:
+    known = {**FIGURES, **OF_TASKS}
+    asked = names or (*FIGURES, *(name for name in OF_TASKS if has(result, name)))
+    for name in asked:
         try:
-            found[name] = FIGURES[choice("figure", name, tuple(FIGURES))](result, width=width)
+            found[name] = known[choice("figure", name, tuple(known))](result, width=width)
         except SynctrlError as error:
             if names or (len(found.missing) + 1 == len(FIGURES)):
                 raise

@@ -42,6 +42,25 @@ def check_run(result: Result, *arrays: str) -> None:
             )
 
 
+def check_output(result: Result, name: str) -> np.ndarray:
+    """An output of a run that is to be drawn.
+
+    Raises:
+        InputError: the run has none of this name, or one with numbers that cannot be drawn.
+    """
+    subject = f"run '{result.info['title']}', outputs, {name}"
+    if name not in result.outputs:
+        raise InputError("expected a run that has it", subject=subject, found=tuple(result.outputs))
+    numbers = result.outputs[name]
+    seen = np.abs(numbers) <= LARGEST
+    if not seen.all():
+        found = numbers[~seen][0]
+        raise InputError(
+            f"expected numbers up to {LARGEST:g} to draw, found {found:g}", subject=subject, found=found
+        )
+    return numbers
+
+
 def check_axes(result: Result, *axes: str) -> None:
     """Refuse a run whose coordinates are not those of tips along these axes.
 

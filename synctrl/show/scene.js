@@ -1,5 +1,5 @@
 "use strict";
-var viewer;
+var viewer, viewers = [];
 
 async function inflate(line) {
   const packed = Uint8Array.from(atob(line), c => c.charCodeAt(0));
@@ -13,7 +13,7 @@ function shade(root) {
   });
 }
 
-function arrangeControls() {
+function arrangeControls(viewer) {
   const scene = viewer.scene_tree.find(["meshcat"]);
   const root = scene.find(["<object>"]).object;
   root.children.forEach(child => scene.add_child(child));
@@ -22,23 +22,52 @@ function arrangeControls() {
 }
 
 function showTime() {
-  document.getElementById("time").textContent = `t = ${viewer.animator.time.toFixed(2)} s`;
+  viewers.slice(1).forEach(follow);
+  viewers.forEach((each, k) => {
+    document.querySelectorAll(".time")[k].textContent = `t = ${each.animator.time.toFixed(2)} s`;
+  });
   requestAnimationFrame(showTime);
 }
 
-async function start() {
-  const lines = document.getElementById("commands").textContent.trim().split("\n");
+// The time of all scenes is that of the first, whose controls are the only ones.
+function follow(other) {
+  other.animator.pause();
+  other.animator.seek(viewer.animator.time);
+  other.animator.display_progress(viewer.animator.time);
+}
+
+// Who turns or moves one scene turns and moves all.
+function seeTogether() {
+  viewers.forEach(one => one.controls.addEventListener("change", () => viewers.forEach(other => {
+    if (other === one) return;
+    other.camera.position.copy(one.camera.position);
+    other.controls.target.copy(one.controls.target);
+    other.set_dirty();
+  })));
+}
+
+async function show(view) {
+  const lines = view.querySelector(".commands").textContent.trim().split("\n");
   const commands = await Promise.all(lines.map(inflate));
-  const pane = document.getElementById("meshcat-pane");
-  viewer = new MeshCat.Viewer(pane);
-  viewer.controls.target.fromArray(JSON.parse(pane.dataset.target));
-  commands.forEach(command => viewer.handle_command_bytearray(command));
-  shade(viewer.scene);
-  arrangeControls();
+  const pane = view.querySelector(".pane");
+  const shown = new MeshCat.Viewer(pane);
+  viewers.push(shown);
+  viewer = viewers[0];
+  shown.controls.target.fromArray(JSON.parse(pane.dataset.target));
+  commands.forEach(command => shown.handle_command_bytearray(command));
+  shade(shown.scene);
+  arrangeControls(shown);
+  if (viewers.length > 1) shown.gui.hide();
+  if (document.querySelectorAll(".view").length > 1) shown.gui.close();
+}
+
+async function start() {
+  for (const view of document.querySelectorAll(".view")) await show(view);
+  seeTogether();
   if (viewer.animator.duration > 0) showTime();
 }
 
 start().catch(error => {
-  document.getElementById("failure").textContent = `This scene cannot be shown: ${error.message}`;
+  document.querySelector(".failure").textContent = `This scene cannot be shown: ${error.message}`;
   throw error;
 });

@@ -5,7 +5,7 @@ Round and square shapes are unit shapes stretched by a matrix, so that all boxes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,12 +27,14 @@ class Solid:
         bounds: lowest and highest corner of the geometry, (2, 3), m.
         matrix: placement and stretch of the geometry in the node that carries it, (4, 4).
         color: red, green, blue, opacity in [0, 1].
+        in_front: whether it is seen through all that is before it.
     """
 
     geometry: dict[str, Any]
     bounds: np.ndarray
     matrix: np.ndarray
     color: Color = GREY
+    in_front: bool = False
 
 
 def box(size: np.ndarray, color: Color = GREY) -> Solid:
@@ -86,6 +88,60 @@ def tube(points: np.ndarray, radius: float, color: Color = GREY) -> Solid:
     angles = np.linspace(0, 2 * np.pi, TUBE_SIDES, endpoint=False)[:, None]
     rings = np.cos(angles) * normals[:, None] + np.sin(angles) * binormals[:, None]  # (k, sides, 3)
     return mesh((points[:, None] + radius * rings).reshape(-1, 3), _quads(len(points)), color)
+
+
+def prism(outline: np.ndarray, thickness: float, color: Color = GREY) -> Solid:
+    """A plate about z = 0: its outline in x and y, (k, 2), m, does not cross itself."""
+    turns_left = _double_area(*outline.T) > 0
+    rim = outline if turns_left else outline[::-1]
+    k, half = len(rim), np.full((len(rim), 1), thickness / 2)
+    top, start = triangles(rim), np.arange(k)
+    end = np.roll(start, -1)
+    # Faces do not share points, so that the light does not round their edges.
+    walls = [np.stack([start + k, end + k, end], axis=1), np.stack([start + k, end, start], axis=1)]
+    ring = np.vstack([np.hstack([rim, half]), np.hstack([rim, -half])])
+    faces = np.vstack([top, top[:, ::-1] + k, *(wall + 2 * k for wall in walls)])
+    return mesh(np.vstack([ring, ring]), faces, color)
+
+
+def triangles(rim: np.ndarray) -> np.ndarray:
+    """Triangles that fill a rim, (k, 2), that turns left and does not cross itself: (k - 2, 3), from 0.
+
+    Corner after corner is cut off, each where nothing of the rest lies inside the triangle.
+    """
+    left, cut = list(range(len(rim))), []
+    while len(left) > 2:
+        j = next((j for j in range(len(left)) if _is_ear(rim, left, j)), 0)
+        cut.append((left[j - 1], left[j], left[(j + 1) % len(left)]))
+        del left[j]
+    return np.array(cut)
+
+
+def _is_ear(rim: np.ndarray, left: list[int], j: int) -> bool:
+    corners = rim[[left[j - 1], left[j], left[(j + 1) % len(left)]]]
+    if _double_area(*corners.T) < 0:
+        return False
+    others = rim[left]
+    sides = np.roll(corners, -1, axis=0) - corners
+    way = others[None] - corners[:, None]  # (3, k, 2)
+    inside = (sides[:, None, 0] * way[..., 1] - sides[:, None, 1] * way[..., 0] > 0).all(axis=0)
+    return not inside.any()
+
+
+def _double_area(x: np.ndarray, y: np.ndarray) -> float:
+    """Twice the area of a rim, above 0 if it turns left."""
+    return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
+#: radius of the head of an arrow and its length at most, as multiples of the radius of its shaft
+HEAD, HEAD_LENGTH = 2.4, 0.4
+
+
+def arrow(color: Color = GREY) -> list[Solid]:
+    """An arrow from the origin to z = 1 in front of all else, with a shaft of radius 1; to be stretched."""
+    shaft, head = cylinder(1.0, 1 - HEAD_LENGTH, color), cylinder(HEAD, HEAD_LENGTH, color, top=0.0)
+    shaft.matrix[2, 3], head.matrix[2, 3] = (1 - HEAD_LENGTH) / 2, 1 - HEAD_LENGTH / 2
+    return [replace(part, in_front=True) for part in (shaft, head)]
 
 
 def corners(shape: Solid) -> np.ndarray:

@@ -1,0 +1,129 @@
+"""Panels of curves over time: of one run, or of several on top of one another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..checks import instance
+from ..errors import InputError
+from ..simulation.result import Result
+from . import plots
+from .legends import columns_that_fit, fitted, legend, legend_rows, plain
+from .panels import GAP, LEFT, LEGEND, RIGHT, TITLE, WIDTH, stacked_panels
+from .style import DESIRED, PALETTE, line_style, robot_color
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: height of a panel, inches
+PANEL = 1.5
+
+
+class Curves(NamedTuple):
+    """What one panel shows over time.
+
+    Attributes:
+        title: above it.
+        label: of the vertical axis.
+        values: (T, k).
+        names: what the legend calls the k curves.
+        levels: values that are drawn as a dashed line in the colour of each curve, if any.
+    """
+
+    title: str
+    label: str
+    values: np.ndarray
+    names: list[str]
+    levels: Sequence[tuple[float, ...]] = ()
+
+
+def curves_figure(result: Result, curves: Sequence[Curves], width: float) -> Figure:
+    """A panel for each group of curves, with a title and a legend of its own."""
+    room = width - LEFT - RIGHT
+    with plots.style():
+        rows = [-(-len(c.names) // columns_that_fit([plain(n) for n in c.names], room)) for c in curves]
+        above = [GAP + TITLE + LEGEND * count for count in rows]
+        figure, panels = stacked_panels([PANEL] * len(curves), above, width)
+        for panel, shown in zip(panels, curves, strict=True):
+            handles = _draw(panel, result, shown)
+            plots.shade_disturbances(panel, result)
+            panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), **fitted(handles, room))
+            y = 1 + LEGEND * legend_rows(handles, room) / PANEL  # above the legend
+            panel.set_title(plots.titled(shown.title, width), loc="left", y=y)
+            panel.set_ylabel(shown.label)
+    return figure
+
+
+def _draw(panel: Axes, result: Result, shown: Curves) -> list[Any]:
+    lines = []
+    for k, name in enumerate(shown.names):
+        color, look = robot_color(k), line_style(k // len(PALETTE))  # another line where colours repeat
+        lines += panel.plot(result.t, shown.values[:, k], ls=look, color=color, label=plain(name))
+    _draw_levels(panel, shown, PALETTE)
+    return lines
+
+
+def _draw_levels(panel: Axes, shown: Curves, colors: Sequence[str] = (DESIRED,)) -> None:
+    """Levels as dashed lines, in the colours of their curves if these have some."""
+    for k, levels in enumerate(shown.levels):
+        for level in levels:
+            panel.axhline(level, ls=(0, (5, 3)), color=colors[k % len(colors)], linewidth=0.9)
+
+
+def overlay(
+    curves_of: Callable[[Result], Sequence[Curves]], runs: Mapping[str, Result], *, width: float = WIDTH
+) -> Figure:
+    """The same curves of several runs in the same panels: colour is the run, line style the curve.
+
+    Args:
+        curves_of: what is drawn of a run, such as `assembly_figures.internal_force_curves`.
+        runs: by name; each is drawn as far as it goes.
+        width: of the figure, inches.
+
+    Raises:
+        InputError: no runs, or runs with other curves than the first.
+    """
+    from matplotlib.lines import Line2D
+
+    drawn = {name: list(curves_of(run)) for name, run in _named(runs).items()}
+    panels_of = next(iter(drawn.values()))
+    with plots.style():
+        handles = [Line2D([], [], color=robot_color(i), label=plain(name)) for i, name in enumerate(drawn)]
+        above = [LEGEND * legend_rows(handles, width) + TITLE, *[TITLE] * (len(panels_of) - 1)]
+        figure, panels = stacked_panels([PANEL] * len(panels_of), above, width)
+        for i, (run, own) in enumerate(zip(runs.values(), drawn.values(), strict=True)):
+            for panel, shown in zip(panels, _alike(own, panels_of), strict=True):
+                for k, values in enumerate(shown.values.T):
+                    panel.plot(run.t, values, ls=line_style(k), color=robot_color(i))
+                _draw_levels(panel, shown)
+                panel.set_ylabel(shown.label)
+                panel.set_title(plots.titled(_styled(shown), width), loc="left")
+        legend(figure, handles)
+    return figure
+
+
+def _named(runs: Mapping[str, Result]) -> Mapping[str, Result]:
+    instance("runs", runs, Mapping, "runs by name")
+    if not runs:
+        raise InputError("expected at least one run, found none", subject="runs")
+    return runs
+
+
+def _alike(own: Sequence[Curves], first: Sequence[Curves]) -> Sequence[Curves]:
+    """The curves of a run, if they are those of the first one."""
+    shapes, expected = ([(c.title, c.label, c.names) for c in some] for some in (own, first))
+    if shapes != expected:
+        raise InputError("expected runs with the same curves", subject="runs", found=shapes)
+    return own
+
+
+def _styled(shown: Curves) -> str:
+    """The title of a panel whose line styles are those of its curves."""
+    if len(shown.names) < 2:
+        return shown.title
+    marks = ("solid", "dash-dot", "dotted", "dashed")
+    return f"{shown.title}: " + ", ".join(f"{n} {m}" for n, m in zip(shown.names, marks, strict=False))
