@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from functools import cached_property, partial
 from typing import Any
@@ -208,6 +208,15 @@ class Plant:
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         """What a result says of the plant's own state at its logged instants, (T, size of the state)."""
         return {}
+
+    def account(self, log: Mapping[str, np.ndarray]) -> tuple[dict[str, Any], dict[str, Output]]:
+        """`report` and `outputs_along` together, of a plant that needs more of the log for them.
+
+        Args:
+            log: arrays of `Result` by name, those that its adaptation adds, and "plant_state".
+        """
+        hidden = log["plant_state"]
+        return self.report(hidden), self.outputs_along(log["q"], log["v"], hidden, log["t"])
 
     # -- internals ----------------------------------------------------------------------------------------
 
