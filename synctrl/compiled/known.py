@@ -196,7 +196,7 @@ def _check_class(kind: type) -> None:
 
 def _check_controller(controller: Controller) -> None:
     """Refuse a controller whose parts no longer say what it does: it made some of them into others."""
-    if hasattr(controller.adaptation, "shift"):
+    if any(hasattr(controller.adaptation, part) for part in ("shift", "pace")):
         raise _refusal(
             "adaptation", _name(controller.adaptation), "an adaptation that moves the desired motion"
         )

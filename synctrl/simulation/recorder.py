@@ -145,7 +145,7 @@ ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE = "adaptation_state", "network_stat
 #: further names of entries and outputs that a result gets from elsewhere
 OF_EVERY_RUN = (
     *("status", "outputs", "damping", "limits", "saturation", "step_error", "run", "format"),
-    *(APPLIED, "hedge"),
+    *(APPLIED, "hedge", "phase", "feed"),
 )
 #: how every array is read from a sample and the parts of its state; the last one from int epsilon
 ROW: dict[str, Callable[[Sample, State, np.ndarray], Any]] = {
