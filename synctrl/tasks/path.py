@@ -26,7 +26,7 @@ UNEVEN = 1e-4
 #: how close a tangent may come to `up`, as the sine of the angle between them
 UPRIGHT = 0.05
 #: steps of Newton's method to a projection, at most, and where they end, m
-PROJECTIONS, PROJECTED = 8, 1e-12
+PROJECTIONS, PROJECTED = 8, 1e-10
 
 
 class Place(NamedTuple):
