@@ -127,10 +127,12 @@ def test_they_meet_when_both_have_gone_their_way_and_not_before():
 
 
 def test_a_result_keeps_its_beads_in_a_file(tmp_path):
-    run = bead_on_path().simulate(0.02, engine="compiled")
+    run = bead_on_path(override=EAGER, friction=False).simulate(0.02, dt=5e-3)
     loaded = Result.load(run.save(tmp_path / "run.npz"))
-    assert np.array_equal(loaded.outputs["bead_error"], run.outputs["bead_error"])
-    assert loaded.info["path"] == run.info["path"]
+    for name in ("bead_error", "gap_error", "phase", "feed"):
+        assert np.array_equal(loaded.outputs[name], run.outputs[name])
+    assert loaded.info["path"] == run.info["path"] and loaded.info["adaptation"]["name"] == "Paced"
+    assert certify(loaded, experiment=run.experiment).lyapunov.V[0] > 0
 
 
 @pytest.mark.parametrize("mode", ["gap_weighted", "phase"])
@@ -284,6 +286,15 @@ def test_an_override_needs_motions_that_know_their_lag_and_nobody_else_who_moves
         bead_on_path(override=True, network=Posted(0.01))
     with refused(InputError, "adaptation", found="Paced"):
         check_still("Hedged", Paced(learning, Override()), Paced(learning, Override()).bind(cell))
+
+
+def test_a_motion_that_a_caller_gives_is_refused_where_the_adaptation_has_its_own():
+    made = bead_on_path(override=True)
+    controller, desired = made.controller(1e-3), made.cell.references(np.zeros(1))[0].desired
+    controller.reset(0.0, made.cell.q0, made.cell.v0)
+    with refused(InputError, "desired"):
+        controller.step(0.0, made.cell.q0, made.cell.v0, desired)
+    assert np.isfinite(controller.step(0.0, made.cell.q0, made.cell.v0)).all()
 
 
 def test_the_beads_belong_to_two_robots_on_one_path():

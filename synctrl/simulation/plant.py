@@ -72,13 +72,14 @@ class Plant:
     - `move`: accelerations and the rate of that state, (k,), both finite and without side effects, for a
       method asks at states where the run never comes; what the package's plant does is `super().move(...)`;
     - `outputs`: arrays over time that the result gets beside those of every run, with units and axes; or
-      `outputs_along`, if the motion of the robots is needed for them;
+      `outputs_along`, if the motion of the robots is needed for them, or `account`, if more is;
     - `longest_step`: how long a step of "rk4" may be, if that is known beforehand;
     - `report`: what `result.info` says of the state in plain data.
 
     Nothing else is asked of it. The state is logged as `outputs["plant_state"]`, so that a run can be gone
     through again; a certificate names the plant beside the power of what it does and the model does not.
-    The compiled engine refuses a subclass by name.
+    The compiled engine takes a subclass that only tells, by `outputs`, `outputs_along`, `report` and
+    `account`, and refuses others by name.
 
     Args:
         cell: the robots, with their true parameters and friction.
