@@ -58,3 +58,6 @@ def test_the_example_about_held_objects_has_the_outputs_that_the_page_names():
     assert names["squeeze"].shape == names["result"].t.shape
     told = set(re.findall(r"`((?:object|hand|internal)_\w+)`", (DOCS / "assembly.md").read_text("utf-8")))
     assert told == {name for name in names["result"].outputs if name != "plant_state"}
+    section = (DOCS / "assembly.md").read_text("utf-8").partition("## Two beads")[2].partition("\n## ")[0]
+    beads = set(re.findall(r"`((?:gap_error|bead_(?!on_)|speed_)\w*)`", section))
+    assert beads == set(names["laid"].outputs) and names["gap_error"].shape == names["laid"].t.shape

@@ -48,6 +48,8 @@ RIGID = (FullParameters, LinearParameters, BaseParameters)
 INVERSES = (Inverse, Pseudoinverse, DampedInverse)
 #: numbers of the state of an object that is carried
 BODY = 13
+#: what a plant may say of a run without moving otherwise for it
+TELLS = frozenset({"outputs", "outputs_along", "report", "account"})
 COMPILED_BEFORE = "its equations were compiled before"
 #: modules whose functions the parts of a closed loop call, beside those of their own
 LINES = (law, algebra, rotations, grasp)
@@ -99,7 +101,7 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     controller, cell = loop.controller, loop.controller.cell
     task: Any = cell.task
     yield Part("closed loop", loop, (ClosedLoop,))
-    yield Part("plant", loop.plant, (Plant, CarryingPlant))
+    yield Part("plant", loop.plant, (_moved_as(loop.plant), CarryingPlant))
     if isinstance(loop.plant, CarryingPlant):
         yield from _held(loop.plant)
     yield Part("schedule of payloads", loop.plant.schedule, (PayloadSchedule,))
@@ -173,6 +175,20 @@ def _check_type(part: Part) -> None:
         raise _refusal(part.role, name, f"{name}, only {names} and no subclass: {COMPILED_BEFORE}")
 
 
+def _moved_as(plant: Any) -> type:
+    """The type of a plant that the package's own moves, of whatever else it tells; else the package's own."""
+    kinds = type(plant).__mro__
+    own = kinds[: kinds.index(Plant)] if Plant in kinds else kinds
+    changed = {name for kind in own for name in vars(kind)}.intersection(_plant_names()) - TELLS
+    return Plant if changed else type(plant)
+
+
+@cache
+def _plant_names() -> frozenset[str]:
+    """What a plant of the package is made of."""
+    return frozenset(name for name in vars(Plant) if not name.startswith("__"))
+
+
 def _check_own_methods(part: Part) -> None:
     """Refuse an object that has a method of its own in place of its class's."""
     kind: Any = type(part.value)
@@ -197,7 +213,7 @@ def _check_class(kind: type) -> None:
 
 def _check_controller(controller: Controller) -> None:
     """Refuse a controller whose parts no longer say what it does: it made some of them into others."""
-    if hasattr(controller.adaptation, "shift"):
+    if any(hasattr(controller.adaptation, part) for part in ("shift", "pace")):
         raise _refusal(
             "adaptation", _name(controller.adaptation), "an adaptation that moves the desired motion"
         )

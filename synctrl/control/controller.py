@@ -23,7 +23,7 @@ from ..robots.regressors import Regressors, make_regressors
 from ..tasks.algebra import limited
 from ..tasks.spaces import Measurement
 from . import law, laws
-from .adaptation import Adaptation, Seen, chosen, shift_of
+from .adaptation import Adaptation, Seen, chosen, pace_of, shift_of
 from .admittance import Admittance, BoundAdmittance
 from .gains import Gains, spread, spread_rows
 from .laws import Asked, Errors, Law, completed
@@ -133,8 +133,7 @@ class Controller:
         instance("cell", cell, Cell, "a Cell")
         instance("gains", gains, Gains, "Gains")
         m = cell.m
-        self.cell = cell
-        self.gains = gains
+        self.cell, self.gains = cell, gains
         options = laws.chosen(law, reference_acceleration, k_r_space)
         self.reference_acceleration, self.k_r_space = options.reference_acceleration, options.k_r_space
         self.Lambda = spread("Lambda", gains.Lambda, (m,))
@@ -150,6 +149,7 @@ class Controller:
         offers("network", connection, ("bind",), "a network, for example Ideal()")
         self.network, self.network_settings = connection.bind(cell), settings_of(connection)
         self._shift = shift_of(self.adaptation, self.network)
+        self._pace = pace_of(self.adaptation, self.network)
         self._give_way(admittance)
         self.torque_limits = limits("torque_limits", torque_limits, (cell.n, cell.nv))
         self._cuts = bool(np.isfinite(self.torque_limits).any())
@@ -236,6 +236,7 @@ class Controller:
         instant. z is what the adaptation remembers, and `integral` what the network does.
         """
         (q, v), cell = motion, self.cell
+        reference = reference if self._pace is None else self._pace(z, motion, reference)
         space, weights = cell.task, reference.weights
         desired = reference.desired if self._shift is None else self._shift(z, reference)
         task, felt = space.measure(motion, desired), None

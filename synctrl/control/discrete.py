@@ -117,14 +117,17 @@ class DiscreteController:
             wrenches: internal wrenches that an admittance needs, see `Controller.evaluate`.
 
         Raises:
-            InputError: another shape, or a time that is no number; and, unless faults are held, a measurement
-                that is not finite, a time that is early or runs backwards, or a missed period.
+            InputError: another shape, a desired motion beside `Paced`, or a time that is no number; and,
+                unless faults are held, a measurement that is not finite, a time that is early or runs
+                backwards, or a missed period.
             SingularJacobianError, OrientationError: as in a simulation, which ends here.
             NonFiniteError: the law has no finite torque here.
             SimulationError: a space of the user's ends the run, or a motion or weight of theirs fails.
         """
         time, motion = self._time(t), measured.measurement(q, v, self._shape)
         wanted = None if desired is None else finite_array("desired", desired, (3, self.cell.n, self.cell.m))
+        if wanted is not None and hasattr(self.controller.adaptation, "pace"):
+            raise InputError("expected none, for the adaptation sets its pace, found one", subject="desired")
         felt = None if wrenches is None else finite_array("wrenches", wrenches, (self.cell.n, 6))
         missed = self._missed(time)
         fault = self._off_the_grid(time, missed) or measured.not_finite(self.cell, time, motion)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from functools import cached_property, partial
 from typing import Any, Self
@@ -73,7 +73,7 @@ class Plant:
     - `move`: accelerations and the rate of that state, (k,), both finite and without side effects, for a
       method asks at states where the run never comes; what the package's plant does is `super().move(...)`;
     - `outputs`: arrays over time that the result gets beside those of every run, with units and axes; or
-      `outputs_along`, if the motion of the robots is needed for them;
+      `outputs_along`, if the motion of the robots is needed for them, or `account`, if more is;
     - `felt`: the internal wrenches that hands measure, if any do;
     - `chain`: what is proved if the robots hold one object together;
     - `longest_step`: how long a step of "rk4" may be, if that is known beforehand;
@@ -82,7 +82,8 @@ class Plant:
 
     Nothing else is asked of it. The state is logged as `outputs["plant_state"]`, so that a run can be gone
     through again; a certificate names the plant beside the power of what it does and the model does not.
-    The compiled engine refuses a subclass by name.
+    The compiled engine takes a subclass that only tells, by `outputs`, `outputs_along`, `report` and
+    `account`, and refuses others by name.
 
     Args:
         cell: the robots, with their true parameters and friction.
@@ -245,6 +246,15 @@ class Plant:
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         """What a result says of the plant's own state at its logged instants, (T, size of the state)."""
         return {}
+
+    def account(self, log: Mapping[str, np.ndarray]) -> tuple[dict[str, Any], dict[str, Output]]:
+        """`report` and `outputs_along` together, of a plant that needs more of the log for them.
+
+        Args:
+            log: arrays of `Result` by name, those that its adaptation adds, and "plant_state".
+        """
+        hidden = log["plant_state"]
+        return self.report(hidden), self.outputs_along(log["q"], log["v"], hidden, log["t"])
 
     # -- internals ----------------------------------------------------------------------------------------
 

@@ -103,13 +103,11 @@ class Recorder:
                 array with a unit and one axis per dimension, time first.
             Exception: what the plant raises.
         """
-        loop, nothing = self._loop, np.zeros((self.count, 0))
-        logged = self.logged()
-        hidden, lengths = logged.get(PLANT_STATE, nothing), {"time": self.count, **sizes(loop)}
+        loop, logged = self._loop, self.logged()
+        lengths = {"time": self.count, **sizes(loop)}
         taken = {*info, *describe_run(loop), *LAYOUT, *_STATE_AXES, *OF_EVERY_RUN}
-        tau = loop.plant.applied(logged["tau"]) + logged["disturbance"]
-        outputs = loop.plant.outputs_under(logged["q"], logged["v"], hidden, logged["t"], tau)
-        found = Account(loop.plant.report(hidden), outputs)
+        told = {name: array for name, (array, _, _) in self._learned(logged).items()}
+        found = Account(*loop.plant.account({PLANT_STATE: np.zeros((self.count, 0)), **logged, **told}))
         for what, entries in found._asdict().items():
             _check_names(f"plant {type(loop.plant).__qualname__}, {what}", entries, taken)
         for name, output in found.outputs.items():
@@ -130,12 +128,16 @@ class Recorder:
         described.update(account.report)
         described["saturation"] = saturation_report(plant, arrays)
         found = {name: (array, "SI", _STATE_AXES[name]) for name, array in states.items()}
-        if hasattr(self._loop.controller.adaptation, "outputs"):
-            found |= self._loop.controller.adaptation.outputs(states[ADAPTATION_STATE])
+        found |= self._learned(states)
         found |= {**applied_output(plant, arrays["tau"]), **account.outputs}
         outputs = {name: array for name, (array, _, _) in found.items()}
         described["outputs"] = {n: {"unit": unit, "axes": list(axes)} for n, (_, unit, axes) in found.items()}
         return Result(**arrays, info=described, outputs=outputs, experiment=experiment)
+
+    def _learned(self, logged: Mapping[str, np.ndarray]) -> dict[str, Output]:
+        """What the adaptation says of its states in a log."""
+        adaptation = self._loop.controller.adaptation
+        return adaptation.outputs(logged[ADAPTATION_STATE]) if hasattr(adaptation, "outputs") else {}
 
 
 #: outputs that have what an adaptation, a network and a plant have of their own in the state of the loop
@@ -143,7 +145,7 @@ ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE = "adaptation_state", "network_stat
 #: further names of entries and outputs that a result gets from elsewhere
 OF_EVERY_RUN = (
     *("status", "outputs", "damping", "limits", "saturation", "step_error", "run", "format"),
-    *(APPLIED, "hedge", "admittance"),
+    *(APPLIED, "hedge", "admittance", "phase", "feed"),
 )
 #: how every array is read from a sample and the parts of its state; the last one from int epsilon
 ROW: dict[str, Callable[[Sample, State, np.ndarray], Any]] = {

@@ -6,8 +6,9 @@ from .guarded import Guarded, bounded
 from .hedged import Hedged
 from .leakage import EModification, Leakage, Sigma, Switching
 from .natural import Natural
+from .paced import Override, Paced
 from .projection import Ball, Box
-from .protocol import Adaptation, BoundAdaptation, Seen, after_sample, shift_of
+from .protocol import Adaptation, BoundAdaptation, Seen, after_sample, pace_of, shift_of
 
 __all__ = [
     "Adaptation",
@@ -21,11 +22,14 @@ __all__ = [
     "Hedged",
     "Leakage",
     "Natural",
+    "Override",
+    "Paced",
     "Seen",
     "Sigma",
     "Switching",
     "after_sample",
     "bounded",
     "chosen",
+    "pace_of",
     "shift_of",
 ]

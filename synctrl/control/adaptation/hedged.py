@@ -24,7 +24,7 @@ from ...coupling.cell import Cell, Reference
 from ...errors import InputError
 from ...robots.regressors import make_regressors
 from ...tasks.spaces import CartesianSpace, JointSpace
-from .protocol import Adaptation, Seen, after_sample
+from .protocol import Adaptation, Seen, after_sample, check_still
 
 #: share of a limit from which on missing torque counts in full
 FULL = 0.02
@@ -75,10 +75,7 @@ class Hedged:
         """
         _check_task(cell)
         inner: Any = self.adaptation.bind(cell)
-        if hasattr(inner, "shift"):
-            found = type(self.adaptation).__name__
-            expected = "Hedged expects an adaptation that leaves the desired motion alone"
-            raise InputError(f"{expected}, found {found}", subject="adaptation", found=found)
+        check_still("Hedged", self.adaptation, inner)
         speeds = [SPEEDS.get(unit, 1.0) if self.speed is None else self.speed for unit in cell.units]
         return BoundHedged(cell, inner, self.pull, np.array(speeds))
 

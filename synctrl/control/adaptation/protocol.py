@@ -111,14 +111,45 @@ def shift_of(adaptation: Any, network: Any) -> Any:
     Raises:
         InputError: a network whose messages would tell of the motion that was not moved.
     """
-    shift = getattr(adaptation, "shift", None)
-    if shift is not None and hasattr(network, "messages"):
+    return _of_desired("shift", adaptation, network)
+
+
+def pace_of(adaptation: Any, network: Any) -> Any:
+    """The method by which an adaptation sets the pace of the desired motion; None if it has none.
+
+    It takes z, joint positions and velocities, (2, n, nv), and the `Reference`, and gives the `Reference`
+    that stands in the place of that, in the log too. Its rates are derivatives: nothing is given up.
+
+    Args, raises: as of `shift_of`.
+    """
+    return _of_desired("pace", adaptation, network)
+
+
+def _of_desired(name: str, adaptation: Any, network: Any) -> Any:
+    found = getattr(adaptation, name, None)
+    if found is not None and hasattr(network, "messages"):
         raise InputError(
             f"{type(adaptation).__name__} moves the desired motion, of which messages do not know; expected "
             f"a network without messages, for example Ideal(), found {type(network).__name__}",
             subject="network",
         )
-    return shift
+    return found
+
+
+def check_still(who: str, adaptation: Adaptation, bound: Any) -> None:
+    """Refuse an adaptation in the care of another one if it moves the desired motion.
+
+    Args:
+        who: name of the other one.
+        adaptation, bound: the adaptation, and the same for a cell.
+
+    Raises:
+        InputError: it does.
+    """
+    if hasattr(bound, "shift") or hasattr(bound, "pace"):
+        found = type(adaptation).__name__
+        expected = f"{who} expects an adaptation that leaves the desired motion alone"
+        raise InputError(f"{expected}, found {found}", subject="adaptation", found=found)
 
 
 class Adaptation(Protocol):
