@@ -158,7 +158,7 @@ def test_the_driver_counts_columns_as_python_does(name, tmp_path):
 
 # -- the table and the arrays -----------------------------------------------------------------------------
 
-SMALL = dict(zip((*SIZES, "n", "p"), (2, 3, 5, 7, 3, 30, 1, 1, 1, 2, 4, 6), strict=True))
+SMALL = dict(zip((*SIZES, "n", "p"), (2, 3, 5, 7, 3, 30, 1, 1, 1, 1, 2, 4, 6), strict=True))
 
 
 @pytest.mark.parametrize("name", QUANTITIES)
