@@ -44,6 +44,8 @@ SPACES = (JointSpace, CartesianSpace, PoseSpace, SlidingSpace)
 BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace, BoundSlidingSpace)
 RIGID = (FullParameters, LinearParameters, BaseParameters)
 INVERSES = (Inverse, Pseudoinverse, DampedInverse)
+#: what a plant may say of a run without moving otherwise for it
+TELLS = frozenset({"outputs", "outputs_along", "report"})
 COMPILED_BEFORE = "its equations were compiled before"
 #: modules whose functions the parts of a closed loop call, beside those of their own
 LINES = (law, algebra, rotations)
@@ -93,7 +95,7 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     controller, cell = loop.controller, loop.controller.cell
     task: Any = cell.task
     yield Part("closed loop", loop, (ClosedLoop,))
-    yield Part("plant", loop.plant, (Plant,))
+    yield Part("plant", loop.plant, (_moved_as(loop.plant),))
     yield Part("schedule of payloads", loop.plant.schedule, (PayloadSchedule,))
     yield Part("controller", controller, (Controller,))
     if isinstance(controller.law, BoundSunMills):  # others are traced
@@ -157,6 +159,20 @@ def _check_type(part: Part) -> None:
         raise _refusal(part.role, name, f"{name}, only {names} and no subclass: {COMPILED_BEFORE}")
 
 
+def _moved_as(plant: Any) -> type:
+    """The type of a plant that the package's own moves, of whatever else it tells; else the package's own."""
+    kinds = type(plant).__mro__
+    own = kinds[: kinds.index(Plant)] if Plant in kinds else kinds
+    changed = {name for kind in own for name in vars(kind)}.intersection(_plant_names()) - TELLS
+    return Plant if changed else type(plant)
+
+
+@cache
+def _plant_names() -> frozenset[str]:
+    """What a plant of the package is made of."""
+    return frozenset(name for name in vars(Plant) if not name.startswith("__"))
+
+
 def _check_own_methods(part: Part) -> None:
     """Refuse an object that has a method of its own in place of its class's."""
     kind: Any = type(part.value)
@@ -198,8 +214,8 @@ def _check_plant(loop: ClosedLoop) -> None:
     special = {
         f"plant='{plant.physics}'": plant.physics != "pinocchio",
         "a plant with a state of its own": plant.hidden0.size > 0,
-        "a plant with other robots than the cell": list(map(id, plant.schedule.free))
-        != list(map(id, robots)),
+        "a plant with other robots than the cell": list(map(id, plant.schedule.free)) != list(map(id, robots))
+        or plant.robots is not plant.schedule.robots[0],
         "other torque limits than those that the controller knows": not np.array_equal(
             plant.torque_limits, loop.controller.torque_limits
         ),

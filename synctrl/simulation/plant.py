@@ -78,7 +78,8 @@ class Plant:
 
     Nothing else is asked of it. The state is logged as `outputs["plant_state"]`, so that a run can be gone
     through again; a certificate names the plant beside the power of what it does and the model does not.
-    The compiled engine refuses a subclass by name.
+    The compiled engine takes a subclass that only tells, by `outputs`, `outputs_along` and `report`, and
+    refuses others by name.
 
     Args:
         cell: the robots, with their true parameters and friction.
