@@ -64,6 +64,15 @@ class CarriedObject:
         entries = I[0, 0], I[0, 1], I[1, 1], I[0, 2], I[1, 2], I[2, 2]
         return np.array([self.mass, *(self.mass * self.com), *entries])
 
+    def as_dict(self) -> dict[str, Any]:
+        """Its name, inertia and box as plain data."""
+        return {
+            "name": self.name,
+            "parameters": self.parameters.tolist(),
+            "box": None if self.box is None else self.box.tolist(),
+            "center": self.center.tolist(),
+        }
+
     def mass_matrix(self, R: np.ndarray) -> np.ndarray:
         """M_o of the twist of its origin in world axes, (6, 6), for its orientation R, (3, 3)."""
         c, M = skew(R @ self.com), self.mass * np.eye(6)

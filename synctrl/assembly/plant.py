@@ -107,18 +107,11 @@ class CarryingPlant(Plant):
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         """What is carried, and by whom, as plain data."""
-        body, grasps = self.body, self.grasps
-        about = {
-            "name": body.name,
-            "parameters": body.parameters.tolist(),
-            "box": None if body.box is None else body.box.tolist(),
-            "center": body.center.tolist(),
-        }
         held = [
             {"robot": g.robot, "arm": arm.tolist(), **g.compliance.as_dict()}
-            for g, arm in zip(grasps, self.arms, strict=True)
+            for g, arm in zip(self.grasps, self.arms, strict=True)
         ]
-        return {"object": about, "grasps": held}
+        return {"object": self.body.as_dict(), "grasps": held}
 
     # -- internals ----------------------------------------------------------------------------------------
 

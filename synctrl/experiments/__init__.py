@@ -1,6 +1,7 @@
 """Ready cells: the paper's two, and its examples 1 to 3."""
 
 from .a460_pair import a460_full_pair, a460_pair
+from .bead_on_edge import bead_on_edge
 from .carry import carry_ur5
 from .mixed_four import mixed_four
 from .mobile_robot import mobile_robot
@@ -13,6 +14,7 @@ from .ur5_payload import ur5_payload
 __all__ = [
     "a460_full_pair",
     "a460_pair",
+    "bead_on_edge",
     "carry_ur5",
     "mixed_four",
     "mobile_robot",
