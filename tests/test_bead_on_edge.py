@@ -164,6 +164,15 @@ def test_both_engines_agree_while_a_point_slides(period):
         assert np.abs(found[name] - array).max() <= AGREEMENT * (np.abs(array).max() + 1e-12), name
 
 
+def test_what_was_tabulated_for_a_space_in_which_nothing_slides_is_not_taken_for_one_in_which_it_does():
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    engine, still = Compiled({}, Tables()), with_cell(space=PoseSpace())
+    runs = [experiment.simulate(0.01, engine=engine) for experiment in (still, made(), still)]
+    np.testing.assert_array_equal(runs[0].q, runs[2].q)
+    assert (runs[1].q != runs[0].q).any()
+    np.testing.assert_allclose(runs[1].q, made().simulate(0.01).q, atol=AGREEMENT)
+
+
 def test_a_loop_of_ones_own_gives_the_torques_of_a_sampled_run_whoever_says_what_is_desired():
     run = made().simulate(0.012, control_period=2e-3)
     controller = made().controller(2e-3)

@@ -69,11 +69,11 @@ class Tables:
         self._kept: tuple[list[Any], tuple, list[DesiredStretch]] = [], (), []
 
     def blocks(self, program: Program, clock: Clock) -> Iterable[DesiredStretch]:
-        """The steps of a run, made anew if the run before had other motions, weights or instants."""
+        """The steps of a run, made anew if the run before had other motions, weights, instants or rows."""
         cell = program.loop.cell
         if clock.steps * _step_bytes(cell) > BLOCK_BYTES:
             return blocks(program, clock)
-        parts = [cell.coupling, *(member.trajectory for member in cell.members)]
+        parts = [cell.coupling, type(cell.space), *(member.trajectory for member in cell.members)]
         known, instants, kept = self._kept
         same = len(parts) == len(known) and all(map(operator.is_, parts, known))
         if same and instants == (clock, clock.every):
