@@ -123,6 +123,12 @@ def test_where_nothing_slides_all_is_as_in_pose_space(seed, t):
     assert not SlidingSpace().further(desired_flow(np.random.default_rng(0), 6), np.zeros(3)).any()
 
 
+def test_a_desired_motion_that_does_not_say_what_slides_is_refused():
+    q = np.ones((2, 2, 6))
+    with refused(InputError, "desired motion of a sliding point", found="3 rows"):
+        SlidingSpace().bind([UR5, UR5]).measure(q, np.zeros((3, 2, 6)))
+
+
 @pytest.mark.parametrize("kind", [Carrier, Rider])
 def test_what_carries_or_rides_has_two_poses(kind):
     pose, other = PoseTrajectory(Hold([0.0, 0.0, 0.0])), Hold([0.0] * 6)

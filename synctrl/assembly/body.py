@@ -56,14 +56,6 @@ class CarriedObject:
         center = self.com if self.center is None else self.center
         object.__setattr__(self, "center", finite_array("object, center", center, (3,)))
 
-    @property
-    def parameters(self) -> np.ndarray:
-        """Its ten inertial parameters about its origin, in Pinocchio's order, (10,)."""
-        c = skew(np.array(self.com))
-        I = self.inertia - self.mass * c @ c
-        entries = I[0, 0], I[0, 1], I[1, 1], I[0, 2], I[1, 2], I[2, 2]
-        return np.array([self.mass, *(self.mass * self.com), *entries])
-
     def as_dict(self) -> dict[str, Any]:
         """Its name, inertia and box as plain data."""
         return {
@@ -72,6 +64,14 @@ class CarriedObject:
             "box": None if self.box is None else self.box.tolist(),
             "center": self.center.tolist(),
         }
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """Its ten inertial parameters about its origin, in Pinocchio's order, (10,)."""
+        c = skew(np.array(self.com))
+        I = self.inertia - self.mass * c @ c
+        entries = I[0, 0], I[0, 1], I[1, 1], I[0, 2], I[1, 2], I[2, 2]
+        return np.array([self.mass, *(self.mass * self.com), *entries])
 
     def mass_matrix(self, R: np.ndarray) -> np.ndarray:
         """M_o of the twist of its origin in world axes, (6, 6), for its orientation R, (3, 3)."""

@@ -20,11 +20,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import instance
+from ..errors import InputError
 from .pose import BoundPoseSpace, PoseSpace
 from .poses import PoseTrajectory, Turning, pose_motion
 from .rotations import exp, skew
 from .spaces import Measurement
 from .trajectories import Motion
+
+#: of what is desired: three of the tip, and three of the point
+ROWS = 6
 
 
 class Carrier(PoseTrajectory):
@@ -81,6 +85,9 @@ class BoundSlidingSpace(BoundPoseSpace):
     """
 
     def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+        if len(desired) != ROWS:
+            where = "desired motion of a sliding point"
+            raise InputError.expected("xd, xd', xd'', rho, rho' and rho''", f"{len(desired)} rows", where)
         (p, p_dot), R, J, J_dot = self._tips.poses(*motion)
         w = np.matvec(J[..., 3:, :], motion[1])
         r, b, faster = (np.matvec(R, part) for part in desired[3:, ..., :3])
