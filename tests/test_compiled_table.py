@@ -31,7 +31,7 @@ from synctrl.compiled.structs import functions_of, header, largest
 from synctrl.compiled.trace import Trace
 from synctrl.control.adaptation import Natural
 from synctrl.errors import CompilationError
-from synctrl.experiments import a460_pair, mixed_four, panda_four, planar_four, rigid_object
+from synctrl.experiments import a460_pair, bead_on_edge, mixed_four, panda_four, planar_four, rigid_object
 from synctrl.simulation.result import LAYOUT
 
 pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
@@ -55,6 +55,7 @@ EXPERIMENTS = {
     "planar arms": planar_four,
     "joints": a460_pair,
     "poses": rigid_object,
+    "poses that slide": bead_on_edge,
     "redundant arms": panda_four,
     "damping in task space": lambda: planar_four(k_r_space="task"),
     "two kinds": mixed_four,
@@ -159,7 +160,7 @@ def test_the_driver_counts_columns_as_python_does(name, tmp_path):
 
 # -- the table and the arrays -----------------------------------------------------------------------------
 
-SMALL = dict(zip((*SIZES, "n", "p", "o"), (2, 3, 5, 7, 3, 30, 1, 1, 1, 2, 1, 4, 6, 1), strict=True))
+SMALL = dict(zip((*SIZES, "n", "p", "o"), (2, 3, 5, 7, 3, 30, 1, 1, 1, 1, 2, 1, 4, 6, 1), strict=True))
 
 
 @pytest.mark.parametrize("name", QUANTITIES)

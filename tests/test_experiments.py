@@ -86,8 +86,8 @@ def test_every_ready_cell_takes_one_part_and_keeps_the_others(make, name):
     assert experiment.gains == expected
 
 
-def test_there_are_nine_ready_cells():
-    assert len(READY) == 9
+def test_all_ready_cells_but_an_analysis_are_experiments():
+    assert {make.__name__ for make in READY} == {*experiments.__all__} - {"quadratic_analysis"}
 
 
 # -- four planar arms -------------------------------------------------------------------------------------

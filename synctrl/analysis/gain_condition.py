@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 from ..checks import count, finite_array, instance, positive_number
 from ..control.controller import Controller
 from ..control.gains import spread
+from ..coupling.desired import further_rows
 from ..errors import InputError
 from ..renamed import names_elsewhere
 from ..simulation.result import Result
@@ -170,8 +171,10 @@ def _evaluation(controller: Controller, i: int) -> Callable[[np.ndarray], Margin
     space, m = cell.space.bind([robot]), cell.m
 
     def evaluate(point: np.ndarray) -> Margins:
-        q, weights = point[:-1], cell.coupling.weights(point[-1:], m)
-        task = space.measure(np.stack((q[None], np.zeros((1, q.size)))), np.zeros((3, 1, m)))
+        (q, t), weights = np.split(point, [-1]), cell.coupling.weights(point[-1:], m)
+        further = further_rows(cell.names[i], i, cell.space, cell.members[i].trajectory, t)
+        desired = np.concatenate((np.zeros((3, 1, m)), further))
+        task = space.measure(np.stack((q[None], np.zeros((1, q.size)))), desired)
         J, J_inv = (np.eye(m),) * 2 if task.J is None or task.J_inv is None else (task.J[0], task.J_inv[0])
         M, c_inv, c_dot = robot.mass_matrix(q), weights.c_inv[0, i], weights.c_dot[0, i]
         return _values(controller, i, M, c_inv, c_dot, J, J_inv)

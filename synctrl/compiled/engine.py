@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..coupling.cell import Cell
+from ..coupling.desired import rows_of
 from ..renamed import names_elsewhere
 from ..simulation.advance import up_to_a_failure
 from ..simulation.clock import Clock, Stretch
@@ -21,7 +22,7 @@ from ..simulation.result import Result
 from . import structs
 from .known import check_known
 from .program import Program, one_after_another
-from .quantities import DESIRED, LOGS
+from .quantities import DESIRED, LOGS, SLIDE
 from .structs import Mark
 
 #: bytes of references that one block of steps may need
@@ -55,7 +56,7 @@ def blocks(program: Program, clock: Clock) -> Iterator[DesiredStretch]:
 def _step_bytes(cell: Cell) -> int:
     """Bytes of what is desired in one step."""
     weights = 0 if cell.coupling.is_constant else 4 * cell.m**2
-    return 3 * 8 * cell.n * (3 * cell.m + weights)
+    return 3 * 8 * cell.n * (rows_of(cell.space) * cell.m + weights)
 
 
 class Tables:
@@ -68,11 +69,11 @@ class Tables:
         self._kept: tuple[list[Any], tuple, list[DesiredStretch]] = [], (), []
 
     def blocks(self, program: Program, clock: Clock) -> Iterable[DesiredStretch]:
-        """The steps of a run, made anew if the run before had other motions, weights or instants."""
+        """The steps of a run, made anew if the run before had other motions, weights, instants or rows."""
         cell = program.loop.cell
         if clock.steps * _step_bytes(cell) > BLOCK_BYTES:
             return blocks(program, clock)
-        parts = [cell.coupling, *(member.trajectory for member in cell.members)]
+        parts = [cell.coupling, type(cell.space), *(member.trajectory for member in cell.members)]
         known, instants, kept = self._kept
         same = len(parts) == len(known) and all(map(operator.is_, parts, known))
         if same and instants == (clock, clock.every):
@@ -239,9 +240,10 @@ def _tables(cell: Cell, instants: np.ndarray) -> dict[str, np.ndarray]:
     Every motion is asked once and goes straight to its place: what a step costs does not grow with n.
     """
     flat = instants.ravel()
-    desired = {name: np.empty((flat.size, cell.n, cell.m)) for name in DESIRED}
+    names = (*DESIRED, *SLIDE)[: rows_of(cell.space)]
+    desired = {name: np.empty((flat.size, cell.n, cell.m)) for name in names}
     for i in range(cell.n):
-        for name, part in zip(DESIRED, cell.motion(i, flat), strict=True):
+        for name, part in zip(names, cell.told(i, flat), strict=True):
             desired[name][:, i] = part
     weights = cell.weights(flat[:1] if cell.coupling.is_constant else flat)
     return {**desired, "weights": one_after_another(weights)}

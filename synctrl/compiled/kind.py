@@ -94,6 +94,11 @@ class Kind:
         return self.damped or self.nv > self.m
 
     @property
+    def slides(self) -> bool:
+        """Whether errors may count at a point that slides on what is carried."""
+        return hasattr(self.space, "further")
+
+    @property
     def watches(self) -> tuple[str, ...]:
         """Names of what the guard watches."""
         return tuple(getattr(self.space, "limits", ()))
@@ -122,6 +127,7 @@ class Kind:
             "Z": P if self.learning is None else self.learning.estimate.numel_in(),
             "K": self.nv if self.k_r_space == "joint" else self.m,
             "bodies": 10 * self.nv,
+            "slides": int(self.slides),
             "tip": int(self.tip),
             "spare": int(self.solves),
             "damped": int(self.damped),

@@ -40,10 +40,11 @@ from ..tasks import algebra, rotations
 from ..tasks.measurement import Tips
 from ..tasks.pose import BoundPoseSpace, PoseSpace
 from ..tasks.redundancy import DampedInverse, Inverse, Pseudoinverse, Redundancy
+from ..tasks.sliding import BoundSlidingSpace, SlidingSpace
 from ..tasks.spaces import BoundCartesianSpace, BoundJointSpace, CartesianSpace, JointSpace
 
-SPACES = (JointSpace, CartesianSpace, PoseSpace)
-BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace)
+SPACES = (JointSpace, CartesianSpace, PoseSpace, SlidingSpace)
+BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace, BoundSlidingSpace)
 RIGID = (FullParameters, LinearParameters, BaseParameters)
 INVERSES = (Inverse, Pseudoinverse, DampedInverse)
 #: numbers of the state of an object that is carried

@@ -24,7 +24,7 @@ from .build import cached_library, content_key, require_casadi
 from .carrying import carrying_constants, object_function
 from .kind import Classified, Kind, classify, standing
 from .known import check_known, check_untouched
-from .quantities import DESIRED, checked, owned_by, shape
+from .quantities import DESIRED, SLIDE, checked, owned_by, shape
 from .specimen import Specimen
 from .structs import header, largest
 from .trace import Trace
@@ -91,7 +91,7 @@ class CompiledLoop:
     def state_dot(self, reference: Reference, y: np.ndarray, disturbance: np.ndarray) -> np.ndarray:
         """y' at one instant, for comparison with `ClosedLoop.evaluate`."""
         y, y_dot, first = np.ascontiguousarray(y), np.zeros(self.loop.size), np.zeros(1, dtype=np.intc)
-        desired = dict(zip(DESIRED, reference.desired, strict=True))
+        desired = dict(zip((*DESIRED, *SLIDE), reference.desired, strict=False))
         weights = one_after_another(reference.weights)
         steps = structs.Steps(disturbed=first.ctypes.data, loaded=first.ctypes.data)
         self.tell(steps, {**desired, "weights": weights, "disturbance": disturbance, "pi": self.carried})

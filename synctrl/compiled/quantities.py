@@ -45,6 +45,7 @@ SIZES: Mapping[str, str] = MappingProxyType(
         "Z": "entries of the state of the adaptation",
         "K": "columns of K_r",
         "bodies": "inertial parameters of all bodies",
+        "slides": "1 if errors may count at a point that slides, else 0",
         "tip": "1 for tasks of the tip, 0 for tasks of the joints",
         "spare": "1 if the way to the joints is a pseudo-inverse, else 0",
         "damped": "1 if singular configurations are damped, else 0",
@@ -90,6 +91,9 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "desired": Quantity("instant", "n", "m", "desired coordinates"),
         "desired_dot": Quantity("instant", "n", "m", "their velocity"),
         "desired_ddot": Quantity("instant", "n", "m", "their acceleration"),
+        "slide": Quantity("instant", "n", "slides*m", "place of a point on what is carried"),
+        "slide_dot": Quantity("instant", "n", "slides*m", "its velocity there"),
+        "slide_ddot": Quantity("instant", "n", "slides*m", "its acceleration there"),
         "weights": Quantity("instant", "n", "4*m*m", "c, c', c'' and c^-1"),
         "x": Quantity("work", "n", "m", "coordinates of the task"),
         "e": Quantity("work", "n", "m", "error"),
@@ -143,13 +147,15 @@ class Signature(NamedTuple):
 
 #: what is desired at an instant: position, velocity and acceleration
 DESIRED = "desired", "desired_dot", "desired_ddot"
+#: further rows of it, where a point slides on what is carried
+SLIDE = "slide", "slide_dot", "slide_ddot"
 #: what a robot hears of the others, see `Errors`
 HEARD = "E", "sigma", "sigma_dot"
 
 FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
     {
         "measure": Signature(
-            ("q", "v", "base", "tool", *DESIRED, "weights", "W_inv", "posture", "gain"),
+            ("q", "v", "base", "tool", *DESIRED, *SLIDE, "weights", "W_inv", "posture", "gain"),
             (
                 "x", "e", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot", "sine", "cosine", "J", "J_dot", "J_inv",
                 "G", "zeta", "zeta_dot", "damping", "damping_rate",

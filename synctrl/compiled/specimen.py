@@ -24,6 +24,7 @@ from ..control.laws import Law, SunMills
 from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.cell import Cell, Member, Reference
 from ..coupling.coupling import Coupling
+from ..coupling.desired import rows_of
 from ..coupling.weights import Weights
 from ..robots.friction import Friction
 from ..robots.parameters import FrictionParameters, FullParameters, LinearParameters, Parameters
@@ -159,7 +160,7 @@ class Specimen:
     def _desired(self, q: np.ndarray, distance: float) -> np.ndarray:
         """A desired motion that begins at a distance from where the robots are."""
         cell = self.loop.cell
-        desired = self._random(3, cell.n, cell.m)
+        desired = self._random(rows_of(cell.space), cell.n, cell.m)
         offset = distance * desired[0] / np.linalg.norm(desired[0], axis=1, keepdims=True)
         zero = np.zeros_like(desired)
         desired[0] = cell.task.measure(np.stack((q, np.zeros_like(q))), zero).x + offset

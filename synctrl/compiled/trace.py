@@ -30,7 +30,7 @@ from .carrying import fixture_on
 from .kind import Kind
 from .momentum import model_torque
 from .plugged import Learning
-from .quantities import DESIRED, FUNCTIONS, HEARD, QUANTITIES, columns
+from .quantities import DESIRED, FUNCTIONS, HEARD, QUANTITIES, SLIDE, columns
 
 
 class TracedTip:
@@ -87,7 +87,8 @@ class Trace:
 
     def measure(self) -> Any:
         """Where the robot is, and how it errs."""
-        motion, desired = (np.stack([*map(self._row, names)]) for names in (("q", "v"), DESIRED))
+        told = (*DESIRED, *SLIDE) if self.kind.slides else DESIRED
+        motion, desired = (np.stack([*map(self._row, names)]) for names in (("q", "v"), told))
         task = self.space.measure(motion, desired)
         w, w_dot = law.compute_weighted_errors(Weights(*self._weights()), task.error)
         way = {} if task.inversion is None else task.inversion._asdict()

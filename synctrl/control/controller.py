@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance, limits, offers
 from ..coupling.cell import Cell, Reference
+from ..coupling.desired import rows_of
 from ..renamed import argument, names_elsewhere, tell
 from ..robots.momentum import momentum_of_all
 from ..robots.regressors import Regressors, make_regressors
@@ -203,7 +204,7 @@ class Controller:
         """
         cell = self.cell
         instance("reference", reference, Reference, "a Reference, for example of Cell.references")
-        reference.check(cell.n, cell.m)
+        reference.check(cell.n, cell.m, rows_of(cell.space))
         state: Any = argument("Controller.evaluate", "theta_hat", theta_hat, "z", z)
         memory: Any = integral
         return self.signals(

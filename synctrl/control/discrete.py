@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import boolean, choice, finite_array, finite_number, instance, limits, positive_number
 from ..coupling.cell import Reference
+from ..coupling.desired import rows_of
 from ..errors import InputError, ResultError
 from . import measured
 from .adaptation import after_sample
@@ -113,7 +114,7 @@ class DiscreteController:
         Args:
             t: time, s, within a tenth of a period of the grid that `reset` began.
             q, v: what is measured, (n, nv), rad (or m) and rad/s (or m/s).
-            desired: xd, xd', xd'', (3, n, m), as the cell's trajectories give them; by default theirs at t.
+            desired: xd, xd', xd'', (3, n, m), as `Cell.references` gives them; by default what it gives at t.
             wrenches: internal wrenches that an admittance needs, see `Controller.evaluate`.
 
         Raises:
@@ -125,7 +126,8 @@ class DiscreteController:
             SimulationError: a space of the user's ends the run, or a motion or weight of theirs fails.
         """
         time, motion = self._time(t), measured.measurement(q, v, self._shape)
-        wanted = None if desired is None else finite_array("desired", desired, (3, self.cell.n, self.cell.m))
+        told = (rows_of(self.cell.space), self.cell.n, self.cell.m)
+        wanted = None if desired is None else finite_array("desired", desired, told)
         if wanted is not None and hasattr(self.controller.adaptation, "pace"):
             raise InputError("expected none, for the adaptation sets its pace, found one", subject="desired")
         felt = None if wrenches is None else finite_array("wrenches", wrenches, (self.cell.n, 6))

@@ -21,7 +21,7 @@ from ..tasks.inverse_kinematics import start_in
 from ..tasks.spaces import JointSpace, Space, units_of
 from ..tasks.trajectories import Motion, Trajectory
 from .coupling import Coupling
-from .desired import desired_motion, desired_weights
+from .desired import desired_motion, desired_weights, further_rows
 from .member_checks import (
     check_friction,
     check_labels,
@@ -97,7 +97,7 @@ class Reference:
     """What is desired at one instant, or with a leading axis of time at several.
 
     Attributes:
-        desired: xd, xd' and xd'', (3, n, m).
+        desired: xd, xd' and xd'', (3, n, m); then what else the space asks for, see `further` of `Space`.
         weights: c, c', c'' and c^-1, each (n, m, m).
         t: the instant, s, or all of them, (T,); NaN where nobody asks.
     """
@@ -114,13 +114,13 @@ class Reference:
     c_ddot = property(lambda self: self.weights.c_ddot)
     c_inv = property(lambda self: self.weights.c_inv)
 
-    def check(self, n: int, m: int) -> None:
-        """Refuse what is no desired motion and weights of n robots at one instant.
+    def check(self, n: int, m: int, rows: int = 3) -> None:
+        """Refuse what is no desired motion, of so many rows, and weights of n robots at one instant.
 
         Raises:
             InputError: another size, or numbers that are not finite.
         """
-        finite_array("reference: xd, xd' and xd''", self.desired, (3, n, m))
+        finite_array("reference: xd, xd' and xd''", self.desired, (rows, n, m))
         for name, weight in zip(("c", "c'", "c''", "c^-1"), self.weights, strict=True):
             finite_array(f"reference: {name}", weight, (n, m, m))
 
@@ -224,12 +224,18 @@ class Cell:
     def reference_table(self, times: np.ndarray) -> Reference:
         """What is desired at all of the times, (T,), with time as the first axis."""
         times = np.asarray(times, dtype=float)
-        motions = np.stack([self.motion(i, times) for i in range(self.n)])  # (n, 3, T, m)
+        motions = np.stack([self.told(i, times) for i in range(self.n)])  # (n, 3 or more, T, m)
         return Reference(motions.transpose(2, 1, 0, 3), self.weights(times), times)
 
     def motion(self, robot: int, times: np.ndarray) -> Motion:
         """What is desired of one robot at the times, (T,); see `desired_motion`."""
         return desired_motion(self.names[robot], robot, self.members[robot].trajectory, times)
+
+    def told(self, robot: int, times: np.ndarray) -> np.ndarray:
+        """All that is told of one robot, (3, T, m), and more of it; see `further` of `Space`."""
+        name, trajectory = self.names[robot], self.members[robot].trajectory
+        further = further_rows(name, robot, self.space, trajectory, times)
+        return np.concatenate((self.motion(robot, times), further))
 
     def weights(self, times: np.ndarray) -> Weights:
         """Weights of the coupling at the times, (T,); see `desired_weights`."""

@@ -46,6 +46,30 @@ def desired_motion(name: str, robot: int, trajectory: Trajectory, times: np.ndar
     return motion
 
 
+def further_rows(name: str, robot: int, space: Any, trajectory: Trajectory, times: np.ndarray) -> np.ndarray:
+    """What a space asks of a desired motion beside xd, xd' and xd'', (k, T, m), at some times, (T,).
+
+    Args:
+        name, robot, trajectory, times: see `desired_motion`.
+        space: one with `further`, see `Space`; of another it is nothing, k = 0.
+
+    Raises:
+        SynctrlError, SimulationError, NonFiniteError: see `desired_motion`.
+    """
+    if not hasattr(space, "further"):
+        return np.zeros((0, len(times), trajectory.dimension))
+    what = f"what slides with {name}"
+    rows = _asked(lambda at: space.further(trajectory, at), times, what, robot)
+    for row in rows:
+        _check_finite(what, "it", row, times, robot, "motion")
+    return rows
+
+
+def rows_of(space: Any) -> int:
+    """How many rows what is desired in a space has: 3, and 3 further ones where it asks for these."""
+    return 6 if hasattr(space, "further") else 3
+
+
 def desired_weights(weights: WeightsAt, times: np.ndarray, m: int) -> Weights:
     """Weights of a coupling at some times, (T,), s, for a task of dimension m.
 

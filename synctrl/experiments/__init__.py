@@ -1,6 +1,7 @@
 """Ready cells: the paper's two, and its examples 1 to 3."""
 
 from .a460_pair import a460_full_pair, a460_pair
+from .bead_on_edge import bead_on_edge
 from .bead_on_path import bead_on_path
 from .carry import carry_ur5
 from .carry_planar import carry_planar
@@ -15,6 +16,7 @@ from .ur5_payload import ur5_payload
 __all__ = [
     "a460_full_pair",
     "a460_pair",
+    "bead_on_edge",
     "bead_on_path",
     "carry_planar",
     "carry_ur5",

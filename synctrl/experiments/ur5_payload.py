@@ -63,8 +63,8 @@ def ur5_payload(
 
 def payload_motion() -> PoseTrajectory:
     """Desired motion of the payload's middle: away with 1 - cos, back after one period."""
-    way = _swing(SWING, offset=np.array([0.0, 0.0, HEIGHT]))
-    return PoseTrajectory(way, AxisRotation(np.eye(3), TURN_AXIS, _swing(np.array([TURN]))))
+    way = swing(SWING, offset=np.array([0.0, 0.0, HEIGHT]))
+    return PoseTrajectory(way, AxisRotation(np.eye(3), TURN_AXIS, swing(np.array([TURN]))))
 
 
 def hand_on_payload(i: int) -> tuple[np.ndarray, np.ndarray]:
@@ -93,7 +93,7 @@ def _start(robot: Robot, pose: np.ndarray, offset: np.ndarray) -> np.ndarray:
     return q + np.linalg.solve(PoseSpace().miss(robot, pose, q)[1], offset)
 
 
-def _swing(amplitude: np.ndarray, offset: np.ndarray | float = 0.0) -> FunctionTrajectory:
+def swing(amplitude: np.ndarray, offset: np.ndarray | float = 0.0) -> FunctionTrajectory:
     """offset + amplitude (1 - cos(w t)) / 2, at rest at t = 0; every second component at twice the speed."""
     w = 2 * np.pi / PERIOD * np.where(np.arange(amplitude.size) % 2, 2.0, 1.0)
     half = 0.5 * amplitude

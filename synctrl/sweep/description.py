@@ -47,7 +47,7 @@ def describe_base(setup: Setup) -> dict[str, Any]:
         **described,
         "digest": {
             "initial state": digest([loop.initial_state()]),
-            "desired motion": digest([table.xd, table.xd_dot, table.xd_ddot]),
+            "desired motion": digest([*np.moveaxis(table.desired, 1, 0)]),
             "weights": digest([table.c, table.c_dot, table.c_ddot]),
             "disturbances": digest([np.array(schedule.edges), schedule.torques]),
             "dynamics": digest(_flow(setup, times)),

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..robots.robot import Robot
 from . import rotations
+from .measurement import Poses
 from .redundancy import Damping, Redundancy
 from .spaces import BoundTipSpace, Measurement, TipSpace
 
@@ -23,8 +24,12 @@ class BoundPoseSpace(BoundTipSpace):
     """
 
     def measure(self, motion: np.ndarray, desired: np.ndarray) -> Measurement:
+        return self.compare(motion, self._tips.poses(*motion), desired)
+
+    def compare(self, motion: np.ndarray, poses: Poses, desired: np.ndarray) -> Measurement:
+        """`measure` of frames that are where `poses` says, see `Kinematics`."""
         v, (xd, xd_dot, xd_ddot) = motion[1], desired
-        (position, _), R, J_t, J_t_dot = self._tips.poses(*motion)
+        (position, _), R, J_t, J_t_dot = poses
         x, e, J, left = compare(xd, position, R, J_t)
         wd, wd_dot, x_dot = xd_dot[..., 3:], xd_ddot[..., 3:], np.matvec(J, v)
         turning = np.matvec(left, wd)

@@ -174,7 +174,7 @@ class PoseTrajectory:
         self.breaks = tuple(sorted({*position.breaks, *self.orientation.breaks}))
 
     def __call__(self, t: ArrayLike) -> Motion:
-        return _pose_motion(self.position(t), self.orientation(t))
+        return pose_motion(self.position(t), self.orientation(t))
 
 
 class Attached:
@@ -206,10 +206,11 @@ class Attached:
         arm = R @ self.xyz
         speed = np.cross(w, arm)
         position = Motion(p + arm, p_dot + speed, p_ddot + np.cross(w_dot, arm) + np.cross(w, speed))
-        return _pose_motion(position, Turning(R @ self.rotation, w, w_dot))
+        return pose_motion(position, Turning(R @ self.rotation, w, w_dot))
 
 
-def _pose_motion(position: Motion, turning: Turning) -> Motion:
+def pose_motion(position: Motion, turning: Turning) -> Motion:
+    """The motion of a pose, (..., 6) each, of its two halves."""
     parts = (rotations.log(turning.R), turning.w, turning.w_dot)
     return Motion(*(np.concatenate(pair, axis=-1) for pair in zip(position, parts, strict=True)))
 

@@ -42,7 +42,7 @@ class BoundSpace(Protocol):
 
         Args:
             motion: joint positions and velocities, (2, n, nv).
-            desired: xd, xd' and xd'', (3, n, m).
+            desired: xd, xd' and xd'', (3, n, m); behind them what the space has as `further`.
         """
 
     def to_joints(self, task: Measurement, xref_dot: np.ndarray, xref_ddot: np.ndarray) -> Joints:
@@ -63,6 +63,8 @@ class Space(Protocol):
     - `miss(robot, target, q) -> error, Jacobian`: by how much a robot at q misses a target, (m,), and J,
       (m, nv), with e' = -J v. With it a run begins only if joint positions exist for what is desired.
     - `start(robot, x) -> q`: joint positions, (nv,), of a robot that begins at x, (m,), and has no `q0`.
+    - `further(trajectory, times)`: three more rows of what is desired, (3, T, m), that `measure` has to know
+      of a desired motion at some times, (T,), for example of a point that slides on what is carried.
     - `displacement(start, end)`: the way from one position to another, (..., m), if its velocities are no
       derivatives of its coordinates.
     """

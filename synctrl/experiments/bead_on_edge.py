@@ -1,0 +1,120 @@
+"""Two UR5 arms: one carries a plate, the other one spreads adhesive along the plate's edge while it moves.
+
+The errors of the arm that carries count at the frame on its plate where the nozzle should be, so that
+epsilon = e_1 - e_2 is where the nozzle is against the plate. The first arm knows nothing of the plate, and
+has to learn it. Everything here is our choice and not the paper's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Unpack
+
+import numpy as np
+
+from ..assembly.bead import BeadPlant
+from ..assembly.body import CarriedObject, with_share
+from ..assembly.grasp import Grasp
+from ..checks import boolean
+from ..control.gains import Gains
+from ..coupling.cell import Cell, Member
+from ..coupling.coupling import Coupling
+from ..robots.catalog import load_robot
+from ..robots.friction import Friction
+from ..robots.payload import holding
+from ..robots.robot import Robot
+from ..simulation.schedules import Disturbance
+from ..simulation.simulate import Experiment
+from ..tasks.edge import AlongEdge, Edge, Ramped
+from ..tasks.inverse_kinematics import reach
+from ..tasks.pose import PoseSpace
+from ..tasks.poses import AxisRotation, PoseTrajectory
+from ..tasks.rotations import exp
+from ..tasks.sliding import Carrier, Rider, SlidingSpace
+from .carry import FRICTION
+from .carry import GAINS as CARRYING
+from .parts import ControllerParts, ready_experiment
+from .ur5_payload import DURATION, swing
+
+BASES = ((-0.65, 0.0, 0.0), 0.0), ((0.5, 0.0, 0.0), np.pi)  # m, and heading, rad
+HEIGHT, SWING = 0.25, np.array([0.03, 0.06, 0.05])  # m
+TURN, TURN_AXIS = 0.25, (0.3, 0.4, 1.0)  # rad
+SPEED, RAMP = 0.14, 0.5  # m/s, s
+TILT, STAND_OFF = np.deg2rad(30.0), 5e-3  # rad, m
+PLATE = CarriedObject(
+    2.0, (0.01, 0.02, 0.0), 2.0 / 12 * np.array([0.16**2, 0.24**2, 0.24**2 + 0.16**2]),
+    box=(0.24, 0.16, 0.01), center=(0.0, 0.0, -0.005), name="plate",
+)  # fmt: skip
+HAND = Grasp(0, (-0.20, 0.0, 0.0), exp(np.array([0.0, np.pi / 2, 0.0])))
+#: beyond the last link of arm 2, in the axes of its end, which is where adhesive comes out
+NOZZLE, NOZZLE_LENGTH = CarriedObject(0.5, (0.0, 0.0, -0.05), (1e-3,) * 3, name="nozzle"), 0.10
+POSTURES = (0.0, -1.5, 2.0, -0.5, np.pi / 2, 0.0), (0.0, -1.5, 2.0, -2.0, -np.pi / 2, 0.0)  # rad
+#: share of the true parameters, without the plate, that the controller starts with
+KNOWN = 0.7
+#: torque on joints 1 to 3 of arm 1, N·m, from 2 s to 2.3 s
+PUSH = Disturbance(0, np.array([15.0, 15.0, 15.0, 0.0, 0.0, 0.0]), 2.0, 2.3)
+GAINS = CARRYING.replace(beta=20.0, K_eps=2000.0)
+
+
+def bead_on_edge(
+    synchronized: bool = True,
+    push: bool = True,
+    friction: bool = False,
+    gains: Gains | None = None,
+    **parts: Unpack[ControllerParts],
+) -> Experiment:
+    """Two UR5, one with a plate of 2 kg that nobody knows, the other one with a nozzle on the plate's edge.
+
+    Args:
+        synchronized, gains, parts: see `ready_experiment`.
+        push: whether joints 1 to 3 of arm 1 are pushed for .3 s.
+        friction: whether the joints rub, which the controller does not know.
+
+    Raises:
+        InputError: a value that is none of these.
+    """
+    boolean("friction", friction), boolean("push", push)
+    plate, frame = plate_motion(), AlongEdge(plate_edge(), Ramped(SPEED, RAMP))
+    rubs = FRICTION if friction else Friction()
+    members = [_carrier(Carrier(plate, frame), rubs), _nozzle(Rider(plate, frame), rubs)]
+    cell = Cell(members, Coupling.pair(), SlidingSpace(), name="UR5 pair with a bead on an edge")
+    made = ready_experiment(cell, DURATION, GAINS, gains, synchronized, parts, disturbances=[PUSH] * push)
+    return replace(made, plant_type=partial(BeadPlant, body=PLATE))
+
+
+def plate_edge() -> Edge:
+    """The edge, a rounded rectangle of about .24 m by .16 m, and the nozzle's tilt and distance."""
+
+    def curve(u: float) -> tuple[float, float]:
+        return 0.12 * (1.1 * np.cos(u) - 0.1 * np.cos(3 * u)), 0.08 * (1.1 * np.sin(u) + 0.1 * np.sin(3 * u))
+
+    return Edge.of(curve, 2 * np.pi, TILT, STAND_OFF)
+
+
+def plate_motion() -> PoseTrajectory:
+    """Desired motion of the plate: away with 1 - cos, back after one period."""
+    way = swing(SWING, offset=np.array([0.0, 0.0, HEIGHT]))
+    return PoseTrajectory(way, AxisRotation(np.eye(3), TURN_AXIS, swing(np.array([TURN]))))
+
+
+def _carrier(motion: Carrier, friction: Friction) -> Member:
+    arm, (d, G) = _arm(0), HAND.object_in_hand
+    loaded = holding(with_share(arm, PLATE.parameters, d, G), d, G, "plate")
+    return _member(loaded, motion, 0, KNOWN * arm.inertial_parameters, friction)
+
+
+def _nozzle(motion: Rider, friction: Friction) -> Member:
+    end = np.array([0.0, 0.0, NOZZLE_LENGTH]), np.eye(3)
+    loaded = holding(with_share(_arm(1), NOZZLE.parameters, *end), *end, "nozzle")
+    return _member(loaded, motion, 1, KNOWN * loaded.inertial_parameters, friction)
+
+
+def _arm(i: int) -> Robot:
+    place, heading = BASES[i]
+    return load_robot("ur5").placed(place, (0.0, 0.0, heading), name=f"UR5 {i + 1}")
+
+
+def _member(robot: Robot, motion: Carrier | Rider, i: int, guess: np.ndarray, friction: Friction) -> Member:
+    q0 = reach(robot, motion(0.0).x, np.array(POSTURES[i]), PoseSpace())
+    return Member(robot, motion, q0, theta_hat0=guess, friction=friction, name=f"UR5 {i + 1}")
