@@ -114,6 +114,7 @@ class Specimen:
         grasps = [Grasp(k, R.T @ (tip.translation - p), R.T @ tip.rotation) for k, tip in tips.items()]
         plant = CarryingPlant(cell, body=body, grasps=grasps, at=(p, R), robots=true)
         plant.K, plant.D = self._positive(2, len(grasps), 6)
+        plant.K += 2.0 * plant.D  # softer ones than Lambda D are refused
         return plant
 
     def _space(self, space: Space, robots: Sequence[Robot]) -> Space:

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 
 from ..checks import boolean, choice, finite_array, finite_number, instance, limits, positive_number
 from ..coupling.cell import Reference
-from ..coupling.desired import rows_of
 from ..errors import InputError, ResultError
 from . import measured
 from .adaptation import after_sample
@@ -126,10 +125,7 @@ class DiscreteController:
             SimulationError: a space of the user's ends the run, or a motion or weight of theirs fails.
         """
         time, motion = self._time(t), measured.measurement(q, v, self._shape)
-        told = (rows_of(self.cell.space), self.cell.n, self.cell.m)
-        wanted = None if desired is None else finite_array("desired", desired, told)
-        if wanted is not None and hasattr(self.controller.adaptation, "pace"):
-            raise InputError("expected none, for the adaptation sets its pace, found one", subject="desired")
+        wanted = None if desired is None else measured.desired_motion(self.controller, desired)
         felt = None if wrenches is None else finite_array("wrenches", wrenches, (self.cell.n, 6))
         missed = self._missed(time)
         fault = self._off_the_grid(time, missed) or measured.not_finite(self.cell, time, motion)

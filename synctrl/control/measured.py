@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance, numbers, shaped
 from ..coupling.cell import Cell
+from ..coupling.desired import rows_of
 from ..errors import (
     InputError,
     NonFiniteError,
@@ -51,6 +52,18 @@ def measurement(q: ArrayLike, v: ArrayLike, shape: tuple[int, int]) -> np.ndarra
     for row, name, value in zip(motion, "qv", (q, v), strict=True):
         row[...] = numbers(name, value, shape)
     return motion
+
+
+def desired_motion(controller: Controller, desired: ArrayLike) -> np.ndarray:
+    """A caller's own desired motion, as an array.
+
+    Raises:
+        InputError: another shape, or an adaptation that sets the pace of the cell's own.
+    """
+    if hasattr(controller.adaptation, "pace"):
+        raise InputError("expected none, for the adaptation sets its pace, found one", subject="desired")
+    cell = controller.cell
+    return finite_array("desired", desired, (rows_of(cell.space), cell.n, cell.m))
 
 
 def not_finite(cell: Cell, t: float, motion: np.ndarray) -> InputError | None:
