@@ -21,13 +21,14 @@ from synctrl.assembly.grasp import Fixture, grasp_matrix
 from synctrl.assembly.theorems import THEOREMS, shares
 from synctrl.control.admittance import Admittance
 from synctrl.control.laws import ChungSlotine
-from synctrl.coupling.cell import Cell
+from synctrl.coupling.cell import Cell, Member
 from synctrl.errors import GainWarning, InputError
 from synctrl.experiments import carry_ur5, planar_four
 from synctrl.experiments.carry import GAINS
 from synctrl.robots.robot import Robot
 from synctrl.simulation.simulate import Experiment
 from synctrl.tasks.rotations import exp
+from synctrl.tasks.trajectories import Hold
 
 HEAVY = Admittance(mass=(150.0, 3.0))
 
@@ -234,3 +235,15 @@ def test_leaks_beyond_lambda_are_refused_in_a_closed_chain_too():
         carry_ur5(leak=7.0)
     with refused(InputError, "leak"):
         carry_ur5(leak=-1.0)
+
+
+def test_the_theorems_are_about_the_pose_of_an_object_in_hands_that_stay_closed():
+    made = carry_ur5(geometric_error=True)
+    loop = made.closed_loop()
+    loop.plant.events = (0.1,)
+    changing = loop.plant.chain(loop.controller)
+    assert len(changing.outside) == 1 and not changing.warnings and changing.energies is None
+    robots = made.plant_type.keywords["robots"]
+    members = [Member(r, Hold(q), q0=q) for r, q in zip(robots, made.cell.q0, strict=True)]
+    found = replace(made, cell=Cell(members, made.cell.coupling)).closed_loop().chain
+    assert len(found.outside) == 1 and found.energies is None and found.theorem == THEOREMS[0]

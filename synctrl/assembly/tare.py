@@ -48,13 +48,13 @@ def believed_poses(cell: Cell) -> tuple[np.ndarray, np.ndarray]:
     return np.array([tip.translation for tip in tips]), np.array([tip.rotation for tip in tips])
 
 
-def disagreement(cell: Cell) -> np.ndarray:
-    """By how much each arm believes the object elsewhere than the first one at t = 0, (n, 6).
+def disagreement(cell: Cell, than: int = 0) -> np.ndarray:
+    """By how much each arm believes the object elsewhere than one of them at t = 0, (n, 6).
 
     In world axes, m and, as a rotation vector, rad.
     """
     p, R = believed_poses(cell)
-    return np.concatenate((p - p[0], log(R @ R[0].T)), axis=1)
+    return np.concatenate((p - p[than], log(R @ R[than].T)), axis=1)
 
 
 def _holding_it_at(member: Member, xyz: np.ndarray, rotation: np.ndarray, q: np.ndarray) -> Member:

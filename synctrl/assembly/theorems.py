@@ -56,19 +56,20 @@ class ClosedChain:
     def __init__(self, plant: Any, controller: Controller):
         self.plant, self.controller = plant, controller
         self.rigid = getattr(plant, "K", None) is None
-        self._posed = isinstance(plant.cell.space, PoseSpace)
-        self._refuse_soft_fixtures()
-        shared = self._shares_add_up()
-        self.warnings = (*self._admittance(), *self._integral()) if self._posed else ()
-        nobodys = () if shared else ("the object is no load that any arm's model has",)
-        self.outside = (*self.warnings, *self._unknown(), *nobodys)
+        self.warnings: tuple[str, ...] = ()
+        self.outside = tuple(self._unasked())
+        if not self.outside:
+            self._refuse_soft_fixtures()
+            self.warnings = (*self._admittance(), *self._integral())
+            self.outside = (*self.warnings, *self._unknown())
         number = 3 if controller.admittance is not None else 1 if self.rigid else 2
         self.theorem = THEOREMS[0 if self.outside else number]
 
     @cached_property
     def energies(self) -> Energies | None:
         """What the chain has in V and V'; None where that is not known, or nothing."""
-        return Energies(self.plant, self.controller) if self._posed and not self.rigid else None
+        known = not (self.rigid or self._unasked())
+        return Energies(self.plant, self.controller) if known else None
 
     @property
     def gain(self) -> np.ndarray:
@@ -79,10 +80,24 @@ class ClosedChain:
 
     # -- internals ----------------------------------------------------------------------------------------
 
+    def _unasked(self) -> list[str]:
+        """What the theorems are not about at all."""
+        words = []
+        if not isinstance(self.plant.cell.space, PoseSpace):
+            words.append("a task that is not the pose of the object that is held")
+        if len(self.plant.events):
+            words.append("hands that take hold or let go in the middle of a run")
+        return words
+
+    def _apart(self) -> np.ndarray:
+        """By how much arms that hold the object believe it apart, (6,), m and rad."""
+        hands = self.plant._hands
+        return np.abs(disagreement(self.controller.cell, int(hands[0]))[hands]).max(axis=0)
+
     def _integral(self) -> list[str]:
         """An integral that asks for a deformation, unless an admittance gives way."""
         controller = self.controller
-        apart = np.abs(disagreement(controller.cell)).max(axis=0)
+        apart = self._apart()
         acts = ((controller.leak < controller.Lambda) & (controller.beta > 0)).any()
         if not acts or apart.max() <= AGREED:
             return []
@@ -113,17 +128,17 @@ class ClosedChain:
     def _unknown(self) -> list[str]:
         """What no theorem knows, and what does no harm by itself."""
         controller = self.controller
-        if not self._posed:
-            return ["the task is not the pose of the object that is held, for which theorems are"]
         words = []
         if not isinstance(controller.law, BoundSunMills):
             words.append(f"the law {controller.law_settings['name']} in a closed chain: no proof is known")
-        if controller.admittance is None and np.abs(disagreement(controller.cell)).max() > AGREED:
+        if controller.admittance is None and self._apart().max() > AGREED:
             words.append("arms that do not agree on where the object is, and do not give way")
+        if not self._shares_add_up():
+            words.append("an object that is no load in any arm's model")
         return words
 
     def _refuse_soft_fixtures(self) -> None:
-        if self.rigid or not self._posed:
+        if self.rigid:
             return
         plant, rate = self.plant, self.controller.Lambda - self.controller.leak
         short = rate * (self.controller.beta > 0) * plant.D - plant.K
