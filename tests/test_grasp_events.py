@@ -235,6 +235,24 @@ def test_hands_that_never_open_make_the_plant_that_carries(gantries):
         np.testing.assert_allclose(handled.outputs[name], carried.outputs[name], atol=1e-9)
 
 
+def test_a_step_has_to_do_for_hands_that_close_later_too(gantries):
+    always = [Grasp(grasp.robot, compliance=SOFT) for grasp in WINDOWS]
+    later, first = (handling(gantries, some).closed_loop() for some in (WINDOWS, always))
+    K_r = later.controller.K_r
+    assert later.plant.longest_step(K_r) == first.plant.longest_step(K_r)
+    limit = later.plant.longest_step(K_r)
+    with refused(InputError, "dt", found=1.01 * limit):
+        handling(gantries).simulate(5 * limit, dt=1.01 * limit)
+
+
+def test_another_method_goes_the_same_way_through_hands_that_close_and_open(gantries, run):
+    other = handling(gantries).simulate(0.13, dt=1e-3, integrator="DOP853", rtol=1e-8, atol=1e-9)
+    same = slice(0, 2 * len(other.t) - 1, 2)
+    np.testing.assert_allclose(other.t, run.t[same])
+    for name in ("object_pose", "hand_closed"):
+        np.testing.assert_allclose(other.outputs[name], run.outputs[name][same], atol=1e-6)
+
+
 def test_a_hand_may_take_hold_again_and_of_an_object_that_falls(gantries):
     again = [Grasp(0, None, None, SOFT, until=0.04), Grasp(0, None, None, SOFT, since=0.06)]
     run = handling(gantries, again).simulate(0.1, dt=1e-3)

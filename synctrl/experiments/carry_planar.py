@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -87,22 +87,16 @@ def carry_planar(
     Raises:
         InputError: a value that is none of these.
     """
-    for name, wanted in {"tare": tare, "admittance": admittance}.items():
-        if wanted is not False:
-            raise InputError.expected("False, for pins have none yet", wanted, name)
+    _refuse(tare=tare, admittance=admittance)
     boolean("friction", friction), boolean("push", push)
-    error = GEOMETRIC_ERROR * geometric_error if isinstance(geometric_error, bool) else geometric_error
-    error = finite_array("geometric_error", error, (4, 2))
     arms = [load_robot("planar2r").placed((*BASES[i], 0.0), name=f"arm {i + 1}") for i in range(4)]
-    rubs = FRICTION if friction else Friction()
-    members = [_member(arms[i], i, error[i], rubs) for i in range(4)]
-    cell = Cell(members, Coupling.signed_ring(4), SPACE, name="four planar arms that carry a plate")
-    pushes = [PUSH] * bool(push)
+    cell = _cell(arms, _errors(geometric_error), FRICTION if friction else Friction())
     default = GAINS.replace(K_eps=0.0) if isinstance(parts.get("law"), ShapeKeeping) else GAINS
+    pushes = [PUSH] * bool(push)
     made = ready_experiment(cell, DURATION, default, gains, synchronized, parts, disturbances=pushes)
     grasps = [Grasp(i, (*PINS[i], 0.0), compliance=_pin(grasp)) for i in range(4)]
-    at = _start_of_plate()
-    plant = partial(PinnedPlant, body=PLATE, grasps=grasps, at=at, robots=arms, desired=plate_motion())
+    kept: dict[str, Any] = {"body": PLATE, "grasps": grasps, "at": _start_of_plate(), "robots": arms}
+    plant = partial(PinnedPlant, **kept, desired=plate_motion())
     return replace(made, gains=_leaking(made.gains, leak), plant_type=plant)
 
 
@@ -140,6 +134,23 @@ class InPlane:
     def __call__(self, t: ArrayLike) -> Motion:
         x, x_dot, x_ddot = self._motion(t)
         return Motion(x[..., :2], x_dot[..., :2], x_ddot[..., :2])
+
+
+def _refuse(**wanted: Any) -> None:
+    for name, value in wanted.items():
+        if value is not False:
+            raise InputError.expected("False, for pins have none yet", value, name)
+
+
+def _errors(given: bool | ArrayLike) -> np.ndarray:
+    """By how much the arms are wrong about where their pins are, (4, 2), m."""
+    error = GEOMETRIC_ERROR * given if isinstance(given, bool) else given
+    return finite_array("geometric_error", error, (4, 2))
+
+
+def _cell(arms: list[Robot], errors: np.ndarray, friction: Friction) -> Cell:
+    members = [_member(arm, i, errors[i], friction) for i, arm in enumerate(arms)]
+    return Cell(members, Coupling.signed_ring(4), SPACE, name="four planar arms that carry a plate")
 
 
 def _start_of_plate() -> tuple[np.ndarray, np.ndarray]:
