@@ -23,6 +23,7 @@ MOVED = {
     "synctrl.show.lyapunov_plots": ("synctrl.analysis.lyapunov", ["ENERGIES", "POWERS", "THEOREM"]),
     "synctrl.robots.robot": ("synctrl.robots.catalog", ["load_robot"]),
     "synctrl.show.plots": ("synctrl.show.legends", ["WIDE", "NARROW"]),
+    "synctrl.show.scene": ("synctrl.show.shown", ["NOTEBOOK_LIMIT"]),
     "synctrl.simulation.simulate": ("synctrl.simulation.engines", ["run_reference"]),
     "synctrl.coupling.weights": ("synctrl.coupling.desired", ["check_weights"]),
     "synctrl.tasks.rotations": ("synctrl.checks", ["rotation_matrix"]),

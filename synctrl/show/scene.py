@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance, positive_number, printable
 from ..errors import InputError, RobotWarning, warn
+from ..renamed import names_elsewhere
 from ..robots.model import joint_poses
 from .html import Pane, fit_camera, page, view_commands, viewer_axes
 from .meshes import MeshLibrary
@@ -146,3 +147,6 @@ class Scene(Recording, Shown):
         for file, fault in found.items():
             warn(f"robot '{name}': mesh {file} is not shown: {fault}", RobotWarning)
         self.add_hidden(name, (file.name for file in found))
+
+
+__getattr__ = names_elsewhere(__name__, ".shown", "NOTEBOOK_LIMIT")
