@@ -14,6 +14,7 @@ from seams.posted_network import Posted
 
 from synctrl import Experiment, Hold, Result
 from synctrl.analysis import certify
+from synctrl.analysis.replay import replay
 from synctrl.assembly.meeting import MeetingPlant, lag_of_friction
 from synctrl.control.adaptation import Gradient, Override, Paced
 from synctrl.control.adaptation.protocol import check_still
@@ -179,6 +180,14 @@ def test_what_is_desired_has_the_rates_that_it_says_where_the_feed_changes():
         slopes = (of[2:, :2] - of[:-2, :2]) / 4e-3
         for slope, rate in zip(slopes.swapaxes(0, 1), of[1:-1, 1:].swapaxes(0, 1), strict=True):
             np.testing.assert_allclose(slope, rate, atol=5e-3 * np.abs(rate).max())
+
+
+def test_a_run_gone_through_again_has_the_weights_of_its_phase():
+    rows = replay(slowed()).rows
+    phase, feed = (slowed().outputs[name][-1] for name in ("phase", "feed"))
+    weights = slowed().experiment.cell.weights(np.array([phase]))
+    np.testing.assert_allclose(rows.c[-1], weights.c[0], atol=1e-12)
+    np.testing.assert_allclose(rows.c_dot[-1], feed * weights.c_dot[0], atol=1e-12)
 
 
 def test_phase_and_feed_follow_their_equations():
