@@ -155,7 +155,7 @@ HEARD = "E", "sigma", "sigma_dot"
 FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
     {
         "measure": Signature(
-            ("q", "v", "base", "tool", *DESIRED, *SLIDE, "weights", "W_inv", "posture", "gain"),
+            ("q", "v", "tool", "base", *DESIRED, *SLIDE, "weights", "W_inv", "posture", "gain"),
             (
                 "x", "e", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot", "sine", "cosine", "J", "J_dot", "J_inv",
                 "G", "zeta", "zeta_dot", "damping", "damping_rate",
