@@ -6,6 +6,7 @@ in world axes. Poses are kept as (position, unit quaternion x y z w), (7,).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,9 +20,40 @@ from ..robots.pseudo_inertia import inertial_parameters, pseudo_inertia
 from ..robots.robot import Robot
 from ..tasks.rotations import from_quaternion, quaternion, skew
 
+Solve = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""M and b -> M^-1 b."""
+
 
 @dataclass(frozen=True, eq=False)
-class CarriedObject:
+class Inertia:
+    """How hard a rigid object is to move, in numbers or in symbols.
+
+    Args:
+        mass: a number, or an array with one entry, kg.
+        com: centre of mass in the object's axes, (3,), m.
+        inertia: about the centre of mass in the object's axes, (3, 3), kg·m^2.
+    """
+
+    mass: Any
+    com: Any = (0.0, 0.0, 0.0)
+    inertia: Any = None
+
+    def mass_matrix(self, R: np.ndarray) -> np.ndarray:
+        """M_o of the twist of its origin in world axes, (6, 6), for its orientation R, (3, 3)."""
+        c, M = skew(R @ self.com), self.mass * np.eye(6)
+        M[:3, 3:], M[3:, :3] = -self.mass * c, self.mass * c
+        M[3:, 3:] = R @ self.inertia @ R.T - self.mass * c @ c
+        return M
+
+    def bias(self, R: np.ndarray, w: np.ndarray, g: np.ndarray) -> np.ndarray:
+        """c_o of M_o nu' + c_o = sum of the wrenches on it, (6,), with angular velocity w and gravity g."""
+        r, inertia, turning = R @ self.com, R @ self.inertia @ R.T, skew(w)
+        force = self.mass * (turning @ turning @ r - g)
+        return np.concatenate((force, skew(r) @ force + turning @ inertia @ w))
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedObject(Inertia):
     """A rigid object that is carried.
 
     Args:
@@ -63,19 +95,6 @@ class CarriedObject:
         I = self.inertia - self.mass * c @ c
         entries = I[0, 0], I[0, 1], I[1, 1], I[0, 2], I[1, 2], I[2, 2]
         return np.array([self.mass, *(self.mass * self.com), *entries])
-
-    def mass_matrix(self, R: np.ndarray) -> np.ndarray:
-        """M_o of the twist of its origin in world axes, (6, 6), for its orientation R, (3, 3)."""
-        c, M = skew(R @ self.com), self.mass * np.eye(6)
-        M[:3, 3:], M[3:, :3] = -self.mass * c, self.mass * c
-        M[3:, 3:] = R @ self.inertia @ R.T - self.mass * c @ c
-        return M
-
-    def bias(self, R: np.ndarray, w: np.ndarray, g: np.ndarray) -> np.ndarray:
-        """c_o of M_o nu' + c_o = sum of the wrenches on it, (6,), with angular velocity w and gravity g."""
-        r, inertia, turning = R @ self.com, R @ self.inertia @ R.T, skew(w)
-        force = self.mass * (turning @ turning @ r - g)
-        return np.concatenate((force, skew(r) @ force + turning @ inertia @ w))
 
 
 def moved_parameters(theta: np.ndarray, xyz: np.ndarray, rotation: np.ndarray) -> np.ndarray:
@@ -121,5 +140,23 @@ def place_of(pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def pose_rate(pose: np.ndarray, nu: np.ndarray) -> np.ndarray:
     """Rate of a pose, (7,), of a body with the twist nu, (6,): q' = (w, 0) q / 2."""
-    w, (v, s) = nu[3:], (pose[3:6], pose[6])
-    return np.concatenate((nu[:3], 0.5 * (s * w + skew(w) @ v), [-0.5 * w @ v]))
+    w, v, s = nu[3:], pose[3:6], pose[6:]
+    return np.concatenate((nu[:3], 0.5 * (s * w + skew(w) @ v), -0.5 * (w * v).sum(keepdims=True)))
+
+
+def body_rate(
+    body: Inertia, state: np.ndarray, load: np.ndarray, g: np.ndarray, solve: Solve = np.linalg.solve
+) -> np.ndarray:
+    """Rate of pose and twist of an object, (13,), from M_o nu' + c_o = load.
+
+    Args:
+        body: its inertia.
+        state: its pose and twist, (13,).
+        load: the wrench on it about its origin, (6,).
+        g: gravity, (3,), m/s^2.
+        solve: M, b -> M^-1 b.
+    """
+    pose, nu = state[:7], state[7:]
+    R = place_of(pose)[1]
+    nu_dot = solve(body.mass_matrix(R), load - body.bias(R, nu[3:], g))
+    return np.concatenate((pose_rate(pose, nu), nu_dot))

@@ -11,6 +11,7 @@ acts on the object at p_g, and (-f, -n - (p_g - p_h) x f) on the hand.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,6 +20,7 @@ import numpy as np
 from ..checks import count, finite_array, instance, rotation_matrix
 from ..errors import InputError
 from ..tasks.rotations import log, skew
+from .body import place_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,9 +92,25 @@ class Grasp:
         return -self.rotation.T @ self.xyz, self.rotation.T
 
 
+def places_on(
+    state: np.ndarray, arms: np.ndarray, turned: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Position, (k, 3), orientation, (k, 3, 3), and twist, (k, 6), of places on an object, and their levers.
+
+    Args:
+        state: pose and twist of the object, (13,).
+        arms, turned: where the places are in the object's axes, (k, 3) and (k, 3, 3).
+    """
+    (p, R), nu = place_of(state[:7]), state[7:]
+    levers = arms @ R.T
+    nu_g = np.tile(nu, (len(levers), 1))
+    nu_g[:, :3] += levers @ skew(nu[3:]).T
+    return p + levers, R @ turned, nu_g, levers
+
+
 def fixture_wrenches(
-    hands: tuple[np.ndarray, np.ndarray, np.ndarray],
-    places: tuple[np.ndarray, np.ndarray, np.ndarray],
+    hands: Sequence[np.ndarray],
+    places: Sequence[np.ndarray],
     K: np.ndarray,
     D: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -116,6 +134,6 @@ def fixture_wrenches(
 
 def grasp_matrix(arms: np.ndarray) -> np.ndarray:
     """G_i, (..., k, 6, 6), which makes wrenches at r_i, (..., k, 3), wrenches about the object's origin."""
-    G = np.tile(np.eye(6), (*arms.shape[:-1], 1, 1))
+    G = np.tile(np.eye(6, dtype=np.result_type(arms, float)), (*arms.shape[:-1], 1, 1))
     G[..., 3:, :3] = skew(arms)
     return G

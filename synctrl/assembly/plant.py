@@ -15,10 +15,10 @@ from ..robots.robot import Robot
 from ..simulation.plant import Output, Plant
 from ..tasks.measurement import Tips
 from ..tasks.poses import PoseTrajectory
-from ..tasks.rotations import log, skew
-from .body import CarriedObject, place_of, pose_of, pose_rate
+from ..tasks.rotations import log
+from .body import CarriedObject, body_rate, place_of, pose_of
 from .forces import internal_wrenches
-from .grasp import Grasp, fixture_wrenches, grasp_matrix
+from .grasp import Grasp, fixture_wrenches, grasp_matrix, places_on
 from .step import largest_step
 
 #: how far a hand may be off its place on the object at t = 0, m and rad
@@ -145,22 +145,14 @@ class CarryingPlant(Plant):
 
     def _wrenches(self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray) -> tuple[np.ndarray, ...]:
         """Wrenches on the object, at its grasps, and on the hands, (k, 6) each, and the hands' Jacobians."""
-        p_h, R_h, nu_h, J = self._held(q, v)
-        (p, R), nu = place_of(hidden[:7]), hidden[7:]
-        levers = self.arms @ R.T
-        nu_g = np.tile(nu, (len(levers), 1))
-        nu_g[:, :3] += levers @ skew(nu[3:]).T
-        on_object, on_hands = fixture_wrenches(
-            (p_h, R_h, nu_h), (p + levers, R @ self.turned, nu_g), self.K, self.D
-        )
-        return on_object, on_hands, J
+        *hands, J = self._held(q, v)
+        *places, _ = places_on(hidden, self.arms, self.turned)
+        return *fixture_wrenches(hands, places, self.K, self.D), J
 
     def _object_rate(self, hidden: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
-        pose, nu = hidden[:7], hidden[7:]
-        R = place_of(pose)[1]
-        load = np.matvec(grasp_matrix(self.arms @ R.T), wrenches).sum(axis=0)
-        nu_dot = np.linalg.solve(self.body.mass_matrix(R), load - self.body.bias(R, nu[3:], self._gravity))
-        return np.concatenate((pose_rate(pose, nu), nu_dot))
+        levers = self.arms @ place_of(hidden[:7])[1].T
+        load = np.matvec(grasp_matrix(levers), wrenches).sum(axis=0)
+        return body_rate(self.body, hidden, load, self._gravity)
 
     def _levers(self, hidden: np.ndarray) -> np.ndarray:
         """From the object's origin to its grasps in world axes, (T, k, 3)."""
