@@ -43,7 +43,7 @@ def empty_cache(tmp_path, monkeypatch):
 
 def specimen(experiment: Experiment) -> Specimen:
     loop = experiment.closed_loop()
-    return Specimen(loop, classify(loop.controller))
+    return Specimen(loop, classify(loop))
 
 
 def ring(n: int, distance: float) -> Experiment:
@@ -208,7 +208,7 @@ FAULTS = {
     "the posture's gain": ("X(gain, n, nv)\n", "X(posture, n, nv)\n"),
     "the weights of W": ("X(weights, n, 4*m*m) X(W_inv, n, nv)", "X(weights, n, 4*m*m) X(gain, n, nv)"),
     "another robot's damping": ("X(leak, one, m) X(K_r, n, K)", "X(leak, one, m) X(K_r, one, K)"),
-    "another robot's true parameters": ("X(pi, n, bodies) X(base", "X(pi, one, bodies) X(base"),
+    "another robot's true parameters": ("X(pi, n, bodies) X(true_base", "X(pi, one, bodies) X(true_base"),
     "Coulomb friction": ("* tanh(a->v[j] / a->smoothing[j])", "* (a->v[j] / a->smoothing[j])"),
     "the disturbance": ("+ a->disturbance[j]", ""),
     "what adapts": (GAMMA, GAMMA.replace("Gamma, n", "Gamma, one")),
@@ -223,7 +223,7 @@ FAULTS = {
 @pytest.fixture(scope="module")
 def sources():
     loop = mixed().closed_loop()
-    return list(program.generate(classify(loop.controller).kinds))
+    return list(program.generate(classify(loop).kinds))
 
 
 @pytest.mark.parametrize("name", FAULTS)
@@ -246,7 +246,7 @@ def test_code_that_was_made_from_a_wrong_line_of_the_law_is_found(monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(law, "compute_weighted_errors", lambda weights, error: np.matvec(weights.c, error))
-        wrong = list(program.generate(classify(loop.controller).kinds))
+        wrong = list(program.generate(classify(loop).kinds))
     monkeypatch.setattr(program, "generate", lambda kinds: iter(wrong))
     with refused(CompilationError, "generated code") as caught:
         Program(loop)

@@ -7,6 +7,7 @@ from functools import cache as cache_of_results
 from functools import partial, wraps
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from cells import SMALL_GAINS, small_cell
 from refusals import refused
@@ -171,10 +172,17 @@ class Plugged(Experiment):
         return self.loop(self.controller(usual.cell, self.gains), usual.plant)
 
 
-def heavier(cell, **options):
-    """A plant of other robots than the controller knows."""
-    robots = [robot.with_parameters(2 * robot.inertial_parameters) for robot in cell.robots]
+def weightless(cell, **options):
+    """A plant of robots that do not fall."""
+    robots = [Robot(pin.Model(robot.model), robot.tip) for robot in cell.robots]
+    for robot in robots:
+        robot.model.gravity.setZero()
     return Plant(cell, robots=robots, **options)
+
+
+def longer(cell, **options):
+    """A plant of robots with more joints than the controller knows."""
+    return Plant(cell, robots=[load_robot("ur5")] * cell.n, **options)
 
 
 def with_own(make, name, value):
@@ -214,10 +222,15 @@ REPLACED = {
         f"{__name__}.Leaking",
     ),
     "a plant": (lambda: plain(plant_type=Sticky), "plant", f"{__name__}.Sticky"),
-    "a plant of other robots": (
-        lambda: plain(plant_type=heavier),
+    "a plant without gravity": (
+        lambda: plain(plant_type=weightless),
         "plant",
-        "a plant with other robots than the cell",
+        "a plant with another gravity than the cell's",
+    ),
+    "a plant with more joints": (
+        lambda: plain(plant_type=longer),
+        "plant",
+        "a plant with other joints than the cell's",
     ),
     "a cell": (lambda: in_cell(kind=Slow), "cell", f"{__name__}.Slow"),
     "a robot": (
@@ -436,7 +449,7 @@ def test_the_types_of_what_is_plugged_in_are_part_of_the_key():
     def keys(parameters):
         cell = rebuilt(small_cell(), parameters=lambda m: parameters)
         loop = Experiment(cell, SMALL_GAINS, 0.05).closed_loop()
-        return [kind.key() for kind in program.classify(loop.controller).kinds]
+        return [kind.key() for kind in program.classify(loop).kinds]
 
     assert keys(base) != keys(same)
 

@@ -5,16 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from refusals import refused
 from test_saturation import pair as saturating
 
-from synctrl import Disturbance, Experiment, Payload, Result
+from synctrl import Disturbance, Experiment, Payload, Result, Robot
 from synctrl.compiled.known import check_known
 from synctrl.compiled.program import Program
 from synctrl.control.adaptation import Gradient
 from synctrl.errors import InputError, SaturationWarning
 from synctrl.experiments import a460_pair, planar_four, ur5_payload
+from synctrl.simulation.plant import Plant
 from synctrl.simulation.result import LAYOUT
 from synctrl.simulation.schedules import PayloadSchedule
 
@@ -102,6 +104,25 @@ def test_payloads_saturation_and_disturbances_act_together_in_both_engines(optio
     experiment = replace(carrying(planar_four(disturbance=pushes)), saturate=True)
     run, _ = both(experiment, duration=0.1, dt=1e-3, **options)
     assert (run.disturbance[:, 2] != 0).any()
+
+
+def other(cell, **options) -> Plant:
+    """Robots that stand elsewhere than the controller knows, are shorter, and heavier."""
+    robots = []
+    for robot in cell.robots:
+        model = pin.Model(robot.model)
+        model.jointPlacements[2].translation *= 0.98
+        shorter = Robot(model, robot.tip).placed((0.01, 0.02, 0.0), (0.0, 0.0, 0.02))
+        robots.append(shorter.with_parameters(1.1 * robot.inertial_parameters))
+    return Plant(cell, robots=robots, **options)
+
+
+@pytest.mark.parametrize("options", WAYS.values(), ids=WAYS)
+def test_both_engines_have_plants_of_other_robots_than_the_controller_knows(options):
+    experiment = replace(carrying(planar_four()), plant_type=other)
+    run, _ = both(experiment, duration=0.1, dt=1e-3, **options)
+    known = carrying(planar_four()).simulate(duration=0.1, dt=1e-3, **options)
+    assert np.abs(run.q - known.q).max() > 1e-6
 
 
 def test_payloads_need_no_new_code():

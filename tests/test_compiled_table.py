@@ -64,7 +64,7 @@ EXPERIMENTS = {
 
 
 def kinds_of(name: str):
-    return classify(EXPERIMENTS[name]().closed_loop().controller).kinds
+    return classify(EXPERIMENTS[name]().closed_loop()).kinds
 
 
 # -- the table and the generated functions ----------------------------------------------------------------
@@ -87,6 +87,7 @@ def test_generated_functions_have_the_arguments_and_results_of_the_table(name):
 def test_a_function_is_given_only_what_is_there_before_it_is_called():
     known = {*owned_by("state", "cell", "instant", "load", "disturbance"), "moving"}
     known |= {"z_sampled", "z_dot_sampled", "since"}  # by the driver, at a sample
+    known |= {"lift"}  # added up by the driver, of what the hands give
     for name, (inputs, outputs) in FUNCTIONS.items():
         shares = {"E", "sigma", "sigma_dot"} if name == "control" else set()  # by the coupling
         assert set(inputs) <= known | shares, name
@@ -112,7 +113,7 @@ def test_a_rate_has_the_shape_of_its_state_and_the_place():
 
 def test_every_array_of_a_result_is_logged_from_a_quantity_of_its_dimensions():
     dimension = {"robot": "n", "pair": "p", "axis": "m", "joint": "nv", "parameter": "P"}
-    assert [*LOGS] == [*[*LAYOUT][1:], "adaptation_state", "damping", "velocity_lost"]
+    assert [*LOGS] == [*[*LAYOUT][1:], "adaptation_state", "damping", "velocity_lost", "plant_state"]
     for name, (dimensions, _) in [*LAYOUT.items()][1:]:
         rows, length = (dimension[each] for each in dimensions[1:])
         assert QUANTITIES[LOGS[name]][1:3] == (rows, length), name
@@ -158,7 +159,7 @@ def test_the_driver_counts_columns_as_python_does(name, tmp_path):
 
 # -- the table and the arrays -----------------------------------------------------------------------------
 
-SMALL = dict(zip((*SIZES, "n", "p"), (2, 3, 5, 7, 3, 30, 1, 1, 1, 2, 4, 6), strict=True))
+SMALL = dict(zip((*SIZES, "n", "p", "o"), (2, 3, 5, 7, 3, 30, 1, 1, 1, 2, 1, 4, 6, 1), strict=True))
 
 
 @pytest.mark.parametrize("name", QUANTITIES)
@@ -179,8 +180,7 @@ def test_arrays_that_are_put_in_are_numbers_one_after_another():
 
 def test_a_program_has_all_constants_and_refuses_one_of_another_shape():
     loop = Experiment(small_cell(), SMALL_GAINS, 0.05).closed_loop()
-    bases = classify(loop.controller).bases
-    assert set(_constants(loop, bases)) == set(owned_by("cell"))
+    assert set(_constants(loop, classify(loop))) == set(owned_by("cell"))
     loop.plant.viscous = loop.plant.viscous[:, :1]
     with refused(CompilationError, "viscous"):
         Program(loop)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synctrl import Controller, load_robot
+from synctrl import load_robot
 from synctrl.experiments import a460_pair, mixed_four, planar_four
 from synctrl.robots.base_parameters import BaseParameters
 from synctrl.robots.friction import Friction
@@ -107,7 +107,7 @@ def test_symbols_give_the_same_regressors_as_numbers(make):
 
     experiment = make()
     cell = experiment.cell
-    found = classify(Controller(cell, experiment.gains))
+    found = classify(experiment.closed_loop())
     q, v = np.random.default_rng(0).standard_normal((2, cell.n, cell.nv))
     for i, robot in enumerate(cell.robots):
         function = momentum_function(found.kinds[found.kind_of[i]], found.bases[i].rotation)

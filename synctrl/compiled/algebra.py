@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -34,6 +35,47 @@ def symbols(name: str, *shape: int) -> np.ndarray:
     import casadi as ca
 
     return array_of(ca.SX.sym(name, int(np.prod(shape))), *shape)
+
+
+def function_of(
+    name: str,
+    signature: tuple[Sequence[str], Sequence[str]],
+    given: Mapping[str, Any],
+    computed: Mapping[str, Any],
+) -> Any:
+    """A CasADi function in which nothing is computed twice.
+
+    Args:
+        name: of the function.
+        signature: names of its arguments and of its results.
+        given: symbols by name.
+        computed: arrays of these by name; one that is None, or missing, has no entries.
+    """
+    import casadi as ca
+
+    inputs, outputs = signature
+    found = [computed.get(key) for key in outputs]
+    results = ca.cse([column_of([] if array is None else array) for array in found])
+    return ca.Function(name, [given[key] for key in inputs], results, [*inputs], [*outputs])
+
+
+def solve_positive(M: Any, b: Any) -> Any:
+    """M^-1 b for a symmetric positive definite matrix of CasADi's, by M = L D L^T without pivoting."""
+    import casadi as ca
+
+    n = M.shape[0]
+    L, LD = ca.SX.eye(n), ca.SX.zeros(n, n)
+    for j in range(n):
+        for i in range(j, n):
+            LD[i, j] = M[i, j] - sum(LD[i, k] * L[j, k] for k in range(j))
+            L[i, j] = LD[i, j] / LD[j, j]
+    x = [b[i] for i in range(n)]
+    for i in range(n):
+        x[i] -= sum(L[i, k] * x[k] for k in range(i))
+    x = [x[i] / LD[i, i] for i in range(n)]
+    for i in reversed(range(n)):
+        x[i] -= sum(L[k, i] * x[k] for k in range(i + 1, n))
+    return ca.vertcat(*x)
 
 
 def _inverse(A: np.ndarray) -> np.ndarray:

@@ -25,7 +25,7 @@ from .cache import building_folder, executable_place, open_cache, read_file, rem
 from .compiler import FLAGS, compile_library, compiler, compiler_version, fault
 
 #: rooms of the package that generated code is made from, or compared with
-ROOMS = ("robots", "tasks", "coupling", "control", "simulation", "compiled")
+ROOMS = ("robots", "tasks", "coupling", "control", "simulation", "assembly", "compiled")
 #: a digest in a file is shorter than this, bytes
 DIGEST = 200
 

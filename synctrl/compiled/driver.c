@@ -40,6 +40,7 @@ static void take(Quantities *a, const Steps *s, int step) {
 /* call_measure(c, a, i, k) and so on: the generated functions, for robot i */
 #define ROW_n i
 #define ROW_one 0
+#define ROW_o 0
 #define READ(name, rows, columns) *arg++ = a->name + (size_t)ROW_##rows * (columns);
 #define WRITE(name, rows, columns) *res++ = a->name + (size_t)ROW_##rows * (columns);
 #define CALL(function)                                                                      \
@@ -83,6 +84,18 @@ static void couple(const Cell *c, Quantities *a) {
 /* What reaches a joint of the torque that is asked for, as `Plant.applied`; what is no number stays so. */
 static double applied(double tau, double limit) { return tau > limit ? limit : tau < -limit ? -limit : tau; }
 
+/* Let hands that hold an object pull at their robots, and all of them move it. */
+static void hold(const Cell *c, Quantities *a, Work *k) {
+    for (int j = 0; j < c->o * 6; j++) a->lift[j] = 0;
+    for (int i = 0; i < c->n; i++) {
+        if (!kinds[c->kind[i]].hand) continue;
+        call_hand(c, a, i, k);
+        for (int j = 0; j < 6; j++) a->lift[j] += a->wrench[i * 6 + j];
+        for (int j = 0; j < nv; j++) a->moving[i * nv + j] += a->pull[i * nv + j];
+    }
+    call_object(c, a, c->n, k);
+}
+
 /* v' under a torque that is asked for, where sine and cosine are known, and q' = v */
 static void move(const Cell *c, Quantities *a, const double *tau, Work *k) {
     int joints = c->n * nv;
@@ -92,6 +105,7 @@ static void move(const Cell *c, Quantities *a, const double *tau, Work *k) {
     if (c->rubs)
         for (int j = 0; j < joints; j++)
             a->moving[j] -= a->viscous[j] * a->v[j] + a->coulomb[j] * tanh(a->v[j] / a->smoothing[j]);
+    if (c->o) hold(c, a, k);
     for (int i = 0; i < c->n; i++) call_plant(c, a, i, k);
 }
 

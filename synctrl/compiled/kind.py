@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -9,9 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from ..assembly.plant import CarryingPlant
 from ..control.controller import Controller
 from ..robots.mechanism import Mechanism, mechanism
 from ..robots.parameters import FrictionParameters
+from ..robots.robot import Robot
+from ..simulation.closed_loop import ClosedLoop
+from ..simulation.plant import Plant
 from ..tasks.algebra import Algebra
 from ..tasks.measurement import Kinematics
 from ..tasks.redundancy import Posture
@@ -25,10 +30,12 @@ class Kind:
     """What equal robots share; everything else is an input of the generated functions.
 
     Attributes:
-        fixed: the mechanism.
+        fixed: the mechanism, as the controller knows it.
+        true: the one that really stands there.
         space: of the task.
         matrix: map from theta to inertial parameters, (10 bodies, P), or None for all of them.
-        base_rotation: rotation of the first joint's placement if all robots share it, else None.
+        base_rotation, true_rotation: rotation of the first joint's placement, as the controller knows it and
+            as it is, if all robots with the mechanism share it, else None.
         gravity: in the world's axes, m/s^2.
         reference_acceleration, k_r_space: options of the controller.
         smoothing: velocity at which adapted Coulomb friction reaches tanh(1), or None without it.
@@ -36,12 +43,15 @@ class Kind:
         made_of: names of the types that the user has plugged in.
         learning: how it learns, or None for (14).
         law: CasADi function of what it does, see `trace_law`, or None for `SunMills`.
+        holds: whether its tip holds an object.
     """
 
     fixed: Mechanism
+    true: Mechanism
     space: TipSpace | JointSpace
     matrix: np.ndarray | None
     base_rotation: np.ndarray | None
+    true_rotation: np.ndarray | None
     gravity: tuple[float, ...]
     reference_acceleration: str
     k_r_space: str
@@ -50,6 +60,7 @@ class Kind:
     made_of: tuple[str, ...] = ()
     learning: Learning | None = None
     law: Any = None
+    holds: bool = False
 
     @property
     def nv(self) -> int:
@@ -114,18 +125,50 @@ class Kind:
             "spare": int(self.solves),
             "damped": int(self.damped),
             "watches": len(self.watches),
+            "hand": int(self.holds),
         }
 
     def key(self) -> list[Any]:
         """Plain data that is equal for robots of one kind."""
-        shared = None if self.base_rotation is None else self.base_rotation.tolist()
+        rotations = (self.base_rotation, self.true_rotation)
+        shared = [None if rotation is None else rotation.tolist() for rotation in rotations]
         matrix = None if self.matrix is None else self.matrix.tolist()
         options: list[Any] = [self.reference_acceleration, self.k_r_space, list(self.gravity)]
-        options += [self.smoothing, self.rotors, list(self.made_of)]
+        options += [self.smoothing, self.rotors, list(self.made_of), self.holds]
         options += [None if part is None else part.serialize() for part in (*(self.learning or ()), self.law)]
         damping = asdict(self.space.damping) if self.damped else None  # type: ignore[union-attr, arg-type]
         space = [list(getattr(self.space, "rows", ())), damping, list(self.watches)]
-        return [self.fixed.key(), space, matrix, shared, options]
+        return [self.fixed.key(), self.true.key(), space, matrix, shared, options]
+
+
+class Standing(NamedTuple):
+    """Robots that stand somewhere.
+
+    Attributes:
+        fixed: their mechanisms, (n,).
+        bases: placement of the first joint of each, (n,).
+    """
+
+    fixed: list[Mechanism]
+    bases: list[pin.SE3]
+
+    @property
+    def shared(self) -> list[np.ndarray | None]:
+        """Rotation of each first joint's placement if all with the mechanism share it, else None."""
+        names = [repr(fixed.key()) for fixed in self.fixed]
+        rotations: dict[str, set[bytes]] = {}
+        for name, base in zip(names, self.bases, strict=True):
+            rotations.setdefault(name, set()).add((base.rotation + 0.0).tobytes())  # -0 counts as 0
+        return [
+            base.rotation if len(rotations[name]) == 1 else None
+            for name, base in zip(names, self.bases, strict=True)
+        ]
+
+
+def standing(robots: Sequence[Robot]) -> Standing:
+    """Mechanisms and places of robots."""
+    fixed, bases = zip(*map(mechanism, robots), strict=True)
+    return Standing([*fixed], [*bases])
 
 
 class Classified(NamedTuple):
@@ -134,54 +177,73 @@ class Classified(NamedTuple):
     Attributes:
         kinds: the kinds of robots there are.
         kind_of: which one each robot is, (n,).
-        bases: placement of the first joint of each robot, (n,).
+        bases, true_bases: placement of the first joint of each robot, as the controller knows it and as it
+            is, (n,).
     """
 
     kinds: list[Kind]
     kind_of: list[int]
     bases: list[pin.SE3]
+    true_bases: list[pin.SE3]
 
 
-def classify(controller: Controller) -> Classified:
-    """The kinds of robots in a cell of known parts, see `check_known`.
+def classify(loop: ClosedLoop) -> Classified:
+    """The kinds of robots in a closed loop of known parts, see `check_known`.
 
     Raises:
         InputError: the cell uses something the compiled engine does not have.
     """
-    found = [mechanism(robot) for robot in controller.cell.robots]
-    names = [repr(fixed.key()) for fixed, _ in found]
-    rotations: dict[str, set[bytes]] = {}
-    for name, (_, base) in zip(names, found, strict=True):
-        rotations.setdefault(name, set()).add((base.rotation + 0.0).tobytes())  # -0 counts as 0
-    kinds: dict[str, Kind] = {}
-    bare = [
-        _kind(controller, i, fixed, base.rotation if len(rotations[name]) == 1 else None)
-        for i, (name, (fixed, base)) in enumerate(zip(names, found, strict=True))
-    ]
+    controller = loop.controller
+    bare, known, true = _bare(loop)
     momentum = [
-        partial(momentum_function, kind, base.rotation) for kind, (_, base) in zip(bare, found, strict=True)
+        partial(momentum_function, kind, base.rotation) for kind, base in zip(bare, known.bases, strict=True)
     ]
+    kinds: dict[str, Kind] = {}
     index, plugged = [], zip(trace_learning(controller, momentum), trace_law(controller), strict=True)
     for plain, (learning, law) in zip(bare, plugged, strict=True):
         kind = replace(plain, learning=learning, law=law)
         key = repr(kind.key())
         kinds.setdefault(key, kind)
         index.append(list(kinds).index(key))
-    return Classified(list(kinds.values()), index, [base for _, base in found])
+    return Classified(list(kinds.values()), index, known.bases, true.bases)
 
 
-def _kind(controller: Controller, i: int, fixed: Mechanism, rotation: np.ndarray | None) -> Kind:
+def holders(plant: Plant) -> tuple[int, ...]:
+    """The robots of a plant whose tips hold its object, in the order of its grasps."""
+    return tuple(grasp.robot for grasp in plant.grasps) if isinstance(plant, CarryingPlant) else ()
+
+
+def _bare(loop: ClosedLoop) -> tuple[list[Kind], Standing, Standing]:
+    """Kinds of robots without what users have plugged in; the robots as they are known, and as they are."""
+    robots, holding = loop.cell.robots, holders(loop.plant)
+    known, true = standing(robots), standing(loop.plant.schedule.free)
+    parts = zip(known.fixed, true.fixed, known.shared, true.shared, strict=True)
+    kinds = [
+        _kind(loop.controller, i, (fixed, real), (rotation, true_rotation), i in holding)
+        for i, (fixed, real, rotation, true_rotation) in enumerate(parts)
+    ]
+    return kinds, known, true
+
+
+def _kind(
+    controller: Controller,
+    i: int,
+    mechanisms: tuple[Mechanism, Mechanism],
+    rotations: tuple[np.ndarray | None, np.ndarray | None],
+    holds: bool,
+) -> Kind:
     cell, parameters = controller.cell, controller.cell.parameters[i]
     rigid: Any = parameters.base if isinstance(parameters, FrictionParameters) else parameters
     return Kind(
-        fixed,
+        *mechanisms,
         cell.space,  # type: ignore[arg-type]
         getattr(rigid, "matrix", None),
-        rotation,
+        *rotations,
         tuple(map(float, cell.robots[i].gravity_vector)),
         controller.reference_acceleration,
         controller.k_r_space,
         getattr(parameters, "smoothing", None),
         getattr(parameters, "armature", False),
         tuple(type(part).__qualname__ for part in (cell.space, parameters, rigid)),
+        holds=holds,
     )

@@ -18,6 +18,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..assembly.body import CarriedObject
+from ..assembly.grasp import Fixture, Grasp
+from ..assembly.plant import CarryingPlant
 from ..control import law
 from ..control.adaptation.gradient import BoundGradient
 from ..control.controller import Controller
@@ -43,6 +46,8 @@ SPACES = (JointSpace, CartesianSpace, PoseSpace)
 BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace)
 RIGID = (FullParameters, LinearParameters, BaseParameters)
 INVERSES = (Inverse, Pseudoinverse, DampedInverse)
+#: numbers of the state of an object that is carried
+BODY = 13
 COMPILED_BEFORE = "its equations were compiled before"
 #: modules whose functions the parts of a closed loop call, beside those of their own
 LINES = (law, algebra, rotations)
@@ -92,7 +97,9 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     controller, cell = loop.controller, loop.controller.cell
     task: Any = cell.task
     yield Part("closed loop", loop, (ClosedLoop,))
-    yield Part("plant", loop.plant, (Plant,))
+    yield Part("plant", loop.plant, (Plant, CarryingPlant))
+    if isinstance(loop.plant, CarryingPlant):
+        yield from _held(loop.plant)
     yield Part("schedule of payloads", loop.plant.schedule, (PayloadSchedule,))
     yield Part("controller", controller, (Controller,))
     if isinstance(controller.law, BoundSunMills):  # others are traced
@@ -117,6 +124,17 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
         yield Part(f"parameters of {name}", parameters, (*RIGID, FrictionParameters))
         if type(parameters) is FrictionParameters:
             yield Part(f"parameters of {name} without friction", parameters.base, RIGID)
+    for name, robot in zip(cell.names, loop.plant.schedule.free, strict=True):
+        yield Part(f"true model of {name}", robot, (Robot,))
+
+
+def _held(plant: CarryingPlant) -> Iterator[Part]:
+    """Parts of a plant that carries an object."""
+    yield Part("object", plant.body, (CarriedObject,))
+    yield Part("true tips of the robots", plant._tips, (Tips,))
+    for grasp in plant.grasps:
+        yield Part("grasp", grasp, (Grasp,))
+        yield Part("fixture", grasp.compliance, (Fixture,))
 
 
 def _functions(loop: ClosedLoop) -> Iterator[tuple[str, Any, str]]:
@@ -193,12 +211,17 @@ def _check_controller(controller: Controller) -> None:
 
 
 def _check_plant(loop: ClosedLoop) -> None:
-    plant, robots = loop.plant, loop.controller.cell.robots
+    plant = loop.plant
+    robots = [*zip(plant.schedule.free, loop.cell.robots, strict=True)]
     special = {
         f"plant='{plant.physics}'": plant.physics != "pinocchio",
-        "a plant with a state of its own": plant.hidden0.size > 0,
-        "a plant with other robots than the cell": list(map(id, plant.schedule.free))
-        != list(map(id, robots)),
+        "a plant with a state of its own": plant.hidden0.size
+        != (BODY if isinstance(plant, CarryingPlant) else 0),
+        "a plant with events": len(plant.events) > 0,
+        "a plant with other joints than the cell's": any(true.nv != known.nv for true, known in robots),
+        "a plant with another gravity than the cell's": not all(
+            np.array_equal(true.gravity_vector, known.gravity_vector) for true, known in robots
+        ),
         "other torque limits than those that the controller knows": not np.array_equal(
             plant.torque_limits, loop.controller.torque_limits
         ),

@@ -12,18 +12,19 @@ from typing import Any
 
 import numpy as np
 
+from ..assembly.plant import CarryingPlant
 from ..control.adaptation.gradient import BoundGradient
 from ..coupling.cell import Reference
 from ..errors import CompilationError
-from ..robots.mechanism import mechanism
-from ..simulation.closed_loop import ClosedLoop
+from ..simulation.closed_loop import ClosedLoop, State
 from ..simulation.guard import limits_of
 from ..simulation.plant import Plant
 from . import structs
 from .build import cached_library, content_key, require_casadi
-from .kind import Classified, Kind, classify
+from .carrying import grasp_rows, inertia_rows, object_function
+from .kind import Classified, Kind, classify, standing
 from .known import check_known, check_untouched
-from .quantities import DESIRED, checked, owned_by, shape
+from .quantities import DESIRED, checked, columns, owned_by, shape
 from .specimen import Specimen
 from .structs import header, largest
 from .trace import Trace
@@ -33,19 +34,22 @@ AGREEMENT = 1e-9
 
 
 def generate(kinds: list[Kind]) -> Iterator[str]:
-    """C sources one after another: one per function of each kind of robot, and the driver."""
-    import casadi as ca
-
+    """C sources one after another: one per function of each kind of robot and of objects, and the driver."""
     for k, kind in enumerate(kinds):
         for function in Trace(kind, f"kind{k}").functions():
-            generator = ca.CodeGenerator(f"{function.name()}.c")
-            generator.add(function)
-            yield _unchecked(generator.dump())
+            yield _written(function)
+    if any(kind.holds for kind in kinds):
+        yield _written(object_function(f"kind{len(kinds)}_object"))
     yield header(kinds) + (Path(__file__).parent / "driver.c").read_text(encoding="utf-8")
 
 
-def _unchecked(source: str) -> str:
-    """Generated code without its tests for arguments and results left out: the driver leaves none out."""
+def _written(function: Any) -> str:
+    """A function in C, without its tests for arguments and results left out: the driver leaves none out."""
+    import casadi as ca
+
+    generator = ca.CodeGenerator(f"{function.name()}.c")
+    generator.add(function)
+    source = generator.dump()
     source = re.sub(r"arg\[\d+\]\? (arg\[\d+\]\[\d+\]) : 0;", r"\1;", source)
     return re.sub(r"if \(res\[\d+\]!=0\) res", "res", source)
 
@@ -59,7 +63,7 @@ class CompiledLoop:
         library: made for these kinds.
 
     Attributes:
-        sizes: lengths of rows, see `SIZES`, and the numbers of robots and pairs, n and p.
+        sizes: lengths of rows, see `SIZES`, and the numbers of robots, pairs and objects, n, p and o.
         cell, quantities, work: what the driver is given; see `structs.py`.
         carried: true inertial parameters with every load, (loads, n, bodies).
         scratch: sizes of the scratch arrays arg, res, iw and w that the generated functions ask for.
@@ -70,13 +74,13 @@ class CompiledLoop:
 
     def __init__(self, loop: ClosedLoop, classified: Classified, library: ctypes.CDLL):
         self.loop, self.library = loop, library
-        cell = loop.cell
-        self.sizes = {**largest(classified.kinds), "n": cell.n, "p": cell.coupling.pairs}
+        cell, objects = loop.cell, int(isinstance(loop.plant, CarryingPlant))
+        self.sizes = {**largest(classified.kinds), "n": cell.n, "p": cell.coupling.pairs, "o": objects}
         self._keep: list[np.ndarray] = []
-        self.cell = self._cell(classified.kind_of)
+        self.cell = self._cell([*classified.kind_of, len(classified.kinds)])
         self.quantities = structs.Quantities()
         arrays = {name: np.zeros(shape(name, self.sizes)) for name in owned_by("work")}
-        for name, array in {**arrays, **_constants(loop, classified.bases)}.items():
+        for name, array in {**arrays, **_constants(loop, classified)}.items():
             setattr(self.quantities, name, self.address(checked(name, array, self.sizes)))
         sizes = (ctypes.c_longlong * 4)()
         library.work_sizes(sizes)
@@ -139,6 +143,7 @@ class CompiledLoop:
         return structs.Cell(
             n=cell.n,
             p=coupling.pairs,
+            o=self.sizes["o"],
             arity=coupling.edges.shape[1],
             rubs=int(plant.rubs),
             saturates=int(plant.saturate),
@@ -172,7 +177,7 @@ class Program(CompiledLoop):
 
     def __init__(self, loop: ClosedLoop, libraries: dict[str, ctypes.CDLL] | None = None):
         check_known(loop)
-        classified = classify(loop.controller)
+        classified = classify(loop)
         self.kinds = len(classified.kinds)
         library = _library(loop, classified, {} if libraries is None else libraries)
         super().__init__(loop, classified, library)
@@ -200,15 +205,28 @@ def _compare(library: ctypes.CDLL, loop: ClosedLoop, classified: Classified) -> 
         raise CompilationError("the library was made from other code", subject="generated code")
     specimen = Specimen(loop, classified)
     small = specimen.loop
-    bases = [mechanism(robot)[1] for robot in small.cell.robots]
-    found = CompiledLoop(small, Classified(classified.kinds, specimen.index, bases), library)
+    bases = (standing(robots).bases for robots in (small.cell.robots, small.plant.robots))
+    found = CompiledLoop(small, Classified(classified.kinds, specimen.index, *bases), library)
     for case in specimen.cases():
-        expected = small.evaluate(*case)[0]
-        _agree(small.split(expected), small.split(found.state_dot(*case)))
+        rates = small.evaluate(*case)[0], found.state_dot(*case)
+        _agree(*map(small.state, rates))
 
 
-def _agree(expected: list[np.ndarray], found: list[np.ndarray]) -> None:
-    for name, a, b in zip(("q'", "v'", "z'", "integral'"), expected, found, strict=True):
+def _rates(rate: State) -> dict[str, np.ndarray]:
+    """Parts of a rate by the names of what changes with it."""
+    return {
+        "q'": rate.q,
+        "v'": rate.v,
+        "z'": rate.z,
+        "integral'": rate.memory,
+        "the plant's state'": rate.hidden,
+    }
+
+
+def _agree(expected: State, found: State) -> None:
+    parts = _rates(found)
+    for name, a in _rates(expected).items():
+        b = parts[name]
         difference = np.abs(b - a).max(initial=0.0) / (1 + np.abs(a).max(initial=0.0))
         if not difference < AGREEMENT:
             raise CompilationError(
@@ -225,7 +243,7 @@ def one_after_another(weights: Sequence[np.ndarray]) -> np.ndarray:
     return together.reshape(*together.shape[:-3], -1)
 
 
-def _constants(loop: ClosedLoop, bases: list[Any]) -> dict[str, np.ndarray]:
+def _constants(loop: ClosedLoop, classified: Classified) -> dict[str, np.ndarray]:
     """Arrays of the quantities that do not change in a run, by name; zeros for those that nothing reads."""
     controller, plant, cell = loop.controller, loop.plant, loop.cell
     found = {
@@ -238,13 +256,27 @@ def _constants(loop: ClosedLoop, bases: list[Any]) -> dict[str, np.ndarray]:
     return {
         **found,
         "Gamma": learns.Gamma if isinstance(learns, BoundGradient) else zeros,
-        "base": np.array([np.append(base.rotation.ravel(), base.translation) for base in bases]),
+        "base": _placements(classified.bases),
+        "true_base": _placements(classified.true_bases),
         "W_inv": W_inv,
         "posture": posture,
         "gain": gain,
         "limits": plant.torque_limits,
         "bounds": np.array([[*limits_of(cell.task).values()]]),
+        **_carried_by(plant),
     }
+
+
+def _placements(bases: Sequence[Any]) -> np.ndarray:
+    """Rotation by rows, and translation, (n, 12)."""
+    return np.array([np.append(base.rotation.ravel(), base.translation) for base in bases])
+
+
+def _carried_by(plant: Plant) -> dict[str, np.ndarray]:
+    """What is constant of an object that is carried; nothing where there is none."""
+    if not isinstance(plant, CarryingPlant):
+        return {"grasp": np.zeros((plant.cell.n, 0)), "inertia": np.zeros((0, columns("inertia", {})))}
+    return {"grasp": grasp_rows(plant), "inertia": inertia_rows(plant)}
 
 
 def _carried(plant: Plant, bodies: int) -> np.ndarray:

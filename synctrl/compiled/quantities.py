@@ -24,7 +24,8 @@ class Quantity(NamedTuple):
         owner: where it is: "state" and "rate" in y and y', "cell" for constants, "instant" for what is
             desired at a stage of a step, "load" and "disturbance" for what is constant between edges of
             these, "work" for what generated functions and the driver hand on.
-        rows: "n" for one per robot, "p" for one per pair, "one" for one that all robots share.
+        rows: "n" for one per robot, "p" for one per pair, "o" for one per object that is carried, "one" for
+            one that all robots share.
         columns: length of a row, a product of numbers and of the names in `SIZES`.
         meaning: what it is.
     """
@@ -48,6 +49,7 @@ SIZES: Mapping[str, str] = MappingProxyType(
         "spare": "1 if the way to the joints is a pseudo-inverse, else 0",
         "damped": "1 if singular configurations are damped, else 0",
         "watches": "numbers that the guard watches",
+        "hand": "1 for robots whose tip holds an object, else 0",
     }
 )
 
@@ -57,11 +59,14 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "v": Quantity("state", "n", "nv", "velocities of the joints"),
         "z": Quantity("state", "n", "Z", "state of the adaptation; with (14) it is theta_hat"),
         "integral": Quantity("state", "p", "m", "integrals of epsilon"),
+        "body": Quantity("state", "o", "13", "pose and twist of what is carried"),
         "q_dot": Quantity("rate", "n", "nv", "q'"),
         "v_dot": Quantity("rate", "n", "nv", "v'"),
         "z_dot": Quantity("rate", "n", "Z", "z'"),
         "integral_dot": Quantity("rate", "p", "m", "epsilon less what leaks"),
+        "body_dot": Quantity("rate", "o", "13", "their rates"),
         "base": Quantity("cell", "n", "12", "placement of the first joint: rotation by rows, translation"),
+        "true_base": Quantity("cell", "n", "12", "the same of what really stands there"),
         "Lambda": Quantity("cell", "one", "m", "gain"),
         "beta": Quantity("cell", "one", "m", "gain"),
         "K_eps": Quantity("cell", "one", "m", "gain"),
@@ -76,6 +81,8 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "smoothing": Quantity("cell", "n", "nv", "velocity at which Coulomb friction reaches tanh(1)"),
         "limits": Quantity("cell", "n", "nv", "at which torque is cut off"),
         "bounds": Quantity("cell", "one", "watches", "of what the guard watches, in its order"),
+        "grasp": Quantity("cell", "n", "hand*24", "where a hand holds the object, K and D of its fixture"),
+        "inertia": Quantity("cell", "o", "16", "mass, centre of mass and inertia of the object, and gravity"),
         "pi": Quantity("load", "n", "bodies", "true inertial parameters, with what is carried"),
         "disturbance": Quantity("disturbance", "n", "nv", "torque from outside"),
         "desired": Quantity("instant", "n", "m", "desired coordinates"),
@@ -110,6 +117,9 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "tau": Quantity("work", "n", "nv", "torque that the controller asks for"),
         "acting": Quantity("work", "n", "nv", "torque that it asked for when it was last sampled"),
         "moving": Quantity("work", "n", "nv", "torque that moves the rigid bodies"),
+        "pull": Quantity("work", "n", "hand*nv", "torque of the fixture on the joints"),
+        "wrench": Quantity("work", "n", "hand*6", "what the fixture does to the object, about its origin"),
+        "lift": Quantity("work", "o", "6", "what all fixtures together do to it"),
         "e_star": Quantity("work", "n", "m", "coupled error"),
         "s_q": Quantity("work", "n", "nv", "error in velocity of the joints"),
         "theta_hat": Quantity("work", "n", "P", "estimates"),
@@ -151,7 +161,11 @@ FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
             ),
             ("tau", "z_dot", "e_star", "s_q", "velocity_lost"),
         ),
-        "plant": Signature(("q", "v", "sine", "cosine", "moving", "pi", "base"), ("v_dot",)),
+        "hand": Signature(
+            ("q", "v", "sine", "cosine", "true_base", "body", "grasp"), ("pull", "wrench")
+        ),
+        "plant": Signature(("q", "v", "sine", "cosine", "moving", "pi", "true_base"), ("v_dot",)),
+        "object": Signature(("body", "lift", "inertia"), ("body_dot",)),
         "guard": Signature(("e", "J", "J_inv"), ("watched", "side")),
         "estimate": Signature(("z",), ("theta_hat",)),
         "settle": Signature(("z",), ("settled",)),
@@ -177,6 +191,7 @@ LOGS: Mapping[str, str] = MappingProxyType(
         "adaptation_state": "z",
         "damping": "damping",
         "velocity_lost": "velocity_lost",
+        "plant_state": "body",
     }
 )
 
@@ -193,7 +208,7 @@ def columns(name: str, sizes: Mapping[str, int]) -> int:
 
 
 def shape(name: str, sizes: Mapping[str, int]) -> tuple[int, int]:
-    """Shape of the array of a quantity; `sizes` has the numbers of robots and pairs, n and p, too."""
+    """Shape of the array of a quantity; `sizes` has n, p and o too, of robots, pairs and objects."""
     return {"one": 1, **sizes}[QUANTITIES[name].rows], columns(name, sizes)
 
 

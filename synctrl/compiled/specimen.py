@@ -14,6 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from ..assembly.body import CarriedObject
+from ..assembly.grasp import Grasp
+from ..assembly.plant import CarryingPlant
 from ..control.adaptation.gradient import BoundGradient
 from ..control.controller import Controller
 from ..control.gains import Gains
@@ -28,9 +31,10 @@ from ..robots.robot import Robot
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.plant import Plant
 from ..tasks.redundancy import Redundancy
+from ..tasks.rotations import exp
 from ..tasks.spaces import JointSpace, Space, TipSpace
 from ..tasks.trajectories import Hold
-from .kind import Classified
+from .kind import Classified, holders
 from .plugged import ChosenAdaptation, ChosenLaw
 
 #: robots at least: with three in a ring, each is in two pairs, and each pair leaves one out
@@ -63,7 +67,7 @@ class Specimen:
         self.index = [k % count for k in range(max(ROBOTS, count))]
         chosen = [_most_turned(classified, k) for k in range(count)]
         members = [_member(loop.controller.cell, chosen[k]) for k in self.index]
-        self.loop = self._loop(loop.controller, members, [chosen[k] for k in self.index])
+        self.loop = self._loop(loop, members, [chosen[k] for k in self.index])
 
     def cases(self) -> Iterator[tuple[Reference, np.ndarray, np.ndarray]]:
         """References, states and disturbances to compare y' at; none if a robot is singular everywhere."""
@@ -80,8 +84,8 @@ class Specimen:
 
     # -- the loop -----------------------------------------------------------------------------------------
 
-    def _loop(self, original: Controller, members: Sequence[Member], robots: Sequence[int]) -> ClosedLoop:
-        n, m = len(members), original.cell.m
+    def _loop(self, whole: ClosedLoop, members: Sequence[Member], robots: Sequence[int]) -> ClosedLoop:
+        original, plant, n, m = whole.controller, whole.plant, len(members), whole.cell.m
         coupling = Coupling.signed_ring(n, lambda t: tuple(self._moving(n, m)))
         coupling = coupling.weighted(self._positive(n))
         cell = Cell(members, coupling, self._space(original.cell.space, [x.robot for x in members]))
@@ -91,7 +95,23 @@ class Specimen:
             adaptation = ChosenAdaptation(original, robots)
             gains = gains.replace(Gamma=None)
         controller = Controller(cell, gains, adaptation=adaptation, law=_law(original, robots))
-        return ClosedLoop(controller, Plant(cell))
+        return ClosedLoop(controller, self._plant(cell, plant, robots))
+
+    def _plant(self, cell: Cell, original: Plant, robots: Sequence[int]) -> Plant:
+        """The true robots, and an object of its own in the hands of those that hold one."""
+        true = [_at_place(original.schedule.free[i]) for i in robots]
+        holding = holders(original)
+        hands = [k for k, i in enumerate(robots) if i in holding]
+        if not hands:
+            return Plant(cell, robots=true)
+        p, R = self._random(3), exp(self._random(3))
+        spread = exp(self._random(3))
+        body = CarriedObject(1.5, self._random(3), spread @ np.diag([1.0, 1.2, 1.4]) @ spread.T)
+        tips = {k: true[k].tip_pose(np.zeros(true[k].nv)) for k in hands}
+        grasps = [Grasp(k, R.T @ (tip.translation - p), R.T @ tip.rotation) for k, tip in tips.items()]
+        plant = CarryingPlant(cell, body=body, grasps=grasps, at=(p, R), robots=true)
+        plant.K, plant.D = self._positive(2, len(grasps), 6)
+        return plant
 
     def _space(self, space: Space, robots: Sequence[Robot]) -> Space:
         if not isinstance(space, TipSpace):
@@ -180,10 +200,8 @@ def _law(original: Controller, robots: Sequence[int]) -> Law:
 
 
 def _member(cell: Cell, i: int) -> Member:
-    """Robot i with parameters of the same kind, but with the first joint near the origin."""
-    robot = Robot(cell.robots[i].model, cell.robots[i].tip, name=cell.names[i])
-    first = next(j for j in range(1, robot.model.njoints) if robot.model.parents[j] == 0)
-    robot = robot.placed(PLACE - robot.model.jointPlacements[first].translation)
+    """Robot i near the origin, with parameters of the same kind."""
+    robot = _at_place(cell.robots[i])
     friction = Friction(0.3, 0.2, getattr(cell.parameters[i], "smoothing", 0.01))
     return Member(
         robot,
@@ -192,6 +210,13 @@ def _member(cell: Cell, i: int) -> Member:
         parameters=_parameters(cell.parameters[i], robot, friction),
         friction=friction,
     )
+
+
+def _at_place(robot: Robot) -> Robot:
+    """A robot with the first joint near the origin."""
+    alone = Robot(robot.model, robot.tip, name=robot.name)
+    first = next(j for j in range(1, robot.model.njoints) if robot.model.parents[j] == 0)
+    return alone.placed(PLACE - robot.model.jointPlacements[first].translation)
 
 
 def _parameters(parameters: Parameters, robot: Robot, friction: Friction) -> Parameters:

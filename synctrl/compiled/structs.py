@@ -54,8 +54,8 @@ class Cell(ctypes.Structure):
     """What does not change in a run: sizes, who is compared with whom, and whether joints rub.
 
     Attributes:
-        n, p, arity: robots, pairs, and robots in one pair.
-        kind: of each robot.
+        n, p, o, arity: robots, pairs, objects that are carried, and robots in one pair.
+        kind: of each robot, and then of each object.
         edge, sign: (p, arity), robots that are compared, and entries of S.
         first, incident, incident_sign: where the pairs of a robot begin, (n + 1), and robot after robot its
             pairs, with entries of S.
@@ -63,7 +63,7 @@ class Cell(ctypes.Structure):
     """
 
     _fields_ = [
-        *((name, ctypes.c_int) for name in ("n", "p", "arity", "rubs", "saturates")),
+        *((name, ctypes.c_int) for name in ("n", "p", "o", "arity", "rubs", "saturates")),
         *((name, Ints) for name in ("kind", "edge", "first", "incident")),
         *((name, Doubles) for name in ("sign", "incident_sign")),
     ]
@@ -184,7 +184,8 @@ def functions_of(kind: Kind) -> list[str]:
     """Names of the functions that a kind has.
 
     A space that watches nothing has no `guard`, an adaptation whose state is theta_hat no `estimate`,
-    and one that leaves its state as a step or a sample leaves it no `settle` or `leap`.
+    and one that leaves its state as a step or a sample leaves it no `settle` or `leap`. Only a robot that
+    holds something has a `hand`, and none is an `object`.
     """
     learning = kind.learning
     lacks = {
@@ -192,6 +193,8 @@ def functions_of(kind: Kind) -> list[str]:
         "estimate": learning is None,
         "settle": learning is None or learning.settle is None,
         "leap": learning is None or learning.leap is None,
+        "hand": not kind.holds,
+        "object": True,
     }
     return [name for name in FUNCTIONS if not lacks.get(name, False)]
 
@@ -215,7 +218,7 @@ def _member(name: str, kind: Any) -> str:
 
 def _constants(kinds: list[Kind]) -> Iterable[str]:
     """Sizes, how many kinds there are, marks, and what the guard may find."""
-    yield _enumeration({**largest(kinds), "KINDS": len(kinds)})
+    yield _enumeration({**largest(kinds), "KINDS": len(kinds) + 1})
     yield _enumeration({name: mark.value for name, mark in Mark.__members__.items()})
     found = enumerate(checks(kinds[0].watches), start=1)
     yield _enumeration({f"FOUND_{check.upper()}": k for k, check in found})
@@ -245,15 +248,19 @@ def _entry(name: str) -> str:
 
 
 def _table(kinds: list[Kind]) -> Iterable[str]:
-    """Declarations of the generated functions, and the array `kinds`; 0 for a function that a kind lacks."""
+    """Declarations of the generated functions, and the array `kinds`; 0 for a function that a kind lacks.
+
+    The last kind is that of objects that are carried, if robots hold some.
+    """
     yield "typedef int Function(const double **, double **, long long *, double *, int);\n"
     yield "typedef int Sizes(long long *, long long *, long long *, long long *);\n"
     members = "".join(f"Function *{name}; Sizes *{name}_work; " for name in FUNCTIONS)
     yield f"typedef struct {{ {members}int nv; }} Kind;\n"
+    carried = ["object"] if any(kind.holds for kind in kinds) else []
     rows = []
-    for k, kind in enumerate(kinds):
-        names = {name: f"kind{k}_{name}" for name in functions_of(kind)}
-        yield from (f"Function {name}; Sizes {name}_work;\n" for name in names.values())
-        members = "".join(f".{name} = {full}, .{name}_work = {full}_work, " for name, full in names.items())
-        rows.append(f"    {{ {members}.nv = {kind.nv} }},\n")
+    for k, (names, nv) in enumerate([*((functions_of(kind), kind.nv) for kind in kinds), (carried, 0)]):
+        full = {name: f"kind{k}_{name}" for name in names}
+        yield from (f"Function {name}; Sizes {name}_work;\n" for name in full.values())
+        members = "".join(f".{name} = {made}, .{name}_work = {made}_work, " for name, made in full.items())
+        rows.append(f"    {{ {members}.nv = {nv} }},\n")
     yield from ("static const Kind kinds[] = {\n", *rows, "};\n")

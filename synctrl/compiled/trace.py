@@ -23,7 +23,8 @@ from ..tasks.algebra import limited
 from ..tasks.measurement import Poses, Positions
 from ..tasks.redundancy import Inversion, velocity_lost
 from ..tasks.spaces import Measurement
-from .algebra import SYMBOLS, array_of, column_of
+from .algebra import SYMBOLS, array_of, column_of, function_of, solve_positive
+from .carrying import fixture_on
 from .kind import Kind
 from .momentum import model_torque
 from .plugged import Learning
@@ -73,6 +74,8 @@ class Trace:
         yield self.control()
         yield self.plant()
         yield self.measure()
+        if self.kind.holds:
+            yield self.hand()
         if self.kind.watches:
             yield self.guard()
         if self.kind.learning is not None:
@@ -180,7 +183,7 @@ class Trace:
 
     def _model(self, theta_hat: Any, v_ref: Any, a_ref: Any, s_q: Any) -> tuple[Any, Any]:
         """Y theta_hat, and Y^T s_q as the derivative of s_q^T Y theta_hat with respect to theta_hat."""
-        recursion, gravity = self._recursion(), self._gravity()
+        recursion, gravity = self._recursion(), self._gravity(self._base())
         torque = model_torque(self.kind, recursion, theta_hat, self.v, v_ref, a_ref, gravity)
         return torque, self.ca.jtimes(torque, theta_hat, s_q, True)
 
@@ -188,33 +191,46 @@ class Trace:
 
     def plant(self) -> Any:
         """v' = M^-1 (tau - C v - g), through a Cholesky factor of M."""
-        pi, recursion = self.given["pi"], self._recursion()
-        bias = recursion.torque(pi, self.v, self.v, self.ca.SX.zeros(self.kind.nv), self._gravity())
-        v_dot = _solve_positive(self.ca, recursion.mass_matrix(pi), self.given["moving"] - bias)
+        pi, recursion, gravity = self.given["pi"], self._true_recursion(), self._gravity(self._true_base())
+        bias = recursion.torque(pi, self.v, self.v, self.ca.SX.zeros(self.kind.nv), gravity)
+        v_dot = solve_positive(recursion.mass_matrix(pi), self.given["moving"] - bias)
         return self._function("plant", v_dot=array_of(v_dot))
+
+    def hand(self) -> Any:
+        """What the fixture between the hand and the object does to the joints, and to the object."""
+        tip = TracedTip(self._true_recursion(), self._true_base())
+        pull, wrench = fixture_on(tip, *map(self._row, ("q", "v", "body", "grasp")))
+        return self._function("hand", pull=pull, wrench=wrench)
 
     # -- symbols and arrays -------------------------------------------------------------------------------
 
     def _function(self, name: str, **computed: Any) -> Any:
         """A function of the table, in which nothing is computed twice; what is None has no entries."""
-        inputs, outputs = FUNCTIONS[name]
-        given = [self.given[key] for key in inputs]
-        found = [computed.get(key) for key in outputs]
-        results = self.ca.cse([column_of([] if array is None else array) for array in found])
-        return self.ca.Function(f"{self.name}_{name}", given, results, [*inputs], [*outputs])
+        return function_of(f"{self.name}_{name}", FUNCTIONS[name], self.given, computed)
 
     def _recursion(self) -> Symbols:
         """At joint positions of which sine and cosine are known."""
         return Symbols(self.kind.fixed, self.q, self.given["sine"], self.given["cosine"])
 
+    def _true_recursion(self) -> Symbols:
+        """The same of what really stands there."""
+        return Symbols(self.kind.true, self.q, self.given["sine"], self.given["cosine"])
+
     def _base(self) -> tuple[Any, Any]:
-        shared, base = self.kind.base_rotation, self.given["base"]
+        """Rotation and translation of the first joint's placement."""
+        return self._placement(self.kind.base_rotation, self.given["base"])
+
+    def _true_base(self) -> tuple[Any, Any]:
+        """The same of what really stands there."""
+        return self._placement(self.kind.true_rotation, self.given["true_base"])
+
+    def _placement(self, shared: np.ndarray | None, base: Any) -> tuple[Any, Any]:
         rotation = self.ca.reshape(base[:9], 3, 3).T if shared is None else self.ca.SX(shared)
         return rotation, base[9:]
 
-    def _gravity(self) -> Any:
-        """Gravity in the frame of the first joint's placement."""
-        return self.ca.mtimes(self._base()[0].T, self.ca.SX(self.ca.DM(self.kind.gravity)))
+    def _gravity(self, base: tuple[Any, Any]) -> Any:
+        """Gravity in the frame of a first joint's placement."""
+        return self.ca.mtimes(base[0].T, self.ca.SX(self.ca.DM(self.kind.gravity)))
 
     def _weights(self) -> np.ndarray:
         return array_of(self.given["weights"], 4, self.kind.m, self.kind.m)
@@ -222,20 +238,3 @@ class Trace:
     def _row(self, name: str) -> np.ndarray:
         """A quantity as an array of single symbols."""
         return array_of(self.given[name], -1)
-
-
-def _solve_positive(ca: Any, M: Any, b: Any) -> Any:
-    """M^-1 b for a symmetric positive definite matrix, by M = L D L^T without pivoting."""
-    n = M.shape[0]
-    L, LD = ca.SX.eye(n), ca.SX.zeros(n, n)
-    for j in range(n):
-        for i in range(j, n):
-            LD[i, j] = M[i, j] - sum(LD[i, k] * L[j, k] for k in range(j))
-            L[i, j] = LD[i, j] / LD[j, j]
-    x = [b[i] for i in range(n)]
-    for i in range(n):
-        x[i] -= sum(L[i, k] * x[k] for k in range(i))
-    x = [x[i] / LD[i, i] for i in range(n)]
-    for i in reversed(range(n)):
-        x[i] -= sum(L[k, i] * x[k] for k in range(i + 1, n))
-    return ca.vertcat(*x)

@@ -1,0 +1,72 @@
+"""An object that hands hold, traced with symbols: what a fixture does to its hand, and how the object moves.
+
+The first is a function of every robot that holds something; what the fixtures do to the object is added up by
+the driver, so a robot costs the same however many hold it. The second belongs to the object. The lines are
+those of `assembly/grasp.py` and `assembly/body.py`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..assembly.body import Inertia, body_rate
+from ..assembly.grasp import fixture_wrenches, grasp_matrix, places_on
+from ..assembly.plant import CarryingPlant
+from ..tasks.measurement import Kinematics
+from .algebra import array_of, column_of, function_of, solve_positive
+from .quantities import FUNCTIONS, columns
+
+
+def fixture_on(
+    tip: Kinematics, q: np.ndarray, v: np.ndarray, body: np.ndarray, grasp: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Torque on the joints of one robot, (nv,), and wrench on the object about its origin, (6,).
+
+    Args:
+        tip: the true tip.
+        q, v: joint positions and velocities, (nv,).
+        body: pose and twist of the object, (13,).
+        grasp: where the hand holds it and how, see `grasp_rows`, (24,).
+    """
+    moved, R, J, _ = tip.poses(q, v)
+    arm, turned, K, D = np.split(grasp[None], (3, 12, 18), axis=1)
+    *places, lever = places_on(body, arm, turned.reshape(1, 3, 3))
+    hand = moved[:1], R[None], (J @ v)[None]
+    on_object, on_hand = fixture_wrenches(hand, places, K, D)
+    return J.T @ on_hand[0], grasp_matrix(lever)[0] @ on_object[0]
+
+
+def object_function(name: str) -> Any:
+    """The CasADi function of an object: rates of its pose and twist."""
+    import casadi as ca
+
+    signature = FUNCTIONS["object"]
+    given = {key: ca.SX.sym(key, columns(key, {})) for key in signature.inputs}
+    body, lift, row = (array_of(given[key], -1) for key in signature.inputs)
+    mass, com, inertia, gravity = np.split(row, (1, 4, 13))
+    of = Inertia(mass, com, inertia.reshape(3, 3))
+    rate = body_rate(of, body, lift, gravity, _solve)
+    return function_of(name, signature, given, {"body_dot": rate})
+
+
+def grasp_rows(plant: CarryingPlant) -> np.ndarray:
+    """Places and axes of the hands on the object, K and D, (n, 24); zeros for robots that hold nothing."""
+    rows = np.zeros((plant.cell.n, columns("grasp", {"hand": 1})))
+    parts = plant.arms, plant.turned.reshape(-1, 9), plant.K, plant.D
+    rows[[grasp.robot for grasp in plant.grasps]] = np.concatenate(parts, axis=1)
+    return rows
+
+
+def inertia_rows(plant: CarryingPlant) -> np.ndarray:
+    """Mass, centre of mass and inertia of the object, and gravity, (1, 16)."""
+    body = plant.body
+    return np.concatenate(([body.mass], body.com, body.inertia.ravel(), plant.robots[0].gravity_vector))[None]
+
+
+def _solve(M: np.ndarray, b: np.ndarray) -> np.ndarray:
+    import casadi as ca
+
+    rows = len(M)
+    return array_of(solve_positive(ca.reshape(column_of(M.T), rows, rows), column_of(b)), -1)
