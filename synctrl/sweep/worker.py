@@ -103,6 +103,7 @@ class Prepared:
         self.duration, self.dt = experiment.duration if duration is None else duration, dt
         self.log_dt = log_dt
         run = self._plan(experiment, None)
+        run.check_step()
         run.check()
         self._known = list(_paths(experiment))
         self._engine = find_engine(engine)
@@ -122,6 +123,7 @@ class Prepared:
             see `Experiment.simulate`
         """
         run = self._plan(experiment, control_period)
+        run.check_step()
         paths = list(_paths(experiment))
         if not _same(paths, self._known):
             run.check()
