@@ -41,6 +41,8 @@ from .plugged import ChosenAdaptation, ChosenLaw
 ROBOTS = 3
 #: where the first joint of each robot is, m
 PLACE = (0.3, -0.2, 0.1)
+#: where it really is, which the controller does not know, m
+TRUE_PLACE = (0.25, -0.1, 0.05)
 #: how far from the desired pose the robots are, m and rad: small errors, and some that are not
 DISTANCES = (0.1, 0.8, 1.6)
 #: configurations that are tried for one that is not close to a singular one
@@ -99,7 +101,7 @@ class Specimen:
 
     def _plant(self, cell: Cell, original: Plant, robots: Sequence[int]) -> Plant:
         """The true robots, and an object of its own in the hands of those that hold one."""
-        true = [_at_place(original.schedule.free[i]) for i in robots]
+        true = [_moved(original.schedule.free[i], TRUE_PLACE) for i in robots]
         holding = holders(original)
         hands = [k for k, i in enumerate(robots) if i in holding]
         if not hands:
@@ -201,7 +203,7 @@ def _law(original: Controller, robots: Sequence[int]) -> Law:
 
 def _member(cell: Cell, i: int) -> Member:
     """Robot i near the origin, with parameters of the same kind."""
-    robot = _at_place(cell.robots[i])
+    robot = _moved(cell.robots[i], PLACE)
     friction = Friction(0.3, 0.2, getattr(cell.parameters[i], "smoothing", 0.01))
     return Member(
         robot,
@@ -212,11 +214,11 @@ def _member(cell: Cell, i: int) -> Member:
     )
 
 
-def _at_place(robot: Robot) -> Robot:
-    """A robot with the first joint near the origin."""
+def _moved(robot: Robot, place: tuple[float, float, float]) -> Robot:
+    """A robot with the first joint somewhere else."""
     alone = Robot(robot.model, robot.tip, name=robot.name)
     first = next(j for j in range(1, robot.model.njoints) if robot.model.parents[j] == 0)
-    return alone.placed(PLACE - robot.model.jointPlacements[first].translation)
+    return alone.placed(place - robot.model.jointPlacements[first].translation)
 
 
 def _parameters(parameters: Parameters, robot: Robot, friction: Friction) -> Parameters:
