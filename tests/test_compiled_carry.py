@@ -28,6 +28,7 @@ from synctrl import (
     Payload,
     Redundancy,
 )
+from synctrl.analysis.certify import certify
 from synctrl.assembly import grasp as grasp_module
 from synctrl.assembly.body import CarriedObject, Inertia, body_rate, with_share
 from synctrl.assembly.grasp import Fixture, Grasp, fixture_wrenches, grasp_matrix, places_on
@@ -40,7 +41,7 @@ from synctrl.compiled.structs import functions_of
 from synctrl.control.adaptation import Leakage
 from synctrl.control.laws import ComputedTorque
 from synctrl.coupling.cell import Reference
-from synctrl.errors import CompilationError, InputError
+from synctrl.errors import CompilationError, InputError, NonFiniteError
 from synctrl.experiments import carry_ur5
 from synctrl.experiments.ur5_payload import payload_motion
 from synctrl.robots.payload import holding
@@ -91,7 +92,8 @@ def mixed(hands: tuple[int, ...] = HANDS, body: CarriedObject = BODY, fixture: F
     space = CartesianSpace("xy", redundancy=Redundancy([np.zeros(robot.nv) for robot in robots]))
     cell = Cell(members, Coupling.chain(4), space)
     parts = {"body": body, "grasps": grasps, "robots": robots, "desired": payload_motion()}
-    return Experiment(cell, GAINS, 0.03, plant_type=partial(CarryingPlant, at=(p, R), **parts), **options)
+    options = {"gains": GAINS, "plant_type": partial(CarryingPlant, at=(p, R), **parts), **options}
+    return Experiment(cell, duration=0.03, **options)
 
 
 # -- the equations ----------------------------------------------------------------------------------------
@@ -187,7 +189,22 @@ PARTS = {
 
 @pytest.mark.parametrize("parts", PARTS.values(), ids=PARTS)
 def test_other_laws_and_ways_to_learn_carry_alike(parts):
-    both(replace(mixed(), **parts), duration=0.02, dt=1e-3)
+    both(mixed(**parts), duration=0.02, dt=1e-3)
+
+
+def test_a_run_that_breaks_down_ends_alike_with_an_object():
+    ends = []
+    for engine in ("pinocchio", "compiled"):
+        with pytest.raises(NonFiniteError) as caught:
+            mixed(gains=GAINS.replace(Gamma=1e9)).simulate(engine=engine)
+        ends.append((caught.value.time, caught.value.robot, len(caught.value.result.t), str(caught.value)))
+    assert ends[0] == ends[1]
+
+
+def test_runs_of_both_engines_have_the_same_certificate():
+    certificates = [certify(mixed().simulate(engine=engine)) for engine in ("pinocchio", "compiled")]
+    one, other = ((found.verdict, found.closes, found.outside) for found in certificates)
+    assert one == other
 
 
 def test_a_run_with_an_object_is_repeated_bit_by_bit():

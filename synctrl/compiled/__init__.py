@@ -10,6 +10,7 @@ goes through these modules:
    refused, and the part named;
 3. `kind`: which robots are equal, and can share code;
 4. `trace`, with `plugged` for laws and adaptations of a user's own: the functions of a robot of a kind;
+   `carrying`: that of an object in the hands of several;
 5. `structs`, made from the table in `quantities`: what stands in C before `driver.c`;
 6. `build`, with `compiler` and `cache`: from C to a library that is loaded;
 7. `program`: library and arrays together. Once in every process, before it is used, the library is compared
