@@ -234,6 +234,13 @@ def test_other_objects_fixtures_and_hands_of_the_same_kinds_need_no_new_code():
     assert len(libraries) == 1
 
 
+def test_where_hands_are_and_where_they_are_thought_to_be_needs_no_new_code():
+    libraries: dict = {}
+    for error in (True, False, np.full(6, 1e-3)):
+        assert Program(carry_ur5(geometric_error=error).closed_loop(), libraries).kinds == 1
+    assert len(libraries) == 1
+
+
 def test_only_robots_that_hold_something_have_code_for_their_hands(loops):
     loop, _ = loops["mixed"]
     found = program.classify(loop)
@@ -248,7 +255,8 @@ FAULTS = {
     "only the last hand lifts": ("a->lift[j] += a->wrench", "a->lift[j] = a->wrench"),
     "hands do not pull": ("a->moving[i * nv + j] += a->pull[i * nv + j]", "(void)0"),
     "another robot's grasp": ("X(grasp, n, hand*24)", "X(grasp, one, hand*24)"),
-    "where the robot stands": ("X(true_base, n, 12) X(body", "X(base, n, 12) X(body"),
+    "where the hand is": ("X(true_tool, n, hand*12)", "X(tool, n, hand*12)"),
+    "where the robot stands": ("X(true_base, n, 12) X(true_tool", "X(base, n, 12) X(true_tool"),
 }
 
 

@@ -7,6 +7,7 @@ those of `assembly/grasp.py` and `assembly/body.py`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,9 @@ import numpy as np
 from ..assembly.body import Inertia, body_rate
 from ..assembly.grasp import fixture_wrenches, grasp_matrix, places_on
 from ..assembly.plant import CarryingPlant
+from ..robots.mechanism import mechanism
+from ..robots.robot import Robot
+from ..simulation.plant import Plant
 from ..tasks.measurement import Kinematics
 from .algebra import array_of, column_of, function_of, solve_positive
 from .quantities import FUNCTIONS, columns
@@ -28,7 +32,7 @@ def fixture_on(
         tip: the true tip.
         q, v: joint positions and velocities, (nv,).
         body: pose and twist of the object, (13,).
-        grasp: where the hand holds it and how, see `grasp_rows`, (24,).
+        grasp: where the hand holds it and how, see `_grasps`, (24,).
     """
     moved, R, J, _ = tip.poses(q, v)
     arm, turned, K, D = np.split(grasp[None], (3, 12, 18), axis=1)
@@ -51,7 +55,26 @@ def object_function(name: str) -> Any:
     return function_of(name, signature, given, {"body_dot": rate})
 
 
-def grasp_rows(plant: CarryingPlant) -> np.ndarray:
+def carrying_constants(plant: Plant) -> dict[str, np.ndarray]:
+    """Quantities that do not change while an object is carried; rows without entries where none is."""
+    if not isinstance(plant, CarryingPlant):
+        none = {name: np.zeros((plant.cell.n, 0)) for name in ("tool", "true_tool", "grasp")}
+        return {**none, "inertia": np.zeros((0, columns("inertia", {})))}
+    return {
+        "tool": _tools(plant.cell.robots),
+        "true_tool": _tools(plant.schedule.free),
+        "grasp": _grasps(plant),
+        "inertia": _inertia(plant),
+    }
+
+
+def _tools(robots: Sequence[Robot]) -> np.ndarray:
+    """Rotation by rows and translation of the tips on their links, (n, 12)."""
+    fixed = [mechanism(robot)[0] for robot in robots]
+    return np.array([np.append(x.tip_rotation, x.tip_translation) for x in fixed])
+
+
+def _grasps(plant: CarryingPlant) -> np.ndarray:
     """Places and axes of the hands on the object, K and D, (n, 24); zeros for robots that hold nothing."""
     rows = np.zeros((plant.cell.n, columns("grasp", {"hand": 1})))
     parts = plant.arms, plant.turned.reshape(-1, 9), plant.K, plant.D
@@ -59,7 +82,7 @@ def grasp_rows(plant: CarryingPlant) -> np.ndarray:
     return rows
 
 
-def inertia_rows(plant: CarryingPlant) -> np.ndarray:
+def _inertia(plant: CarryingPlant) -> np.ndarray:
     """Mass, centre of mass and inertia of the object, and gravity, (1, 16)."""
     body = plant.body
     return np.concatenate(([body.mass], body.com, body.inertia.ravel(), plant.robots[0].gravity_vector))[None]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -30,8 +30,9 @@ class Kind:
     """What equal robots share; everything else is an input of the generated functions.
 
     Attributes:
-        fixed: the mechanism, as the controller knows it.
-        true: the one that really stands there.
+        fixed: the mechanism, as the controller knows it; if it holds an object, with its tip on its link, for
+            where the tip is differs from hand to hand, and is an input of the code.
+        true: the same of what really stands there.
         space: of the task.
         matrix: map from theta to inertial parameters, (10 bodies, P), or None for all of them.
         base_rotation, true_rotation: rotation of the first joint's placement, as the controller knows it and
@@ -165,10 +166,11 @@ class Standing(NamedTuple):
         ]
 
 
-def standing(robots: Sequence[Robot]) -> Standing:
-    """Mechanisms and places of robots."""
+def standing(robots: Sequence[Robot], hands: Collection[int] = ()) -> Standing:
+    """Mechanisms and places of robots, with the tips of some on their links."""
     fixed, bases = zip(*map(mechanism, robots), strict=True)
-    return Standing([*fixed], [*bases])
+    open_tip = {"tip_translation": np.zeros(3), "tip_rotation": np.eye(3)}
+    return Standing([replace(x, **open_tip) if i in hands else x for i, x in enumerate(fixed)], [*bases])
 
 
 class Classified(NamedTuple):
@@ -216,7 +218,7 @@ def holders(plant: Plant) -> tuple[int, ...]:
 def _bare(loop: ClosedLoop) -> tuple[list[Kind], Standing, Standing]:
     """Kinds of robots without what users have plugged in; the robots as they are known, and as they are."""
     robots, holding = loop.cell.robots, holders(loop.plant)
-    known, true = standing(robots), standing(loop.plant.schedule.free)
+    known, true = (standing(those, holding) for those in (robots, loop.plant.schedule.free))
     parts = zip(known.fixed, true.fixed, known.shared, true.shared, strict=True)
     kinds = [
         _kind(loop.controller, i, (fixed, real), (rotation, true_rotation), i in holding)

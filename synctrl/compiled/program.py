@@ -21,10 +21,10 @@ from ..simulation.guard import limits_of
 from ..simulation.plant import Plant
 from . import structs
 from .build import cached_library, content_key, require_casadi
-from .carrying import grasp_rows, inertia_rows, object_function
+from .carrying import carrying_constants, object_function
 from .kind import Classified, Kind, classify, standing
 from .known import check_known, check_untouched
-from .quantities import DESIRED, checked, columns, owned_by, shape
+from .quantities import DESIRED, checked, owned_by, shape
 from .specimen import Specimen
 from .structs import header, largest
 from .trace import Trace
@@ -263,20 +263,13 @@ def _constants(loop: ClosedLoop, classified: Classified) -> dict[str, np.ndarray
         "gain": gain,
         "limits": plant.torque_limits,
         "bounds": np.array([[*limits_of(cell.task).values()]]),
-        **_carried_by(plant),
+        **carrying_constants(plant),
     }
 
 
 def _placements(bases: Sequence[Any]) -> np.ndarray:
     """Rotation by rows, and translation, (n, 12)."""
     return np.array([np.append(base.rotation.ravel(), base.translation) for base in bases])
-
-
-def _carried_by(plant: Plant) -> dict[str, np.ndarray]:
-    """What is constant of an object that is carried; nothing where there is none."""
-    if not isinstance(plant, CarryingPlant):
-        return {"grasp": np.zeros((plant.cell.n, 0)), "inertia": np.zeros((0, columns("inertia", {})))}
-    return {"grasp": grasp_rows(plant), "inertia": inertia_rows(plant)}
 
 
 def _carried(plant: Plant, bodies: int) -> np.ndarray:

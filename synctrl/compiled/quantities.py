@@ -81,6 +81,8 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "smoothing": Quantity("cell", "n", "nv", "velocity at which Coulomb friction reaches tanh(1)"),
         "limits": Quantity("cell", "n", "nv", "at which torque is cut off"),
         "bounds": Quantity("cell", "one", "watches", "of what the guard watches, in its order"),
+        "tool": Quantity("cell", "n", "hand*12", "place of a hand on its link, as the controller knows it"),
+        "true_tool": Quantity("cell", "n", "hand*12", "the same as it is"),
         "grasp": Quantity("cell", "n", "hand*24", "where a hand holds the object, K and D of its fixture"),
         "inertia": Quantity("cell", "o", "16", "mass, centre of mass and inertia of the object, and gravity"),
         "pi": Quantity("load", "n", "bodies", "true inertial parameters, with what is carried"),
@@ -147,7 +149,7 @@ HEARD = "E", "sigma", "sigma_dot"
 FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
     {
         "measure": Signature(
-            ("q", "v", "base", *DESIRED, "weights", "W_inv", "posture", "gain"),
+            ("q", "v", "tool", "base", *DESIRED, "weights", "W_inv", "posture", "gain"),
             (
                 "x", "e", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot", "sine", "cosine", "J", "J_dot", "J_inv",
                 "G", "zeta", "zeta_dot", "damping", "damping_rate",
@@ -162,7 +164,7 @@ FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
             ("tau", "z_dot", "e_star", "s_q", "velocity_lost"),
         ),
         "hand": Signature(
-            ("q", "v", "sine", "cosine", "true_base", "body", "grasp"), ("pull", "wrench")
+            ("q", "v", "sine", "cosine", "true_base", "true_tool", "body", "grasp"), ("pull", "wrench")
         ),
         "plant": Signature(("q", "v", "sine", "cosine", "moving", "pi", "true_base"), ("v_dot",)),
         "object": Signature(("body", "lift", "inertia"), ("body_dot",)),

@@ -9,6 +9,7 @@ Which quantities each function reads and writes, and how long they are, is said 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from ..control.laws import Asked, Errors
 from ..control.laws.protocol import ROWS
 from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.weights import Weights
+from ..robots.mechanism import Mechanism
 from ..robots.symbolic import Symbols
 from ..tasks.algebra import limited
 from ..tasks.measurement import Poses, Positions
@@ -65,7 +67,7 @@ class Trace:
         self.ca, self.kind, self.name = ca, kind, name
         self.given = {key: self.ca.SX.sym(key, columns(key, kind.sizes)) for key in QUANTITIES}
         self.q, self.v = self.given["q"], self.given["v"]
-        still = Symbols(kind.fixed, self.q, self.ca.sin(self.q), self.ca.cos(self.q))
+        still = Symbols(self._tooled(kind.fixed, "tool"), self.q, self.ca.sin(self.q), self.ca.cos(self.q))
         posture = self._row("W_inv"), self._row("posture"), self._row("gain")
         self.space: Any = kind.bound(TracedTip(still, self._base()), posture, SYMBOLS)
 
@@ -191,14 +193,17 @@ class Trace:
 
     def plant(self) -> Any:
         """v' = M^-1 (tau - C v - g), through a Cholesky factor of M."""
-        pi, recursion, gravity = self.given["pi"], self._true_recursion(), self._gravity(self._true_base())
+        pi, gravity = self.given["pi"], self._gravity(self._true_base())
+        recursion = Symbols(self.kind.true, self.q, self.given["sine"], self.given["cosine"])
         bias = recursion.torque(pi, self.v, self.v, self.ca.SX.zeros(self.kind.nv), gravity)
         v_dot = solve_positive(recursion.mass_matrix(pi), self.given["moving"] - bias)
         return self._function("plant", v_dot=array_of(v_dot))
 
     def hand(self) -> Any:
         """What the fixture between the hand and the object does to the joints, and to the object."""
-        tip = TracedTip(self._true_recursion(), self._true_base())
+        fixed = self._tooled(self.kind.true, "true_tool")
+        recursion = Symbols(fixed, self.q, self.given["sine"], self.given["cosine"])
+        tip = TracedTip(recursion, self._true_base())
         pull, wrench = fixture_on(tip, *map(self._row, ("q", "v", "body", "grasp")))
         return self._function("hand", pull=pull, wrench=wrench)
 
@@ -212,9 +217,12 @@ class Trace:
         """At joint positions of which sine and cosine are known."""
         return Symbols(self.kind.fixed, self.q, self.given["sine"], self.given["cosine"])
 
-    def _true_recursion(self) -> Symbols:
-        """The same of what really stands there."""
-        return Symbols(self.kind.true, self.q, self.given["sine"], self.given["cosine"])
+    def _tooled(self, fixed: Mechanism, name: str) -> Mechanism:
+        """A mechanism with its tip where the quantity says, if it has been left open."""
+        if not self.kind.holds:
+            return fixed
+        rotation, translation = self._placement(None, self.given[name])
+        return replace(fixed, tip_rotation=rotation, tip_translation=translation)
 
     def _base(self) -> tuple[Any, Any]:
         """Rotation and translation of the first joint's placement."""
