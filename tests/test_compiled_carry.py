@@ -181,6 +181,23 @@ def test_arms_of_different_kinds_carry_alike_while_some_hold_nothing(options):
     assert wrench.shape[1:] == (len(HANDS), 6) and np.abs(wrench[-1]).max() > 0.1
 
 
+class Ball(Fixture):
+    """One that does not resist turning, and holds more tightly along one axis than along others."""
+
+    @property
+    def K(self) -> np.ndarray:  # noqa: N802
+        return np.array([300.0, 200.0, 400.0, 0.0, 0.0, 0.0])
+
+    @property
+    def D(self) -> np.ndarray:  # noqa: N802
+        return np.array([6.0, 5.0, 4.0, 0.0, 0.0, 0.0])
+
+
+def test_fixtures_that_let_the_object_turn_carry_alike():
+    run, _ = both(mixed(fixture=Ball()), duration=0.02, dt=1e-3)
+    assert np.abs(run.outputs["hand_wrench"][..., 3:]).max() == 0
+
+
 PARTS = {
     "law": {"law": ComputedTorque(), "gains": GAINS.independent()},
     "adaptation": {"adaptation": Leakage(0.2, 1.0), "gains": GAINS.replace(Gamma=None)},
@@ -282,10 +299,6 @@ class Slipping(CarryingPlant):
     pass
 
 
-class Sticky(Fixture):
-    pass
-
-
 class Soft(CarriedObject):
     pass
 
@@ -302,7 +315,6 @@ REFUSED = {
         ("plant", f"{__name__}.Slipping"),
     ),
     "an object": (lambda: changed(body=Soft(0.8)), ("object", f"{__name__}.Soft")),
-    "a fixture": (lambda: mixed(fixture=Sticky()), ("fixture", f"{__name__}.Sticky")),
 }
 
 

@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..assembly import grasp
 from ..assembly.body import CarriedObject
-from ..assembly.grasp import Fixture, Grasp
 from ..assembly.plant import CarryingPlant
 from ..control import law
 from ..control.adaptation.gradient import BoundGradient
@@ -50,7 +50,7 @@ INVERSES = (Inverse, Pseudoinverse, DampedInverse)
 BODY = 13
 COMPILED_BEFORE = "its equations were compiled before"
 #: modules whose functions the parts of a closed loop call, beside those of their own
-LINES = (law, algebra, rotations)
+LINES = (law, algebra, rotations, grasp)
 
 
 class Part(NamedTuple):
@@ -132,9 +132,6 @@ def _held(plant: CarryingPlant) -> Iterator[Part]:
     """Parts of a plant that carries an object."""
     yield Part("object", plant.body, (CarriedObject,))
     yield Part("true tips of the robots", plant._tips, (Tips,))
-    for grasp in plant.grasps:
-        yield Part("grasp", grasp, (Grasp,))
-        yield Part("fixture", grasp.compliance, (Fixture,))
 
 
 def _functions(loop: ClosedLoop) -> Iterator[tuple[str, Any, str]]:
@@ -217,6 +214,7 @@ def _check_plant(loop: ClosedLoop) -> None:
         f"plant='{plant.physics}'": plant.physics != "pinocchio",
         "a plant with a state of its own": plant.hidden0.size
         != (BODY if isinstance(plant, CarryingPlant) else 0),
+        "a plant with other robots than its schedule": plant.robots is not plant.schedule.robots[0],
         "a plant with events": len(plant.events) > 0,
         "a plant with other joints than the cell's": any(true.nv != known.nv for true, known in robots),
         "a plant with another gravity than the cell's": not all(
