@@ -126,7 +126,7 @@ class DiscreteController:
         """
         time, motion = self._time(t), measured.measurement(q, v, self._shape)
         wanted = None if desired is None else measured.desired_motion(self.controller, desired)
-        felt = None if wrenches is None else finite_array("wrenches", wrenches, (self.cell.n, 6))
+        felt = {} if wrenches is None else {"wrenches": finite_array("wrenches", wrenches, (self.cell.n, 6))}
         missed = self._missed(time)
         fault = self._off_the_grid(time, missed) or measured.not_finite(self.cell, time, motion)
         if fault is not None:
@@ -134,25 +134,25 @@ class DiscreteController:
         with np.errstate(all="ignore"):  # what is not finite is named
             reference = self._reference(time, wanted)
             memory = self._heard(reference, motion, self._samples + missed)
-            signals = self.controller.unchecked(reference, motion, self.z, memory, felt)
+            signals = self.controller.unchecked(reference, motion, self.z, memory, **felt)
         measured.check_signals(self.cell, time, signals)
         self._advance(motion[0], memory, signals, missed)
         return self._tau.copy()
 
-    def sample(self, t: float, motion: np.ndarray, wrenches: np.ndarray | None = None) -> Signals:
+    def sample(self, t: float, motion: np.ndarray, **felt: np.ndarray) -> Signals:
         """What `step` does with a measurement that is in order, for a simulation that watches by itself.
 
         Args:
             t: time of the sample, s.
             motion: joint positions and velocities, (2, n, nv), of which the signals may keep views.
-            wrenches: internal wrenches, (n, 6), if any are measured.
+            felt: internal wrenches as `wrenches`, (n, 6), if any are measured.
 
         Returns:
             What the law computed, its torque neither cut off nor without gravity.
         """
         reference = self._reference(t)
         memory = self._heard(reference, motion, self._samples)
-        signals = self.controller.unchecked(reference, motion, self.z, memory, wrenches)
+        signals = self.controller.unchecked(reference, motion, self.z, memory, **felt)
         self._advance(motion[0], memory, signals)
         return signals
 

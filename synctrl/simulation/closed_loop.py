@@ -185,13 +185,13 @@ class ClosedLoop:
 
     def look(self, reference: Reference, state: State) -> Signals:
         """What the controller computes in a state, of which it may keep views."""
-        return self._law(reference, state.motion, state.z, state.memory, *self.felt(state))
+        return self._law(reference, state.motion, state.z, state.memory, **self.felt(state))
 
-    def felt(self, state: State) -> tuple[np.ndarray, ...]:
-        """Internal wrenches that the plant measures for an admittance, (n, 6); nothing without one."""
+    def felt(self, state: State) -> dict[str, np.ndarray]:
+        """Internal wrenches that the plant measures for an admittance, as `wrenches`; nothing without one."""
         if self.controller.admittance is None:
-            return ()
-        return (self.plant.felt(state.q, state.v, state.hidden),)
+            return {}
+        return {"wrenches": self.plant.felt(state.q, state.v, state.hidden)}
 
     def respond(self, state: State, tau: np.ndarray, disturbance: np.ndarray, rate: State) -> None:
         """Write how the plant moves into `rate`, and leave the rates of the controller's state as they are.

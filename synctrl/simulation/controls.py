@@ -104,7 +104,7 @@ class Sampled:
         controller = self._controller
         self._t, self._z, self._memory = t, controller.z, controller.heard(t, y.motion)
         y.z[...], y.memory[...] = self._z, self._memory
-        signals = controller.sample(t, y.motion, *self._loop.felt(y))
+        signals = controller.sample(t, y.motion, **self._loop.felt(y))
         self._z_dot, self._memory_dot = np.array(signals.z_dot), np.array(signals.memory_dot)
         self._tau = np.array(signals.tau)
         return signals
