@@ -23,6 +23,7 @@ from ..assembly.body import CarriedObject
 from ..assembly.plant import CarryingPlant
 from ..control import law
 from ..control.adaptation.gradient import BoundGradient
+from ..control.admittance import BoundAdmittance
 from ..control.controller import Controller
 from ..control.gains import Gains
 from ..control.laws.sun_mills import BoundSunMills
@@ -42,6 +43,7 @@ from ..tasks.pose import BoundPoseSpace, PoseSpace
 from ..tasks.redundancy import DampedInverse, Inverse, Pseudoinverse, Redundancy
 from ..tasks.sliding import BoundSlidingSpace, SlidingSpace
 from ..tasks.spaces import BoundCartesianSpace, BoundJointSpace, CartesianSpace, JointSpace
+from .plugged import learner
 
 SPACES = (JointSpace, CartesianSpace, PoseSpace, SlidingSpace)
 BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace, BoundSlidingSpace)
@@ -73,8 +75,6 @@ def check_known(loop: ClosedLoop) -> None:
     Raises:
         InputError: naming the part, its class, and the way out.
     """
-    if loop.controller.admittance is not None:
-        raise _refusal("admittance", "Admittance", "an admittance")
     for part in _parts(loop):
         _check_type(part)
         _check_own_methods(part)
@@ -110,8 +110,11 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     if isinstance(controller.law, BoundSunMills):  # others are traced
         yield Part("law", controller.law, (BoundSunMills,))
     yield Part("network", controller.network, (BoundIdeal,))
-    if isinstance(controller.adaptation, BoundGradient):  # others are traced
-        yield Part("adaptation", controller.adaptation, (BoundGradient,))
+    learns = learner(controller)
+    if isinstance(learns, BoundGradient):  # others are traced
+        yield Part("adaptation", learns, (BoundGradient,))
+    if controller.admittance is not None:
+        yield Part("admittance", controller.admittance, (BoundAdmittance,))
     yield Part("gains", controller.gains, (Gains,))
     yield Part("cell", cell, (Cell,))
     yield Part("coupling", cell.coupling, (Coupling,))
@@ -214,10 +217,9 @@ def _check_class(kind: type) -> None:
 
 def _check_controller(controller: Controller) -> None:
     """Refuse a controller whose parts no longer say what it does: it made some of them into others."""
-    if any(hasattr(controller.adaptation, part) for part in ("shift", "pace")):
-        raise _refusal(
-            "adaptation", _name(controller.adaptation), "an adaptation that moves the desired motion"
-        )
+    learns = learner(controller)
+    if any(hasattr(learns, part) for part in ("shift", "pace")):
+        raise _refusal("adaptation", _name(learns), "an adaptation that moves the desired motion")
     own = [part for part in (controller, controller.law) if isinstance(part, (Controller, BoundSunMills))]
     for name in ("Lambda", "beta", "K_eps", "leak"):
         then = np.broadcast_to(getattr(controller.gains, name), (controller.cell.m,))
