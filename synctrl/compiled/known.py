@@ -51,8 +51,8 @@ RIGID = (FullParameters, LinearParameters, BaseParameters)
 INVERSES = (Inverse, Pseudoinverse, DampedInverse)
 #: numbers of the state of an object that is carried
 BODY = 13
-#: what a plant may say of a run without moving otherwise for it
-TELLS = frozenset({"outputs", "outputs_along", "report", "account"})
+#: what a plant may say of a run, or refuse before it, without moving otherwise for it
+TELLS = frozenset({"outputs", "outputs_along", "report", "account", "chain", "_checked"})
 COMPILED_BEFORE = "its equations were compiled before"
 #: modules whose functions the parts of a closed loop call, beside those of their own
 LINES = (law, algebra, rotations, grasp)
@@ -102,7 +102,7 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     controller, cell = loop.controller, loop.controller.cell
     task: Any = cell.task
     yield Part("closed loop", loop, (ClosedLoop,))
-    yield Part("plant", loop.plant, (_moved_as(loop.plant), CarryingPlant))
+    yield Part("plant", loop.plant, (_moved_as(loop.plant), Plant, CarryingPlant))
     if isinstance(loop.plant, CarryingPlant):
         yield from _held(loop.plant)
     yield Part("schedule of payloads", loop.plant.schedule, (PayloadSchedule,))
@@ -181,16 +181,17 @@ def _check_type(part: Part) -> None:
 
 def _moved_as(plant: Any) -> type:
     """The type of a plant that the package's own moves, of whatever else it tells; else the package's own."""
+    own = CarryingPlant if isinstance(plant, CarryingPlant) else Plant
     kinds = type(plant).__mro__
-    own = kinds[: kinds.index(Plant)] if Plant in kinds else kinds
-    changed = {name for kind in own for name in vars(kind)}.intersection(_plant_names()) - TELLS
-    return Plant if changed else type(plant)
+    beside = kinds[: kinds.index(own)] if own in kinds else kinds
+    changed = {name for kind in beside for name in vars(kind)}.intersection(_names_of(own)) - TELLS
+    return own if changed else type(plant)
 
 
 @cache
-def _plant_names() -> frozenset[str]:
+def _names_of(plant: type) -> frozenset[str]:
     """What a plant of the package is made of."""
-    return frozenset(name for name in vars(Plant) if not name.startswith("__"))
+    return frozenset(name for kind in plant.__mro__ for name in vars(kind) if not name.startswith("__"))
 
 
 def _check_own_methods(part: Part) -> None:
