@@ -42,7 +42,7 @@ from synctrl.control.adaptation import Leakage
 from synctrl.control.laws import ComputedTorque
 from synctrl.coupling.cell import Reference
 from synctrl.errors import CompilationError, InputError, NonFiniteError
-from synctrl.experiments import carry_ur5
+from synctrl.experiments import carry_planar, carry_ur5
 from synctrl.experiments.ur5_payload import payload_motion
 from synctrl.robots.payload import holding
 from synctrl.simulation.closed_loop import ClosedLoop
@@ -54,6 +54,7 @@ pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[c
 pytestmark = [
     pytest.mark.filterwarnings("ignore::synctrl.errors.StepWarning"),
     pytest.mark.filterwarnings("ignore::synctrl.errors.SaturationWarning"),
+    pytest.mark.filterwarnings("ignore::synctrl.errors.GainWarning"),
 ]
 SEEDS = st.integers(0, 2**32 - 1)
 BODY = CarriedObject(0.8, (0.02, -0.01, 0.03), (0.01, 0.012, 0.014))
@@ -193,6 +194,15 @@ class Ball(Fixture):
         return np.array([6.0, 5.0, 4.0, 0.0, 0.0, 0.0])
 
 
+@pytest.mark.parametrize("way", ["continuous", "sampled and thinned"])
+def test_arms_in_a_plane_carry_at_pins_alike(way):
+    """The plant tells forces of its own, and moves as any that carries."""
+    push = Disturbance(0, (1.0, 1.0), 0.0043, 0.01)
+    experiment = replace(carry_planar(geometric_error=True, friction=True, leak=2.0), disturbances=[push])
+    run, _ = both(experiment, duration=0.03, dt=1e-3, **WAYS[way])
+    assert np.abs(run.outputs["internal_force"][-1]).max() > 0.1
+
+
 def test_fixtures_that_let_the_object_turn_carry_alike():
     run, _ = both(mixed(fixture=Ball()), duration=0.02, dt=1e-3)
     assert np.abs(run.outputs["hand_wrench"][..., 3:]).max() == 0
@@ -295,8 +305,18 @@ def test_a_fault_of_the_driver_that_carries_is_found(name, monkeypatch, tmp_path
 # -- what is refused --------------------------------------------------------------------------------------
 
 
+class Telling(CarryingPlant):
+    """One that tells something else of a run, and moves as the package's own."""
+
+    def outputs_along(self, q, v, hidden, t):
+        return {"height": (hidden[:, 2], "m", ("time",))}
+
+
 class Slipping(CarryingPlant):
-    pass
+    """One whose fixtures are computed elsewhere."""
+
+    def _wrenches(self, q, v, hidden):
+        return super()._wrenches(q, v, hidden)
 
 
 class Soft(CarriedObject):
@@ -316,6 +336,14 @@ REFUSED = {
     ),
     "an object": (lambda: changed(body=Soft(0.8)), ("object", f"{__name__}.Soft")),
 }
+
+
+def test_a_plant_that_only_tells_something_else_is_run():
+    experiment = mixed()
+    run = partial(Telling, **experiment.plant_type.keywords)
+    found = replace(experiment, plant_type=run).simulate(0.01, engine="compiled")
+    expected = experiment.simulate(0.01, engine="compiled").outputs["object_pose"][:, 2]
+    assert (found.outputs["height"] == expected).all() and "object_pose" not in found.outputs
 
 
 @pytest.mark.parametrize("name", REFUSED)

@@ -12,11 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from ..assembly.body import Inertia, body_rate
+from ..assembly.body import Inertia, body_rate, place_of
+from ..assembly.forces import internal_wrenches
 from ..assembly.grasp import fixture_wrenches, grasp_matrix, places_on
 from ..assembly.plant import CarryingPlant
 from ..robots.mechanism import mechanism
 from ..robots.robot import Robot
+from ..simulation.closed_loop import ClosedLoop
 from ..simulation.plant import Plant
 from ..tasks.measurement import Kinematics
 from .algebra import array_of, column_of, function_of, solve_positive
@@ -40,6 +42,20 @@ def fixture_on(
     hand = moved[:1], R[None], (J @ v)[None]
     on_object, on_hand = fixture_wrenches(hand, places, K, D)
     return J.T @ on_hand[0], grasp_matrix(lever)[0] @ on_object[0]
+
+
+def felt_at_origin(wrench: np.ndarray, share: np.ndarray, lift: np.ndarray, body: np.ndarray) -> np.ndarray:
+    """Internal wrench of one hand about the object's origin in world axes, (6,).
+
+    Args:
+        wrench: of the fixture on the object about its origin, (6,).
+        share: the part of the load that belongs to the hand, in the object's axes, (36,), see `_shares`.
+        lift: wrenches of all fixtures together, (6,).
+        body: pose and twist of the object, (13,).
+    """
+    R = place_of(body[:7])[1]
+    load = np.matvec(share.reshape(6, 6), (lift.reshape(2, 3) @ R).ravel())
+    return wrench - (load.reshape(2, 3) @ R.T).ravel()
 
 
 def object_function(name: str) -> Any:
@@ -68,6 +84,14 @@ def carrying_constants(plant: Plant) -> dict[str, np.ndarray]:
     }
 
 
+def giving_constants(loop: ClosedLoop) -> dict[str, np.ndarray]:
+    """The same of an admittance; rows without entries where robots do not give way."""
+    admittance, plant = loop.controller.admittance, loop.plant
+    if admittance is None or not isinstance(plant, CarryingPlant):
+        return {"share": np.zeros((loop.cell.n, 0)), "giving": np.zeros((1, 0))}
+    return {"share": _shares(plant), "giving": np.concatenate(admittance.giving)[None]}
+
+
 def _tools(robots: Sequence[Robot]) -> np.ndarray:
     """Rotation by rows and translation of the tips on their links, (n, 12)."""
     fixed = [mechanism(robot)[0] for robot in robots]
@@ -79,6 +103,21 @@ def _grasps(plant: CarryingPlant) -> np.ndarray:
     rows = np.zeros((plant.cell.n, columns("grasp", {"hand": 1})))
     parts = plant.arms, plant.turned.reshape(-1, 9), plant.K, plant.D
     rows[[grasp.robot for grasp in plant.grasps]] = np.concatenate(parts, axis=1)
+    return rows
+
+
+def _shares(plant: CarryingPlant) -> np.ndarray:
+    """What part of a load about the object's origin belongs to each hand, in its axes, (n, 36).
+
+    The split is linear and the same in all directions, so it turns with the object: it is asked here what
+    it makes of six unit loads in the first hand.
+    """
+    G = grasp_matrix(plant.arms)
+    h = np.zeros((6, *plant.arms.shape[:1], 6))
+    h[:, 0] = np.linalg.inv(G[0]).T
+    loads = np.matvec(G, h - internal_wrenches(h, np.broadcast_to(plant.arms, (6, *plant.arms.shape))))
+    rows = np.zeros((plant.cell.n, 36))
+    rows[[grasp.robot for grasp in plant.grasps]] = loads.transpose(1, 2, 0).reshape(-1, 36)
     return rows
 
 

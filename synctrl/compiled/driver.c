@@ -84,15 +84,25 @@ static void couple(const Cell *c, Quantities *a) {
 /* What reaches a joint of the torque that is asked for, as `Plant.applied`; what is no number stays so. */
 static double applied(double tau, double limit) { return tau > limit ? limit : tau < -limit ? -limit : tau; }
 
-/* Let hands that hold an object pull at their robots, and all of them move it. */
-static void hold(const Cell *c, Quantities *a, Work *k) {
+/* Sines and cosines, on which all else depends. */
+static void turn(const Cell *c, Quantities *a) {
+    for (int j = 0; j < c->n * nv; j++) { a->sine[j] = sin(a->q[j]); a->cosine[j] = cos(a->q[j]); }
+}
+
+/* What hands that hold an object do to it, and it to them: all of this follows from the state. */
+static void feel(const Cell *c, Quantities *a, Work *k) {
     for (int j = 0; j < c->o * 6; j++) a->lift[j] = 0;
     for (int i = 0; i < c->n; i++) {
         if (!kinds[c->kind[i]].hand) continue;
         call_hand(c, a, i, k);
         for (int j = 0; j < 6; j++) a->lift[j] += a->wrench[i * 6 + j];
-        for (int j = 0; j < nv; j++) a->moving[i * nv + j] += a->pull[i * nv + j];
     }
+}
+
+/* Let hands that hold an object pull at their robots, and all of them move it. */
+static void hold(const Cell *c, Quantities *a, Work *k) {
+    for (int i = 0; i < c->n; i++)
+        for (int j = 0; kinds[c->kind[i]].hand && j < nv; j++) a->moving[i * nv + j] += a->pull[i * nv + j];
     call_object(c, a, c->n, k);
 }
 
@@ -118,6 +128,7 @@ static void evaluate(const Cell *c, Quantities *a, Work *k, const Steps *s, int 
                      double *y_dot) {
     place(c, a, y, y_dot);
     look_up(a, s, stage, step);
+    if (c->o) { turn(c, a); feel(c, a, k); }
     for (int i = 0; i < c->n; i++) call_measure(c, a, i, k);
     couple(c, a);
     for (int i = 0; i < c->n; i++) call_control(c, a, i, k);
@@ -129,7 +140,8 @@ static void evaluate(const Cell *c, Quantities *a, Work *k, const Steps *s, int 
 static void coast(const Cell *c, Quantities *a, Work *k, const Steps *s, int stage, int step, const double *y,
                   double *y_dot) {
     place(c, a, y, y_dot);
-    for (int j = 0; j < c->n * nv; j++) { a->sine[j] = sin(a->q[j]); a->cosine[j] = cos(a->q[j]); }
+    turn(c, a);
+    if (c->o) feel(c, a, k);
     memcpy(y_dot + controlled(c), k->held + controlled(c), sizeof(double) * (state_size(c) - controlled(c)));
     move(c, a, a->acting, k);
 }

@@ -22,7 +22,7 @@ from ..tasks.measurement import Kinematics
 from ..tasks.redundancy import Posture
 from ..tasks.spaces import BoundJointSpace, BoundTipSpace, JointSpace, TipSpace
 from .momentum import momentum_function
-from .plugged import Learning, trace_law, trace_learning
+from .plugged import Learning, learner, trace_law, trace_learning
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +45,7 @@ class Kind:
         learning: how it learns, or None for (14).
         law: CasADi function of what it does, see `trace_law`, or None for `SunMills`.
         holds: whether its tip holds an object.
+        gives_at: where y and y' of an admittance stand in the state of the adaptation, or None without one.
     """
 
     fixed: Mechanism
@@ -62,6 +63,7 @@ class Kind:
     learning: Learning | None = None
     law: Any = None
     holds: bool = False
+    gives_at: int | None = None
 
     @property
     def nv(self) -> int:
@@ -82,6 +84,17 @@ class Kind:
     def rigid_parameters(self) -> int:
         """Number of adapted parameters of the rigid bodies; they come first."""
         return 10 * self.nv if self.matrix is None else self.matrix.shape[1]
+
+    @property
+    def adapted(self) -> int:
+        """Number of adapted parameters."""
+        rub = 0 if self.smoothing is None else (2 + self.rotors) * self.nv
+        return self.rigid_parameters + rub
+
+    @property
+    def learned(self) -> int:
+        """Entries of the state of the adaptation, without what an admittance adds."""
+        return self.adapted if self.learning is None else self.learning.estimate.numel_in()
 
     @property
     def damped(self) -> bool:
@@ -118,13 +131,11 @@ class Kind:
     @property
     def sizes(self) -> dict[str, int]:
         """What the lengths of its rows are made of, see `SIZES`."""
-        rub = 0 if self.smoothing is None else (2 + self.rotors) * self.nv
-        P = self.rigid_parameters + rub
         return {
             "m": self.m,
             "nv": self.nv,
-            "P": P,
-            "Z": P if self.learning is None else self.learning.estimate.numel_in(),
+            "P": self.adapted,
+            "Z": self.learned if self.gives_at is None else self.gives_at + 12,
             "K": self.nv if self.k_r_space == "joint" else self.m,
             "bodies": 10 * self.nv,
             "slides": int(self.slides),
@@ -133,6 +144,7 @@ class Kind:
             "damped": int(self.damped),
             "watches": len(self.watches),
             "hand": int(self.holds),
+            "gives": int(self.gives_at is not None),
         }
 
     def key(self) -> list[Any]:
@@ -141,7 +153,7 @@ class Kind:
         shared = [None if rotation is None else rotation.tolist() for rotation in rotations]
         matrix = None if self.matrix is None else self.matrix.tolist()
         options: list[Any] = [self.reference_acceleration, self.k_r_space, list(self.gravity)]
-        options += [self.smoothing, self.rotors, list(self.made_of), self.holds]
+        options += [self.smoothing, self.rotors, list(self.made_of), self.holds, self.gives_at]
         options += [None if part is None else part.serialize() for part in (*(self.learning or ()), self.law)]
         damping = asdict(self.space.damping) if self.damped else None  # type: ignore[union-attr, arg-type]
         space = [list(getattr(self.space, "rows", ())), damping, list(self.watches)]
@@ -254,4 +266,5 @@ def _kind(
         getattr(parameters, "armature", False),
         tuple(type(part).__qualname__ for part in (cell.space, parameters, rigid)),
         holds=holds,
+        gives_at=None if controller.admittance is None else learner(controller).start().shape[1],
     )

@@ -23,6 +23,7 @@ from ..assembly.body import CarriedObject
 from ..assembly.plant import CarryingPlant
 from ..control import law
 from ..control.adaptation.gradient import BoundGradient
+from ..control.admittance import BoundAdmittance
 from ..control.controller import Controller
 from ..control.gains import Gains
 from ..control.laws.sun_mills import BoundSunMills
@@ -42,6 +43,7 @@ from ..tasks.pose import BoundPoseSpace, PoseSpace
 from ..tasks.redundancy import DampedInverse, Inverse, Pseudoinverse, Redundancy
 from ..tasks.sliding import BoundSlidingSpace, SlidingSpace
 from ..tasks.spaces import BoundCartesianSpace, BoundJointSpace, CartesianSpace, JointSpace
+from .plugged import learner
 
 SPACES = (JointSpace, CartesianSpace, PoseSpace, SlidingSpace)
 BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace, BoundSlidingSpace)
@@ -49,8 +51,8 @@ RIGID = (FullParameters, LinearParameters, BaseParameters)
 INVERSES = (Inverse, Pseudoinverse, DampedInverse)
 #: numbers of the state of an object that is carried
 BODY = 13
-#: what a plant may say of a run without moving otherwise for it
-TELLS = frozenset({"outputs", "report", "account"})
+#: what a plant may say of a run, or refuse before it, without moving otherwise for it
+TELLS = frozenset({"outputs", "report", "account", "chain", "_checked"})
 COMPILED_BEFORE = "its equations were compiled before"
 #: modules whose functions the parts of a closed loop call, beside those of their own
 LINES = (law, algebra, rotations, grasp)
@@ -73,8 +75,6 @@ def check_known(loop: ClosedLoop) -> None:
     Raises:
         InputError: naming the part, its class, and the way out.
     """
-    if loop.controller.admittance is not None:
-        raise _refusal("admittance", "Admittance", "an admittance")
     for part in _parts(loop):
         _check_type(part)
         _check_own_methods(part)
@@ -102,7 +102,7 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     controller, cell = loop.controller, loop.controller.cell
     task: Any = cell.task
     yield Part("closed loop", loop, (ClosedLoop,))
-    yield Part("plant", loop.plant, (_moved_as(loop.plant), CarryingPlant))
+    yield Part("plant", loop.plant, (_moved_as(loop.plant), Plant, CarryingPlant))
     if isinstance(loop.plant, CarryingPlant):
         yield from _held(loop.plant)
     yield Part("schedule of payloads", loop.plant.schedule, (PayloadSchedule,))
@@ -110,8 +110,11 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     if isinstance(controller.law, BoundSunMills):  # others are traced
         yield Part("law", controller.law, (BoundSunMills,))
     yield Part("network", controller.network, (BoundIdeal,))
-    if isinstance(controller.adaptation, BoundGradient):  # others are traced
-        yield Part("adaptation", controller.adaptation, (BoundGradient,))
+    learns = learner(controller)
+    if isinstance(learns, BoundGradient):  # others are traced
+        yield Part("adaptation", learns, (BoundGradient,))
+    if controller.admittance is not None:
+        yield Part("admittance", controller.admittance, (BoundAdmittance,))
     yield Part("gains", controller.gains, (Gains,))
     yield Part("cell", cell, (Cell,))
     yield Part("coupling", cell.coupling, (Coupling,))
@@ -178,16 +181,17 @@ def _check_type(part: Part) -> None:
 
 def _moved_as(plant: Any) -> type:
     """The type of a plant that the package's own moves, of whatever else it tells; else the package's own."""
+    own = CarryingPlant if isinstance(plant, CarryingPlant) else Plant
     kinds = type(plant).__mro__
-    own = kinds[: kinds.index(Plant)] if Plant in kinds else kinds
-    changed = {name for kind in own for name in vars(kind)}.intersection(_plant_names()) - TELLS
-    return Plant if changed else type(plant)
+    beside = kinds[: kinds.index(own)] if own in kinds else kinds
+    changed = {name for kind in beside for name in vars(kind)}.intersection(_names_of(own)) - TELLS
+    return own if changed else type(plant)
 
 
 @cache
-def _plant_names() -> frozenset[str]:
+def _names_of(plant: type) -> frozenset[str]:
     """What a plant of the package is made of."""
-    return frozenset(name for name in vars(Plant) if not name.startswith("__"))
+    return frozenset(name for kind in plant.__mro__ for name in vars(kind) if not name.startswith("__"))
 
 
 def _check_own_methods(part: Part) -> None:
@@ -214,10 +218,9 @@ def _check_class(kind: type) -> None:
 
 def _check_controller(controller: Controller) -> None:
     """Refuse a controller whose parts no longer say what it does: it made some of them into others."""
-    if any(hasattr(controller.adaptation, part) for part in ("shift", "pace")):
-        raise _refusal(
-            "adaptation", _name(controller.adaptation), "an adaptation that moves the desired motion"
-        )
+    learns = learner(controller)
+    if any(hasattr(learns, part) for part in ("shift", "pace")):
+        raise _refusal("adaptation", _name(learns), "an adaptation that moves the desired motion")
     own = [part for part in (controller, controller.law) if isinstance(part, (Controller, BoundSunMills))]
     for name in ("Lambda", "beta", "K_eps", "leak"):
         then = np.broadcast_to(getattr(controller.gains, name), (controller.cell.m,))

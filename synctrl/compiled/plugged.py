@@ -51,6 +51,12 @@ class Learning(NamedTuple):
     leap: Any
 
 
+def learner(controller: Controller) -> Any:
+    """The adaptation of a controller; where its robots give way to forces, the one inside the admittance."""
+    giving = controller.admittance
+    return controller.adaptation if giving is None else giving.adaptation
+
+
 def trace_law(controller: Controller) -> list[Any]:
     """What every robot of a cell does, as a CasADi function; None for `SunMills`, which has code of its own.
 
@@ -81,7 +87,7 @@ def trace_learning(controller: Controller, momentum: Sequence[Callable[[], Any]]
     Raises:
         InputError: an adaptation that does not take symbols, or mixes robots.
     """
-    cell, adaptation = controller.cell, controller.adaptation
+    cell, adaptation = controller.cell, learner(controller)
     if type(adaptation) is BoundGradient:
         return [None] * cell.n
     with _traceable("adaptation", adaptation, "robot by robot"):
@@ -154,8 +160,8 @@ class ChosenAdaptation:
     """
 
     def __init__(self, controller: Controller, robots: Sequence[int]):
-        self._adaptation, self._cell, self._robots = controller.adaptation, controller.cell, robots
-        self._z0 = controller.adaptation.start()
+        self._adaptation, self._cell, self._robots = learner(controller), controller.cell, robots
+        self._z0 = self._adaptation.start()
 
     def bind(self, cell: Cell) -> ChosenAdaptation:
         """Itself: it knows its robots."""

@@ -21,9 +21,10 @@ from ..simulation.guard import limits_of
 from ..simulation.plant import Plant
 from . import structs
 from .build import cached_library, content_key, require_casadi
-from .carrying import carrying_constants, object_function
+from .carrying import carrying_constants, giving_constants, object_function
 from .kind import Classified, Kind, classify, standing
 from .known import check_known, check_untouched
+from .plugged import learner
 from .quantities import DESIRED, SLIDE, checked, owned_by, shape
 from .specimen import Specimen
 from .structs import header, largest
@@ -250,7 +251,7 @@ def _constants(loop: ClosedLoop, classified: Classified) -> dict[str, np.ndarray
         name: np.atleast_2d(getattr(controller, name)) for name in ("Lambda", "beta", "K_eps", "leak", "K_r")
     }
     found |= {name: getattr(plant, name) for name in ("viscous", "coulomb", "smoothing")}
-    learns, zeros = controller.adaptation, np.zeros_like(cell.theta)
+    learns, zeros = learner(controller), np.zeros_like(cell.theta)
     redundancy = getattr(cell.space, "redundancy", None)
     W_inv, posture, gain = redundancy.spread(cell.robots) if redundancy else np.zeros((3, cell.n, cell.nv))
     return {
@@ -264,6 +265,7 @@ def _constants(loop: ClosedLoop, classified: Classified) -> dict[str, np.ndarray
         "limits": plant.torque_limits,
         "bounds": np.array([[*limits_of(cell.task).values()]]),
         **carrying_constants(plant),
+        **giving_constants(loop),
     }
 
 

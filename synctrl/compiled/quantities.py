@@ -51,6 +51,7 @@ SIZES: Mapping[str, str] = MappingProxyType(
         "damped": "1 if singular configurations are damped, else 0",
         "watches": "numbers that the guard watches",
         "hand": "1 for robots whose tip holds an object, else 0",
+        "gives": "1 if robots give way to forces inside the object, else 0",
     }
 )
 
@@ -85,6 +86,8 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "tool": Quantity("cell", "n", "hand*12", "place of a hand on its link, as the controller knows it"),
         "true_tool": Quantity("cell", "n", "hand*12", "the same as it is"),
         "grasp": Quantity("cell", "n", "hand*24", "where a hand holds the object, K and D of its fixture"),
+        "share": Quantity("cell", "n", "gives*36", "part of the load at each hand, in the object's axes"),
+        "giving": Quantity("cell", "one", "gives*18", "D_a, 1 / M_a, and whether there is a mass"),
         "inertia": Quantity("cell", "o", "16", "mass, centre of mass and inertia of the object, and gravity"),
         "pi": Quantity("load", "n", "bodies", "true inertial parameters, with what is carried"),
         "disturbance": Quantity("disturbance", "n", "nv", "torque from outside"),
@@ -97,6 +100,7 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "weights": Quantity("instant", "n", "4*m*m", "c, c', c'' and c^-1"),
         "x": Quantity("work", "n", "m", "coordinates of the task"),
         "e": Quantity("work", "n", "m", "error"),
+        "e_dot": Quantity("work", "n", "m", "its rate"),
         "x_dot": Quantity("work", "n", "m", "velocity of the task"),
         "xd_dot": Quantity("work", "n", "m", "desired velocity, as errors are counted"),
         "xd_ddot": Quantity("work", "n", "m", "desired acceleration, as errors are counted"),
@@ -126,6 +130,7 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "pull": Quantity("work", "n", "hand*nv", "torque of the fixture on the joints"),
         "wrench": Quantity("work", "n", "hand*6", "what the fixture does to the object, about its origin"),
         "lift": Quantity("work", "o", "6", "what all fixtures together do to it"),
+        "felt": Quantity("work", "n", "gives*6", "force inside at the object's origin, in the desired axes"),
         "e_star": Quantity("work", "n", "m", "coupled error"),
         "s_q": Quantity("work", "n", "nv", "error in velocity of the joints"),
         "theta_hat": Quantity("work", "n", "P", "estimates"),
@@ -155,17 +160,21 @@ HEARD = "E", "sigma", "sigma_dot"
 FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
     {
         "measure": Signature(
-            ("q", "v", "tool", "base", *DESIRED, *SLIDE, "weights", "W_inv", "posture", "gain"),
             (
-                "x", "e", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot", "sine", "cosine", "J", "J_dot", "J_inv",
-                "G", "zeta", "zeta_dot", "damping", "damping_rate",
+                "q", "v", "tool", "base", *DESIRED, *SLIDE, "weights", "W_inv", "posture", "gain",
+                "z", "body", "wrench", "lift", "share", "giving",
+            ),
+            (
+                "x", "e", "e_dot", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot", "sine", "cosine", "J", "J_dot",
+                "J_inv", "G", "zeta", "zeta_dot", "damping", "damping_rate", "felt",
             ),
         ),
         "control": Signature(
             (
-                "q", "v", "sine", "cosine", "z", *HEARD, "e", "x_dot", "xd_dot", "xd_ddot",
+                "q", "v", "sine", "cosine", "z", *HEARD, "e", "e_dot", "x_dot", "xd_dot", "xd_ddot",
                 "w", "w_dot", "J", "J_dot", "J_inv", "G", "zeta", "zeta_dot", "damping_rate", "weights",
                 "Lambda", "beta", "K_eps", "leak", "K_r", "Gamma", "limits", "W_inv", "base",
+                "felt", "giving",
             ),
             ("tau", "z_dot", "e_star", "s_q", "velocity_lost"),
         ),

@@ -18,6 +18,7 @@ from ..assembly.body import CarriedObject
 from ..assembly.grasp import Grasp
 from ..assembly.plant import CarryingPlant
 from ..control.adaptation.gradient import BoundGradient
+from ..control.admittance import Admittance, BoundAdmittance
 from ..control.controller import Controller
 from ..control.gains import Gains
 from ..control.laws import Law, SunMills
@@ -36,7 +37,7 @@ from ..tasks.rotations import exp
 from ..tasks.spaces import JointSpace, Space, TipSpace
 from ..tasks.trajectories import Hold
 from .kind import Classified, holders
-from .plugged import ChosenAdaptation, ChosenLaw
+from .plugged import ChosenAdaptation, ChosenLaw, learner
 
 #: robots at least: with three in a ring, each is in two pairs, and each pair leaves one out
 ROBOTS = 3
@@ -94,10 +95,13 @@ class Specimen:
         cell = Cell(members, coupling, self._space(original.cell.space, [x.robot for x in members]))
         gains = self._gains(cell, original.k_r_space)
         adaptation: Any = None
-        if not isinstance(original.adaptation, BoundGradient):
+        if not isinstance(learner(original), BoundGradient):
             adaptation = ChosenAdaptation(original, robots)
             gains = gains.replace(Gamma=None)
-        controller = Controller(cell, gains, adaptation=adaptation, law=_law(original, robots))
+        giving = None if original.admittance is None else _FreelyGiving()
+        controller = Controller(
+            cell, gains, adaptation=adaptation, law=_law(original, robots), admittance=giving
+        )
         return ClosedLoop(controller, self._plant(cell, plant, robots))
 
     def _plant(self, cell: Cell, original: Plant, robots: Sequence[int]) -> Plant:
@@ -114,6 +118,7 @@ class Specimen:
         grasps = [Grasp(k, R.T @ (tip.translation - p), R.T @ tip.rotation) for k, tip in tips.items()]
         plant = _Carrying(cell, body=body, grasps=grasps, at=(p, R), robots=true)
         plant.K, plant.D = self._positive(2, len(grasps), 6)
+        plant.arms = self._random(len(grasps), 3)  # equal arms would hold it at one place
         return plant
 
     def _space(self, space: Space, robots: Sequence[Robot]) -> Space:
@@ -151,10 +156,12 @@ class Specimen:
         state.v[...] *= self._joints()
         for row, parameters in zip(known, cell.parameters, strict=True):
             row[: len(parameters.theta)] = 1
-        if isinstance(self.loop.controller.adaptation, BoundGradient):
-            state.z[...] = known * (cell.theta + 0.1 * state.z)
+        learns = learner(self.loop.controller)
+        z = state.z[:, : learns.start().shape[1]]  # what an admittance has behind it stays random
+        if isinstance(learns, BoundGradient):
+            z[...] = known * (cell.theta + 0.1 * z)
         else:
-            state.z[...] = self.loop.controller.adaptation.start() * (1 + 0.1 * state.z)
+            z[...] = learns.start() * (1 + 0.1 * z)
         return y
 
     def _desired(self, q: np.ndarray, distance: float) -> np.ndarray:
@@ -189,11 +196,20 @@ class Specimen:
         return self._rng.uniform(0.5, 2.0, shape)
 
 
+class _FreelyGiving(Admittance):
+    """One that takes the weights of the specimen, and has a mass in some directions only."""
+
+    def bind(self, cell: Cell, adaptation: Any, network: Any) -> BoundAdmittance:
+        """With numbers near one, as those of all else here."""
+        return BoundAdmittance(adaptation, np.array([1.5, 0.7, 0.0, 1.2, 0.0, 0.8]), np.linspace(0.6, 1.7, 6))
+
+
 class _Carrying(CarryingPlant):
     """A plant of which no theorem is asked, nor whether arms know the object as their load."""
 
-    def chain(self, controller: Controller) -> None:
-        """Nothing."""
+    def chain(self, controller: Controller) -> Any:
+        """None."""
+        return None
 
 
 def _most_turned(classified: Classified, kind: int) -> int:

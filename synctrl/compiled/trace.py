@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..control import law
+from ..control.admittance import Giving
 from ..control.laws import Asked, Errors
 from ..control.laws.protocol import ROWS
 from ..control.laws.sun_mills import BoundSunMills
@@ -26,7 +27,7 @@ from ..tasks.measurement import Poses, Positions
 from ..tasks.redundancy import Inversion, velocity_lost
 from ..tasks.spaces import Measurement
 from .algebra import SYMBOLS, array_of, column_of, function_of, solve_positive
-from .carrying import fixture_on
+from .carrying import felt_at_origin, fixture_on
 from .kind import Kind
 from .momentum import model_torque
 from .plugged import Learning
@@ -89,14 +90,27 @@ class Trace:
         """Where the robot is, and how it errs."""
         told = (*DESIRED, *SLIDE) if self.kind.slides else DESIRED
         motion, desired = (np.stack([*map(self._row, names)]) for names in (("q", "v"), told))
-        task = self.space.measure(motion, desired)
+        task, felt = self._given_way(self.space.measure(motion, desired), desired)
         w, w_dot = law.compute_weighted_errors(Weights(*self._weights()), task.error)
         way = {} if task.inversion is None else task.inversion._asdict()
         return self._function(
             "measure",
-            x=task.x, e=task.e, x_dot=task.x_dot, xd_dot=task.xd_dot, xd_ddot=task.xd_ddot, w=w, w_dot=w_dot,
-            sine=np.sin(motion[0]), cosine=np.cos(motion[0]), J=task.J, J_dot=task.J_dot, **way,
+            x=task.x, e=task.e, e_dot=task.e_dot, x_dot=task.x_dot, xd_dot=task.xd_dot, xd_ddot=task.xd_ddot,
+            w=w, w_dot=w_dot, sine=np.sin(motion[0]), cosine=np.cos(motion[0]), J=task.J, J_dot=task.J_dot,
+            felt=felt, **way,
         )  # fmt: skip
+
+    def _given_way(self, task: Measurement, desired: np.ndarray) -> tuple[Measurement, np.ndarray | None]:
+        """What was measured after it gave way to forces, and what is felt; nothing of that without them."""
+        at = self.kind.gives_at
+        if at is None:
+            return task, None
+        parts = map(self._row, ("wrench", "share", "lift", "body"))
+        wrench = felt_at_origin(*parts) if self.kind.holds else np.zeros(6)
+        return self._giving().moved(task, self._row("z")[at:].reshape(2, 6), desired[:3], wrench)
+
+    def _giving(self) -> Giving:
+        return Giving(*self._row("giving").reshape(3, 6))
 
     def guard(self) -> Any:
         """What is watched."""
@@ -112,14 +126,14 @@ class Trace:
 
     def _task(self) -> Measurement:
         """What was measured, of one instant."""
-        e, x_dot, xd_dot, xd_ddot = map(self._row, ("e", "x_dot", "xd_dot", "xd_ddot"))
+        error, rates = (np.stack([*map(self._row, pair)]) for pair in (("e", "e_dot"), ("xd_dot", "xd_ddot")))
         J, J_inv, J_dot = self._jacobians()
-        m = len(e) if self.kind.solves else 0
-        rows = map(self._row, ("zeta", "zeta_dot", "damping", "damping_rate"))
-        inversion = Inversion(J_inv, array_of(self.given["G"], m, m), *rows)
-        x = np.zeros_like(e)  # which the law does not ask for
-        motion, error = np.stack((x, x_dot)), np.stack((e, xd_dot - x_dot))
-        return Measurement(motion, error, np.stack((xd_dot, xd_ddot)), J, J_inv, J_dot, inversion)
+        m = self.kind.m if self.kind.solves else 0
+        ways = map(self._row, ("zeta", "zeta_dot", "damping", "damping_rate"))
+        inversion = Inversion(J_inv, array_of(self.given["G"], m, m), *ways)
+        x_dot = self._row("x_dot")
+        motion = np.stack((np.zeros_like(x_dot), x_dot))  # the law does not ask for x
+        return Measurement(motion, error, rates, J, J_inv, J_dot, inversion)
 
     # -- the law ------------------------------------------------------------------------------------------
 
@@ -133,7 +147,7 @@ class Trace:
         )
         model_torque, gradient, Y = self._adaptive(v_ref, a_ref, s_q)
         tau = model_torque + feedback
-        z_dot = self._learned(gradient, Y, (v_ref, a_ref, s_q, tau))
+        z_dot = self._with_giving(self._learned(gradient, Y, (v_ref, a_ref, s_q, tau)))
         lost = velocity_lost(self._jacobians()[0], v_ref, asked.xref_dot) if self.kind.damped else None
         return self._function(
             "control",
@@ -157,17 +171,24 @@ class Trace:
 
     def beside(self, learning: Learning) -> Iterator[Any]:
         """What an adaptation has beside its rate: z -> theta_hat, and z -> z after a step."""
-        z = self.given["z"]
+        (z, beside), since = self._parted("z"), self.given["since"]
         yield self._function("estimate", theta_hat=array_of(learning.estimate(z)))
         if learning.settle is not None:
-            yield self._function("settle", settled=array_of(learning.settle(z)))
+            settled = self.ca.vertcat(learning.settle(z), beside)
+            yield self._function("settle", settled=array_of(settled))
         if learning.leap is not None:
-            sampled = (self.given[name] for name in FUNCTIONS["leap"].inputs)
-            yield self._function("leap", leapt=array_of(learning.leap(*sampled)))
+            (z, z_dot), (y, y_dot) = zip(*map(self._parted, ("z_sampled", "z_dot_sampled")), strict=True)
+            leapt = self.ca.vertcat(learning.leap(z, z_dot, since), y + since * y_dot)
+            yield self._function("leap", leapt=array_of(leapt))
+
+    def _parted(self, name: str) -> tuple[Any, Any]:
+        """What an adaptation knows of a state or its rate, and what an admittance has behind it."""
+        whole, learned = self.given[name], self.kind.learned
+        return whole[:learned], whole[learned:]
 
     def _adaptive(self, v_ref: np.ndarray, a_ref: np.ndarray, s_q: np.ndarray) -> tuple:
         """Y theta_hat, Y^T s_q and Y row by row; with (14) the state z of the adaptation is theta_hat."""
-        learning, z = self.kind.learning, self.given["z"]
+        learning, z = self.kind.learning, self._parted("z")[0]
         motion = tuple(map(column_of, (v_ref, a_ref, s_q)))
         if learning is None:
             return (*(array_of(part, -1) for part in self._model(z, *motion)), None)
@@ -182,7 +203,16 @@ class Trace:
         if learning is None:
             return self._row("Gamma") * gradient
         rows = (*motion, limited(tau, -limits, limits), gradient, Y)
-        return array_of(learning.rate(self.given["z"], self.q, self.v, *map(column_of, rows)))
+        z = self._parted("z")[0]
+        return array_of(learning.rate(z, self.q, self.v, *map(column_of, rows)), -1)
+
+    def _with_giving(self, z_dot: np.ndarray) -> np.ndarray:
+        """A rate with those of y and y' behind it, where an admittance has them."""
+        at = self.kind.gives_at
+        if at is None:
+            return z_dot
+        between, y_dot = np.zeros(at - len(z_dot)), self._row("z")[-6:]
+        return np.concatenate((z_dot, between, *self._giving().rates(y_dot, self._row("felt"))))
 
     def _model(self, theta_hat: Any, v_ref: Any, a_ref: Any, s_q: Any) -> tuple[Any, Any]:
         """Y theta_hat, and Y^T s_q as the derivative of s_q^T Y theta_hat with respect to theta_hat."""

@@ -13,7 +13,7 @@ world axes it is Y = R_d y with Y' = R_d y' + w_d x Y. With M_a = 0 y' = -h / D_
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -74,19 +74,57 @@ class Admittance:
         return {"mass": self.mass.tolist(), "damping": self.damping.tolist()}
 
 
+class Giving(NamedTuple):
+    """How arms give way, robot by robot; plain array arithmetic, which runs on symbols too.
+
+    Attributes:
+        damping: D_a of the six directions, (6,).
+        inverse_mass: 1 / M_a, (6,); 0 without a mass.
+        inertial: whether there is a mass, 1 or 0, (6,).
+    """
+
+    damping: np.ndarray
+    inverse_mass: np.ndarray
+    inertial: np.ndarray
+
+    def rates(self, y_dot: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """y' and y''; without a mass the first follows from the wrench, and the second is not known."""
+        y_ddot = -(h + self.damping * y_dot) * self.inverse_mass
+        return self.inertial * y_dot - (1 - self.inertial) * h / self.damping, y_ddot
+
+    def moved(
+        self, task: Measurement, y: np.ndarray, desired: np.ndarray, wrenches: np.ndarray
+    ) -> tuple[Measurement, np.ndarray]:
+        """What was measured after it gave way, and what is felt in the desired axes, (..., 6).
+
+        Args:
+            task: what was measured.
+            y: y and y', (2, ..., 6).
+            desired: desired poses, twists, and rates of these, (3, ..., 6).
+            wrenches: internal wrenches in world axes, (..., 6).
+        """
+        axes = exp(desired[0][..., 3:])[..., None, :, :]
+        h = np.matvec(axes.mT, wrenches.reshape(*wrenches.shape[:-1], 2, 3)).reshape(wrenches.shape)
+        Y = _in_world(axes, desired, np.stack((y[0], *self.rates(y[1], h))))
+        error, rates = task.error + Y[:2], task.rates + self.inertial * Y[1:]
+        found = task.motion, error, rates, task.J, task.J_inv, task.J_dot, task.inversion
+        return Measurement(*found), h
+
+
 class BoundAdmittance:
     """`Admittance` with the adaptation of a cell: its z is the adaptation's, and behind it y and y', (n, 6).
 
     Attributes:
         mass, damping: M_a and D_a of the six directions, (6,).
+        giving: the same for the equations.
     """
 
     def __init__(self, adaptation: Any, mass: np.ndarray, damping: np.ndarray):
         self.adaptation, self.mass, self.damping = adaptation, mass, damping
         self._first = adaptation.start()
         self._Z = self._first.shape[1]
-        self._inertial = mass > 0
-        self._inverse_mass = np.where(self._inertial, 1 / np.where(self._inertial, mass, 1.0), 0.0)
+        inertial = (mass > 0).astype(float)
+        self.giving = Giving(damping, inertial / np.where(mass > 0, mass, 1.0), inertial)
 
     # -- what gives way -----------------------------------------------------------------------------------
 
@@ -111,17 +149,7 @@ class BoundAdmittance:
         Raises:
             InputError: nobody measured wrenches.
         """
-        y, y_dot = self.given_way(z)
-        h = np.vecmat(_felt(wrenches).reshape(-1, 2, 3), _axes(reference)[:, None]).reshape(-1, 6)
-        Y = _in_world(reference, np.stack((y, *self._rates(y_dot, h))))
-        error, rates = task.error + Y[:2], task.rates + np.where(self._inertial, Y[1:], 0.0)
-        found = task.motion, error, rates, task.J, task.J_inv, task.J_dot, task.inversion
-        return Measurement(*found), h
-
-    def _rates(self, y_dot: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """y' and y''; without a mass the first follows from the wrench, and the second is not known."""
-        y_ddot = -(h + self.damping * y_dot) * self._inverse_mass
-        return np.where(self._inertial, y_dot, -h / self.damping), y_ddot
+        return self.giving.moved(task, self.given_way(z), reference.desired, _felt(wrenches))
 
     # -- the adaptation, with y and y' behind its state ---------------------------------------------------
 
@@ -134,7 +162,7 @@ class BoundAdmittance:
     def rate(self, z: np.ndarray, seen: Seen) -> np.ndarray:
         h = _felt(seen.wrench)
         learned = self.adaptation.rate(z[:, : self._Z], seen)
-        return np.concatenate((learned, *self._rates(self.given_way(z)[1], h)), axis=1)
+        return np.concatenate((learned, *self.giving.rates(self.given_way(z)[1], h)), axis=1)
 
     def settle(self, z: np.ndarray) -> np.ndarray:
         learned = z[:, : self._Z]
@@ -167,19 +195,14 @@ def _felt(wrench: np.ndarray | None) -> np.ndarray:
     return wrench
 
 
-def _axes(reference: Reference) -> np.ndarray:
-    """R_d, (n, 3, 3)."""
-    return exp(reference.xd[:, 3:])
-
-
-def _in_world(reference: Reference, y: np.ndarray) -> np.ndarray:
-    """Y = R_d y, Y' and Y'' of y, y' and y'', (3, n, 6)."""
-    w, w_dot = reference.xd_dot[:, None, 3:], reference.xd_ddot[:, None, 3:]
-    parts = np.matvec(_axes(reference)[:, None], y.reshape(3, -1, 2, 3))
+def _in_world(axes: np.ndarray, desired: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Y = R_d y, Y' and Y'' of y, y' and y'', (3, ..., 6)."""
+    w, w_dot = desired[1:, ..., None, 3:]
+    parts = np.matvec(axes, y.reshape(*y.shape[:-1], 2, 3))
     Y, slid = parts[0], np.cross(w, parts[0])
     Y_dot = parts[1] + slid
     Y_ddot = parts[2] + np.cross(w_dot, Y) + np.cross(w, parts[1] + Y_dot)
-    return np.stack((Y, Y_dot, Y_ddot)).reshape(3, -1, 6)
+    return np.stack((Y, Y_dot, Y_ddot)).reshape(y.shape)
 
 
 def _check_cell(cell: Cell) -> None:
