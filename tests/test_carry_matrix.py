@@ -117,6 +117,8 @@ def test_every_law_carries_and_the_certificate_says_whether_a_theorem_knows_it(n
     assert certificate.theorem == THEOREMS[number]
     assert reasons(certificate) == {OBJECT, *outside}
     assert not (number and certificate.doubts)
+    alone = f"law of robots that nothing connects: {law.statement}"
+    assert alone in str(certificate)
 
 
 def test_a_law_of_pins_is_refused_where_hands_hold_poses():
