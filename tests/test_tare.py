@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from held import carried_along
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
 
 from synctrl.assembly.tare import believed_poses, disagreement, tared
+from synctrl.coupling.cell import Cell
 from synctrl.errors import InputError
 from synctrl.experiments import carry_ur5
 from synctrl.tasks.inverse_kinematics import reach
@@ -46,6 +50,19 @@ def test_after_a_tare_beliefs_agree_wherever_hands_carry_the_object_rigidly(erro
         hand = np.concatenate((p + R @ grasp.xyz, log(R @ grasp.rotation)))
         tips.append(robot.tip_pose(reach(arm, hand, q0, PoseSpace())))
     np.testing.assert_allclose(tips[0].homogeneous, tips[1].homogeneous, atol=1e-6)
+
+
+def test_a_base_that_is_thought_to_stand_turned_is_wrong_again_as_the_object_turns():
+    """Turned by b, it believes b t b^T of every turn t: off by 2 |b| sin(|t| / 2) if the axes are square."""
+    experiment, off = carry_ur5(), 0.01
+    first, second = experiment.cell.members
+    thought = second.robot.placed(rpy=(0.0, 0.0, off))
+    cell = tared(Cell([first, replace(second, robot=thought)], experiment.cell.coupling, PoseSpace()))
+    assert np.abs(disagreement(cell)).max() < 1e-12
+    turn = 0.3
+    q, _ = carried_along(experiment, np.array([0.0, 0.0, 0.0, turn, 0.0, 0.0]), np.zeros(6))
+    R = [robot.tip_pose(q_i).rotation for robot, q_i in zip(cell.robots, q, strict=True)]
+    assert np.linalg.norm(log(R[0] @ R[1].T)) == pytest.approx(2 * off * np.sin(turn / 2), rel=1e-3)
 
 
 def test_whose_belief_is_taken_over_can_be_said():

@@ -110,7 +110,8 @@ class Certificate:
             f"  w = N e* + S+ epsilon: off by {errors.identity:.1g}",
         ]
         if self.statement is not None:
-            lines.append(f"  law: {self.statement}")
+            apart = "" if self.theorem is None else " of robots that nothing connects"
+            lines.append(f"  law{apart}: {self.statement}")
         if self.theorem is not None:
             lines.append(f"  closed chain: {self.theorem}")
         if self.growth is not None:

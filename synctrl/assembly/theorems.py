@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..control.controller import Controller
+from ..control.laws.classic import BoundSlotineLi
 from ..control.laws.sun_mills import BoundSunMills
 from ..errors import InputError
 from ..tasks.pose import PoseSpace
@@ -27,6 +28,10 @@ from .tare import disagreement
 
 #: how far arms may believe the object apart and still agree, m and rad
 AGREED = 1e-6
+#: laws of the theorems: the paper's, and Slotine and Li's, which is that with beta = K_eps = 0
+PROVED = (BoundSunMills, BoundSlotineLi)
+#: when desired motions are compared, s
+ASKED = np.linspace(0.0, 1.0, 5)
 #: by how much shares may miss the object, of its largest parameter
 SHARED = 1e-4
 THEOREMS = (
@@ -84,9 +89,21 @@ class ClosedChain:
         words = []
         if not isinstance(self.plant.cell.space, PoseSpace):
             words.append("a task that is not the pose of the object that is held")
+        elif not self._one_motion():
+            words.append("arms that are not asked for one motion, or not compared by weights of 1 and -1")
         if len(self.plant.events):
             words.append("hands that take hold or let go in the middle of a run")
         return words
+
+    def _one_motion(self) -> bool:
+        """Whether all hands are told the same, and epsilon, with c_i of 1 or -1, is 0 for errors alike."""
+        cell, hands = self.controller.cell, self.plant._hands
+        references = cell.references(ASKED)
+        told = np.stack([reference.xd[hands] for reference in references])
+        weights, S = references[0].weights, cell.coupling.matrix
+        unit = not weights.move and np.array_equal(np.abs(weights.c), np.tile(np.eye(6), (cell.n, 1, 1)))
+        alike = np.abs(np.tensordot(S, weights.c, 1)).max() <= 1e-12 * np.abs(S).max()
+        return bool(unit and alike and np.ptp(told, axis=1).max() <= AGREED)
 
     def _apart(self) -> np.ndarray:
         """By how much arms that hold the object believe it apart, (6,), m and rad."""
@@ -94,7 +111,7 @@ class ClosedChain:
         return np.abs(disagreement(self.controller.cell, int(hands[0]))[hands]).max(axis=0)
 
     def _integral(self) -> list[str]:
-        """An integral that asks for a deformation, unless an admittance gives way."""
+        """An integral that asks for a deformation."""
         controller = self.controller
         apart = self._apart()
         acts = ((controller.leak < controller.Lambda) & (controller.beta > 0)).any()
@@ -128,7 +145,7 @@ class ClosedChain:
         """What no theorem knows, and what does no harm by itself."""
         controller = self.controller
         words = []
-        if not isinstance(controller.law, BoundSunMills):
+        if not isinstance(controller.law, PROVED):
             words.append(f"the law {controller.law_settings['name']} in a closed chain: no proof is known")
         if controller.admittance is None and self._apart().max() > AGREED:
             words.append("arms that do not agree on where the object is, and do not give way")
