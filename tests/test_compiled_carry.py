@@ -308,8 +308,8 @@ def test_a_fault_of_the_driver_that_carries_is_found(name, monkeypatch, tmp_path
 class Telling(CarryingPlant):
     """One that tells something else of a run, and moves as the package's own."""
 
-    def outputs_along(self, q, v, hidden, t):
-        return {"height": (hidden[:, 2], "m", ("time",))}
+    def account(self, log):
+        return {}, {"height": (log["plant_state"][:, 2], "m", ("time",))}
 
 
 class Slipping(CarryingPlant):
