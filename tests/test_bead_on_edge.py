@@ -188,11 +188,8 @@ def test_a_loop_of_ones_own_gives_the_torques_of_a_sampled_run_whoever_says_what
 class Quiet(Plant):
     """The plant of the package, which says something of its own."""
 
-    def outputs_along(self, q, v, hidden, t):
-        return {"speed": (np.abs(v).max(axis=(1, 2)), "rad/s", ("time",))}
-
-    def report(self, hidden):
-        return {"said": True}
+    def account(self, log):
+        return {"said": True}, {"speed": (np.abs(log["v"]).max(axis=(1, 2)), "rad/s", ("time",))}
 
 
 class Heavier(Quiet):

@@ -219,8 +219,9 @@ def test_what_is_told_of_wrenches_explains_how_arms_and_object_move(grasp):
     hidden[7:] = nu = 0.3 * rng.normal(size=6)
     v = np.linalg.solve(J, np.vecmat(nu, grasp_matrix(arms))[..., None])[..., 0]
     v_dot, hidden_dot = plant.move(q, v, tau, hidden)
-    rows = (part[None] for part in (q, v, hidden, np.zeros(()), tau))
-    h = plant.outputs_under(*rows)["hand_wrench"][0][0]
+    names = ("t", "q", "v", "tau", "disturbance", "plant_state")
+    at = zip(names, (np.zeros(()), q, v, tau, 0 * tau, hidden), strict=True)
+    h = plant.account({name: part[None] for name, part in at})[1]["hand_wrench"][0][0]
     for i, robot in enumerate(plant.robots):
         needed = robot.inverse_dynamics(q[i], v[i], v_dot[i]) + J[i].T @ h[i] + plant.friction(v)[i]
         np.testing.assert_allclose(needed, tau[i], atol=1e-8)

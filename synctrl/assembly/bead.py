@@ -6,6 +6,7 @@ robots move as those of any cell, and what is added here is what becomes of the 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -58,11 +59,9 @@ class BeadPlant(Plant):
         instance("carrier, frame", motion.frame, AlongEdge, "a frame AlongEdge")
         self.body, self.motion, self.pair = body, motion, pair
 
-    def outputs_along(
-        self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray, t: np.ndarray
-    ) -> dict[str, Output]:
+    def account(self, log: Mapping[str, np.ndarray]) -> tuple[dict[str, Any], dict[str, Output]]:
         """The bead and its errors, and the pose of the body with what was desired of it, all over time."""
-        (p, R, nu), (at, turned, moving) = self._seen(q, v)
+        t, ((p, R, nu), (at, turned, moving)) = log["t"], self._seen(log["q"], log["v"])
         frame: AlongEdge = self.motion.frame
         target, tangent = frame.position(t), frame.tangent(t)
         arm = np.vecmat(at - p, R)  # in the body's axes, as all below
@@ -72,7 +71,7 @@ class BeadPlant(Plant):
         apart = np.linalg.norm(np.cross(pointing, wanted), axis=1)
         laid = arm + frame.edge.stand_off * pointing
         place = "m, and a unit quaternion"
-        return {
+        outputs = {
             "object_pose": (pose_of(p, R), place, ALONG),
             "object_desired": (self._desired(t), place, ALONG),
             "bead_points": (laid[:, None], "m", AT_BEADS),
@@ -81,6 +80,7 @@ class BeadPlant(Plant):
             "bead_speed_desired": (np.vecdot(target.x_dot, tangent), "m/s", OVER_TIME),
             "normal_angle": (np.arctan2(apart, np.vecdot(pointing, wanted)), "rad", OVER_TIME),
         }
+        return self.report(log["plant_state"]), outputs
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         """What is carried, and the edge on it, as plain data."""

@@ -12,7 +12,7 @@ grasp whether its hand is closed and the rest pose of its fixture in the object'
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from itertools import compress, pairwise
 from typing import Any, Self
@@ -76,13 +76,11 @@ class HandlingPlant(CarryingPlant):
                 grip[0] = 0.0
         return q, v, after
 
-    def outputs_along(
-        self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray, t: np.ndarray
-    ) -> dict[str, Output]:
-        """Those of `CarryingPlant`, with nothing from open hands, and which hands are closed, 1 or 0."""
-        closed = hidden[:, GRIPS].reshape(len(t), -1, 8)[..., 0]
-        found = super().outputs_along(q, v, hidden, t)
-        return {**found, "hand_closed": (closed, "", ("time", "grasp"))}
+    def account(self, log: Mapping[str, np.ndarray]) -> tuple[dict[str, Any], dict[str, Output]]:
+        """That of `CarryingPlant`, with nothing from open hands, and which hands are closed, 1 or 0."""
+        report, found = super().account(log)
+        closed = log["plant_state"][:, GRIPS][:, ::8]
+        return report, {**found, "hand_closed": (closed, "", ("time", "grasp"))}
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         """The same as of `CarryingPlant`, with the windows of the grasps and where the hands closed last."""
@@ -117,14 +115,13 @@ class HandlingPlant(CarryingPlant):
         held.arms, held.turned = arms[closed], turned[closed]
         return held
 
-    def _forces_along(
-        self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def _forces(self, log: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        hidden = log["plant_state"]
         found = np.zeros((2, len(hidden), len(self.grasps), 6))
         changes = np.flatnonzero((np.diff(hidden[:, GRIPS], axis=0) != 0).any(axis=1)) + 1
         for rows in np.split(np.arange(len(hidden)), changes):
             held, closed = self._held_now(hidden[rows[0]]), hidden[rows[0], GRIPS][::8] > 0
             if closed.any():
-                forces = super(HandlingPlant, held)._forces_along(q[rows], v[rows], hidden[rows, BODY])
-                found[:, rows[:, None], np.flatnonzero(closed)] = forces
+                part = {"q": log["q"][rows], "v": log["v"][rows], "plant_state": hidden[rows, BODY]}
+                found[:, rows[:, None], np.flatnonzero(closed)] = super(HandlingPlant, held)._forces(part)
         return found[0], found[1]

@@ -6,14 +6,14 @@ With h = [h_1 .. h_n] of the forces at pins r_i, the internal ones are N h, wher
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..simulation.plant import Output
 from ..tasks.rigid_motions import deformation
-from .body import place_of
 from .grasp import Grasp, Pin
 from .plant import CarryingPlant
 
@@ -28,15 +28,13 @@ class PinnedPlant(CarryingPlant):
         InputError: as `CarryingPlant`; or grasps that are no pins.
     """
 
-    def outputs_along(
-        self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray, t: np.ndarray
-    ) -> dict[str, Output]:
-        found = super().outputs_along(q, v, hidden, t)
+    def account(self, log: Mapping[str, np.ndarray]) -> tuple[dict[str, Any], dict[str, Output]]:
+        report, found = super().account(log)
         forces, _, axes = found["hand_wrench"]
-        r = (self.arms @ place_of(hidden[:, :7])[1].mT)[..., :2]
-        flat = forces[..., :2].reshape(len(t), -1)
+        r = self._levers(log["plant_state"])[..., :2]
+        flat = forces[..., :2].reshape(len(r), -1)
         inner = np.matvec(deformation(r), flat).reshape(r.shape)
-        return {**found, "internal_force": (inner, "N", axes)}
+        return report, {**found, "internal_force": (inner, "N", axes)}
 
     # -- internals ----------------------------------------------------------------------------------------
 

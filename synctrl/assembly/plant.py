@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import NoneType
 from typing import Any
 
@@ -100,25 +100,21 @@ class CarryingPlant(Plant):
         found[self._hands] = np.matvec(grasp_matrix(levers), inner)
         return found
 
-    def outputs_along(
-        self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray, t: np.ndarray
-    ) -> dict[str, Output]:
+    def account(self, log: Mapping[str, np.ndarray]) -> tuple[dict[str, Any], dict[str, Output]]:
         """Pose, twist and desired motion of the object, and wrenches of the hands on it, all over time."""
-        return self._told(*self._forces_along(q, v, hidden), hidden, t)
-
-    def _told(self, h: np.ndarray, inner: np.ndarray, hidden: np.ndarray, t: np.ndarray) -> dict[str, Output]:
-        """`outputs_along` with the wrenches of the hands and their internal part, (T, k, 6) each."""
+        hidden, (h, inner) = log["plant_state"], self._forces(log)
         pose, nu = hidden[:, :7].copy(), hidden[:, 7:13].copy()
         pose[:, 3:] /= np.linalg.norm(pose[:, 3:], axis=1, keepdims=True)
         place, forces = "m, and a unit quaternion", "N, N·m"
         along, at_hands = ("time", "coordinate"), ("time", "grasp", "coordinate")
-        return {
+        outputs = {
             "object_pose": (pose, place, along),
             "object_twist": (nu, "m/s, rad/s", along),
-            "object_desired": (self._desired_poses(t), place, along),
+            "object_desired": (self._desired_poses(log["t"]), place, along),
             "hand_wrench": (h, forces, at_hands),
             "internal_force": (inner, forces, at_hands),
         }
+        return self.report(hidden), outputs
 
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         """What is carried, and by whom, as plain data."""
@@ -183,13 +179,12 @@ class CarryingPlant(Plant):
         *places, _ = places_on(hidden, self.arms, self.turned)
         return *fixture_wrenches(hands, places, self.K, self.D), J
 
-    def _forces_along(
-        self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def _forces(self, log: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """What the hands do to the object, and the internal part of it, (T, k, 6) each."""
-        h = np.array([self._wrenches(*row)[0] for row in zip(q, v, hidden, strict=True)])
-        h = h.reshape(len(hidden), len(self.grasps), 6)
-        return h, internal_wrenches(h, self._levers(hidden))
+        rows = zip(log["q"], log["v"], log["plant_state"], strict=True)
+        levers = self._levers(log["plant_state"])
+        h = np.array([self._wrenches(*row)[0] for row in rows]).reshape(*levers.shape[:2], 6)
+        return h, internal_wrenches(h, levers)
 
     def _object_rate(self, hidden: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
         levers = self.arms @ place_of(hidden[:7])[1].T

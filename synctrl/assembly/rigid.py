@@ -6,6 +6,7 @@ too, see `robots/rigid_chain.py`, and jump where these do.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, Protocol, Self
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..robots.rigid_chain import RigidChain
-from ..simulation.plant import Dynamics, Output
+from ..simulation.plant import Dynamics
 from .body import pose_rate
 from .forces import internal_wrenches
 from .grasp import grasp_matrix
@@ -46,18 +47,15 @@ class ChainPlant(CarryingPlant):
         v_dot, nu_dot, _ = self._moved(q, v, tau, hidden)
         return v_dot, np.concatenate((pose_rate(hidden[:7], hidden[7:]), nu_dot))
 
-    def outputs_under(
-        self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray, t: np.ndarray, tau: np.ndarray
-    ) -> dict[str, Output]:
-        """What `CarryingPlant.outputs_along` has."""
-        rows = zip(q, v, tau, hidden, strict=True)
-        wrenches = [self.at(instant)._moved(*row)[2] for instant, row in zip(t, rows, strict=True)]
-        levers = self._levers(hidden)
+    # -- internals ----------------------------------------------------------------------------------------
+
+    def _forces(self, log: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        tau, hidden = self.applied(log["tau"]) + log["disturbance"], log["plant_state"]
+        rows = zip(log["t"], log["q"], log["v"], tau, hidden, strict=True)
+        wrenches, levers = [self.at(t)._moved(*row)[2] for t, *row in rows], self._levers(hidden)
         about_origin = np.array(wrenches).reshape(*levers.shape[:2], 6)
         h = np.linalg.solve(grasp_matrix(levers), about_origin[..., None])[..., 0]
-        return self._told(h, internal_wrenches(h, levers), hidden, t)
-
-    # -- internals ----------------------------------------------------------------------------------------
+        return h, internal_wrenches(h, levers)
 
     @cached_property
     def _mover(self) -> Mover:

@@ -50,7 +50,7 @@ INVERSES = (Inverse, Pseudoinverse, DampedInverse)
 #: numbers of the state of an object that is carried
 BODY = 13
 #: what a plant may say of a run without moving otherwise for it
-TELLS = frozenset({"outputs", "outputs_along", "report", "account"})
+TELLS = frozenset({"outputs", "report", "account"})
 COMPILED_BEFORE = "its equations were compiled before"
 #: modules whose functions the parts of a closed loop call, beside those of their own
 LINES = (law, algebra, rotations, grasp)

@@ -72,18 +72,17 @@ class Plant:
     - `events` and `meet`: instants at which its state moves at once, by an impact or a catch, and how;
     - `move`: accelerations and the rate of that state, (k,), both finite and without side effects, for a
       method asks at states where the run never comes; what the package's plant does is `super().move(...)`;
-    - `outputs`: arrays over time that the result gets beside those of every run, with units and axes; or
-      `outputs_along`, if the motion of the robots is needed for them, or `account`, if more is;
+    - `outputs`: arrays over time that the result gets beside those of every run, with units and axes;
     - `felt`: the internal wrenches that hands measure, if any do;
     - `chain`: what is proved if the robots hold one object together;
     - `longest_step`: how long a step of "rk4" may be, if that is known beforehand;
     - `report`: what `result.info` says of the state in plain data;
-    - `outputs_under` in the place of `outputs_along`, if torque is needed for outputs too.
+    - `account`: both of these, if more of the log than that state is needed for them.
 
     Nothing else is asked of it. The state is logged as `outputs["plant_state"]`, so that a run can be gone
     through again; a certificate names the plant beside the power of what it does and the model does not.
-    The compiled engine takes a subclass that only tells, by `outputs`, `outputs_along`, `report` and
-    `account`, and refuses others by name.
+    The compiled engine takes a subclass that only tells, by `outputs`, `report` and `account`, and refuses
+    others by name.
 
     Args:
         cell: the robots, with their true parameters and friction.
@@ -220,41 +219,18 @@ class Plant:
         """
         return {}
 
-    def outputs_along(
-        self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray, t: np.ndarray
-    ) -> dict[str, Output]:
-        """`outputs` of a plant that needs the motion of the robots for them; by default those of `outputs`.
-
-        Args:
-            q, v: joint positions and velocities, (T, n, nv).
-            hidden: the plant's own state, (T, size of the state).
-            t: the logged instants, (T,), s.
-        """
-        return self.outputs(hidden)
-
-    def outputs_under(
-        self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray, t: np.ndarray, tau: np.ndarray
-    ) -> dict[str, Output]:
-        """`outputs_along` of a plant that needs torque for them; by default those of `outputs_along`.
-
-        Args:
-            q, v, hidden, t: see `outputs_along`.
-            tau: torque that reached the joints, with that from outside, (T, n, nv), N·m.
-        """
-        return self.outputs_along(q, v, hidden, t)
-
     def report(self, hidden: np.ndarray) -> dict[str, Any]:
         """What a result says of the plant's own state at its logged instants, (T, size of the state)."""
         return {}
 
     def account(self, log: Mapping[str, np.ndarray]) -> tuple[dict[str, Any], dict[str, Output]]:
-        """`report` and `outputs_along` together, of a plant that needs more of the log for them.
+        """What a result says and gets at its logged instants: `report` and `outputs`, of more of the log.
 
         Args:
-            log: arrays of `Result` by name, those that its adaptation adds, and "plant_state".
+            log: arrays of `Result` by name, those that its adaptation adds, and "plant_state"; the torque
+                that reached the joints is `applied(log["tau"]) + log["disturbance"]`.
         """
-        hidden = log["plant_state"]
-        return self.report(hidden), self.outputs_along(log["q"], log["v"], hidden, log["t"])
+        return self.report(log["plant_state"]), self.outputs(log["plant_state"])
 
     # -- internals ----------------------------------------------------------------------------------------
 
