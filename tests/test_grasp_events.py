@@ -235,6 +235,23 @@ def test_hands_that_never_open_make_the_plant_that_carries(gantries):
         np.testing.assert_allclose(handled.outputs[name], carried.outputs[name], atol=1e-9)
 
 
+def test_an_open_hand_feels_nothing_and_closed_ones_what_they_would_without_events(gantries):
+    grasps = [Grasp(0, None, None, SOFT), Grasp(1, None, None, SOFT, until=0.1)]
+    experiment = handling(gantries, grasps)
+    plant, q, v = experiment.closed_loop().plant, gantries.cell.q0, gantries.cell.v0
+    closed = [Grasp(i, None, None, SOFT) for i in range(2)]
+    carried = CarryingPlant(gantries.cell, **{**experiment.plant_type.keywords, "grasps": closed})
+    moved = plant.hidden0.copy()
+    moved[:13] += 1e-2
+    expected = carried.felt(q, v, moved[:13])
+    assert np.abs(expected).max() > 1e-2
+    np.testing.assert_allclose(plant.felt(q, v, moved), expected, atol=1e-9)
+    opened = plant.meet(0.1, q, v, moved)[2]
+    assert np.abs(plant.felt(q, v, opened)).max() < 1e-9  # one hand alone deforms nothing
+    nobody = handling(gantries).closed_loop().plant
+    assert not nobody.felt(q, v, nobody.hidden0).any()
+
+
 def test_a_step_has_to_do_for_hands_that_close_later_too(gantries):
     always = [Grasp(grasp.robot, compliance=SOFT) for grasp in WINDOWS]
     later, first = (handling(gantries, some).closed_loop() for some in (WINDOWS, always))
