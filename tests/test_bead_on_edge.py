@@ -17,6 +17,9 @@ from synctrl.analysis import certify
 from synctrl.analysis.gain_condition import gain_condition_in_box
 from synctrl.assembly.bead import BeadPlant
 from synctrl.compiled.engine import Compiled, Tables
+from synctrl.control.adaptation import Gradient
+from synctrl.control.admittance import Admittance
+from synctrl.control.network import Ideal
 from synctrl.coupling.cell import Cell, Reference
 from synctrl.errors import InputError, NonFiniteError
 from synctrl.experiments import bead_on_edge
@@ -185,6 +188,12 @@ def test_a_loop_of_ones_own_gives_the_torques_of_a_sampled_run_whoever_says_what
         controller.step(run.t[-1], run.q[-1], run.v[-1], desired[:3])
 
 
+def test_an_admittance_is_refused_where_errors_count_at_what_slides():
+    cell = made().cell
+    with refused(InputError, "space", found="SlidingSpace"):
+        Admittance().bind(cell, Gradient(GAINS.Gamma).bind(cell), Ideal().bind(cell))
+
+
 class Quiet(Plant):
     """The plant of the package, which says something of its own."""
 
@@ -251,6 +260,7 @@ def measured(experiment: Experiment, engine: Compiled) -> list[float]:
 def test_the_table_of_the_page_is_what_runs_give_and_synchronization_keeps_the_bead_on_the_edge():
     pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
     page = (Path(__file__).parents[1] / "docs" / "assembly.md").read_text("utf-8")
+    page = page.partition("\n## A bead on a moving edge\n")[2]
     experiment, engine = bead_on_edge(), Compiled({}, Tables())  # what is desired is tabulated once
     rows = {name: measured(replace(experiment, gains=gains), engine) for name, gains in CASES.items()}
     for name, found in rows.items():

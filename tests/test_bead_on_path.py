@@ -18,10 +18,13 @@ from synctrl.analysis.replay import replay
 from synctrl.assembly.meeting import MeetingPlant, lag_of_friction
 from synctrl.control.adaptation import Gradient, Override, Paced
 from synctrl.control.adaptation.protocol import check_still
+from synctrl.control.admittance import Admittance
+from synctrl.control.network import Ideal
 from synctrl.coupling.cell import Cell, Reference
 from synctrl.errors import GainWarning, InputError
-from synctrl.experiments import bead_on_path, planar_four
+from synctrl.experiments import bead_on_path, carry_ur5, planar_four
 from synctrl.experiments.bead_on_path import GAINS, MODES
+from synctrl.tasks.sliding import SlidingSpace
 
 EAGER = Override(scale=2e-4)  # so small that what wrong estimates do to a start is enough to be waited for
 
@@ -295,6 +298,11 @@ def test_an_override_needs_motions_that_know_their_lag_and_nobody_else_who_moves
         bead_on_path(override=True, network=Posted(0.01))
     with refused(InputError, "adaptation", found="Paced"):
         check_still("Hedged", Paced(learning, Override()), Paced(learning, Override()).bind(cell))
+    with refused(InputError, "space", found="SlidingSpace"):
+        Paced(learning, Override()).bind(Cell(cell.members, cell.coupling, SlidingSpace()))
+    carried, paced = carry_ur5().cell, Paced(learning, Override()).bind(cell)
+    with refused(InputError, "adaptation", found="BoundPaced"):
+        Admittance().bind(carried, paced, Ideal().bind(carried))
 
 
 def test_a_motion_that_a_caller_gives_is_refused_where_the_adaptation_has_its_own():

@@ -24,6 +24,7 @@ from ..tasks.measurement import Measurement
 from ..tasks.pose import PoseSpace
 from ..tasks.rotations import exp
 from .adaptation import BoundAdaptation, Seen, after_sample
+from .adaptation.protocol import check_still, check_three_rows
 
 
 class Admittance:
@@ -56,13 +57,16 @@ class Admittance:
             adaptation, network: for its robots.
 
         Raises:
-            InputError: another space than that of poses, weights other than the identity or minus it, an
-                adaptation that moves the desired motion too, or a network whose messages would tell of
-                errors that do not give way.
+            InputError: another space than that of poses, or one in which errors count at points that slide;
+                weights other than the identity or minus it; an adaptation that moves or slows down the
+                desired motion too; or a network whose messages would tell of errors that do not give way.
         """
         _check_cell(cell)
-        _leaves_alone("adaptation", adaptation, "shift", "that leaves the desired motion alone")
-        _leaves_alone("network", network, "messages", "without messages, for example Ideal()")
+        check_still("an admittance", adaptation, adaptation)
+        if hasattr(network, "messages"):
+            words = "an admittance expects a network without messages, for example Ideal(), found"
+            name = type(network).__name__
+            raise InputError(f"{words} {name}", subject="network", found=name)
         return BoundAdmittance(adaptation, np.repeat(self.mass, 3), np.repeat(self.damping, 3))
 
     def as_dict(self) -> dict[str, Any]:
@@ -178,16 +182,9 @@ def _in_world(reference: Reference, y: np.ndarray) -> np.ndarray:
     return np.stack((Y, Y_dot, Y_ddot)).reshape(3, -1, 6)
 
 
-def _leaves_alone(role: str, part: Any, has: str, expected: str) -> None:
-    if hasattr(part, has):
-        found = type(part).__name__
-        article = "an" if role[0] in "aeiou" else "a"
-        text = f"an admittance expects {article} {role} {expected}, found {found}"
-        raise InputError(text, subject=role, found=found)
-
-
 def _check_cell(cell: Cell) -> None:
     instance("space", cell.space, PoseSpace, "PoseSpace(), in which an admittance gives way")
+    check_three_rows("an admittance", cell.space)
     weights = cell.references(np.zeros(1))[0].weights
     if weights.move or not np.array_equal(np.abs(weights.c), np.tile(np.eye(6), (cell.n, 1, 1))):
         raise InputError(

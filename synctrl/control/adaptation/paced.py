@@ -22,7 +22,7 @@ from ...checks import finite_number, instance, offers, positive_number
 from ...coupling.cell import Cell, Reference
 from ...coupling.weights import Weights
 from ...errors import InputError
-from .protocol import Adaptation, Seen, after_sample, check_still
+from .protocol import Adaptation, Seen, after_sample, check_still, check_three_rows
 
 
 @dataclass(frozen=True)
@@ -73,11 +73,12 @@ class Paced:
         """This adaptation for a cell.
 
         Raises:
-            InputError: desired motions that have no `lag`, as those along paths do, or an adaptation that
-                moves the desired motion itself.
+            InputError: desired motions that have no `lag`, as those along paths do, an adaptation that
+                moves the desired motion itself, or a space that asks for further rows of it.
         """
         inner: Any = self.adaptation.bind(cell)
         check_still("Paced", self.adaptation, inner)
+        check_three_rows("Paced", cell.space)
         motions = []
         for name, member in zip(cell.names, cell.members, strict=True):
             motion: Any = member.trajectory

@@ -136,7 +136,7 @@ def _of_desired(name: str, adaptation: Any, network: Any) -> Any:
     return found
 
 
-def check_still(who: str, adaptation: Adaptation, bound: Any) -> None:
+def check_still(who: str, adaptation: Any, bound: Any) -> None:
     """Refuse an adaptation in the care of another one if it moves the desired motion.
 
     Args:
@@ -150,6 +150,22 @@ def check_still(who: str, adaptation: Adaptation, bound: Any) -> None:
         found = type(adaptation).__name__
         expected = f"{who} expects an adaptation that leaves the desired motion alone"
         raise InputError(f"{expected}, found {found}", subject="adaptation", found=found)
+
+
+def check_three_rows(who: str, space: Any) -> None:
+    """Refuse a space that has to know more of a desired motion than its three rows, which alone are moved.
+
+    Args:
+        who: what moves them.
+        space: the space of a cell.
+
+    Raises:
+        InputError: it has `further` rows.
+    """
+    if hasattr(space, "further"):
+        found = type(space).__name__
+        expected = f"{who} expects a space in which a desired motion has three rows"
+        raise InputError(f"{expected}, found {found}", subject="space", found=found)
 
 
 class Adaptation(Protocol):
