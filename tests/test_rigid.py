@@ -28,7 +28,8 @@ from synctrl.analysis import certify
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.assembly.body import CarriedObject, place_of, pose_of
 from synctrl.assembly.grasp import Fixture, Grasp, grasp_matrix
-from synctrl.assembly.plant import CLOSED, CarryingPlant
+from synctrl.assembly.holding import CLOSED
+from synctrl.assembly.plant import CarryingPlant
 from synctrl.assembly.rigid import RigidPlant
 from synctrl.errors import InputError
 from synctrl.experiments import carry_ur5

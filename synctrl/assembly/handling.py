@@ -24,7 +24,8 @@ from ..errors import InputError
 from ..simulation.plant import Output
 from .body import place_of, pose_of
 from .grasp import Grasp
-from .plant import CarryingPlant, check_grasps
+from .holding import check_grasps
+from .plant import CarryingPlant
 
 #: where parts of the state are: pose and twist of the object, whether a hand has closed, and the grips
 BODY, LOOSE, GRIPS = slice(0, 13), 13, slice(14, None)

@@ -11,7 +11,7 @@ from .plant import CarryingPlant
 from .rigid import ChainPlant, Mover
 
 
-class JudgedPlant(ChainPlant):
+class JudgedPlant(ChainPlant, CarryingPlant):
     """`CarryingPlant` of which MuJoCo computes all: arms, object, and where the fixtures' hands are."""
 
     def _make_mover(self) -> Mover:

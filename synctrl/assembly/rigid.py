@@ -18,8 +18,8 @@ from ..simulation.plant import Dynamics
 from .body import pose_rate
 from .forces import internal_wrenches
 from .grasp import grasp_matrix
+from .holding import CLOSED, HoldingPlant
 from .judge import Motion, WeldedChain
-from .plant import CLOSED, CarryingPlant
 
 #: a hand can move in all directions if the condition of its Jacobian, in m and rad, is below this
 REGULAR = 1e4
@@ -34,8 +34,8 @@ class Mover(Protocol):
         """See `RigidChain.motion`."""
 
 
-class ChainPlant(CarryingPlant):
-    """`CarryingPlant` in which one library moves arms and object at once; which one, subclasses say."""
+class ChainPlant(HoldingPlant):
+    """`HoldingPlant` in which one library moves arms and object at once; which one, subclasses say."""
 
     def prepare(self) -> Dynamics:
         self._mover  # noqa: B018 (made here)
@@ -78,24 +78,21 @@ class ChainPlant(CarryingPlant):
 
 
 class RigidPlant(ChainPlant):
-    """`CarryingPlant` whose grasps do not give, whatever they say of their compliance.
+    """Robots that hold an object in grasps that do not give, whatever these say of their compliance.
 
     Pinocchio computes it, or MuJoCo as a judge, whose welds give a little, see `judge.py`.
 
     Raises:
-        InputError: as `CarryingPlant`; a grasp that leaves a direction free; a hand that cannot move in all
+        InputError: as `HoldingPlant`; a grasp that leaves a direction free; a hand that cannot move in all
             six; hands that do not move as one body at t = 0, to `CLOSED`; robots in different gravity.
     """
+
+    rigid = True
 
     def __init__(self, *args: Any, **options: Any):
         super().__init__(*args, **options)
         self._check_grasps()
-        del self.K, self.D  # nothing gives
         self._check_hands()
-
-    def longest_step(self, K_r: np.ndarray) -> float:
-        """Grasps that do not give set no limit."""
-        return float("inf")
 
     def felt(self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray) -> np.ndarray:
         """Nothing: wrenches here follow from the torques that a controller would make of them.
@@ -107,11 +104,6 @@ class RigidPlant(ChainPlant):
             "an admittance expects grasps that give, whose wrenches do not depend on torque, found rigid ones"
         )
         raise InputError(text, subject="admittance", found="rigid")
-
-    def report(self, hidden: np.ndarray) -> dict[str, Any]:
-        about = super().report(hidden)
-        held = [{name: grasp[name] for name in ("robot", "arm")} for grasp in about["grasps"]]
-        return {**about, "grasps": held}
 
     # -- internals ----------------------------------------------------------------------------------------
 
@@ -125,7 +117,8 @@ class RigidPlant(ChainPlant):
 
     def _check_grasps(self) -> None:
         """Refuse those, for instance pins, that let the object turn or slide in the hand."""
-        for hand, stiffness in zip(self._hands, self.K, strict=True):
+        for hand, grasp in zip(self._hands, self.grasps, strict=True):
+            stiffness = grasp.compliance.K
             if not stiffness.all():
                 text = "expected rigid grasps to hold in all six directions, found the stiffness"
                 where = f"grasps, robot '{self.cell.names[hand]}'"

@@ -41,7 +41,7 @@ class ClosedChain:
     """What theorems say of a controller on a plant whose arms hold one object.
 
     Args:
-        plant: arms and object; with rigid grasps it has no stiffness K.
+        plant: a `HoldingPlant`, arms and object.
         controller: their controller.
 
     Attributes:
@@ -55,20 +55,19 @@ class ClosedChain:
 
     def __init__(self, plant: Any, controller: Controller):
         self.plant, self.controller = plant, controller
-        self.rigid = getattr(plant, "K", None) is None
         self.warnings: tuple[str, ...] = ()
         self.outside = tuple(self._unasked())
         if not self.outside:
             self._refuse_soft_fixtures()
             self.warnings = (*self._admittance(), *self._integral())
             self.outside = (*self.warnings, *self._unknown())
-        number = 3 if controller.admittance is not None else 1 if self.rigid else 2
+        number = 3 if controller.admittance is not None else 1 if plant.rigid else 2
         self.theorem = THEOREMS[0 if self.outside else number]
 
     @cached_property
     def energies(self) -> Energies | None:
         """What the chain has in V and V'; None where that is not known, or nothing."""
-        known = not (self.rigid or self._unasked())
+        known = not (self.plant.rigid or self._unasked())
         return Energies(self.plant, self.controller) if known else None
 
     @property
@@ -138,7 +137,7 @@ class ClosedChain:
         return words
 
     def _refuse_soft_fixtures(self) -> None:
-        if self.rigid:
+        if self.plant.rigid:
             return
         plant, rate = self.plant, self.controller.Lambda - self.controller.leak
         short = rate * (self.controller.beta > 0) * plant.D - plant.K

@@ -18,8 +18,8 @@ import numpy as np
 
 from ..assembly.body import CarriedObject, with_share
 from ..assembly.grasp import Fixture, Grasp
+from ..assembly.holding import HoldingPlant
 from ..assembly.judged import fixture_plant
-from ..assembly.plant import CarryingPlant
 from ..assembly.rigid import RigidPlant
 from ..assembly.tare import tared
 from ..checks import boolean, choice, finite_array, instance
@@ -101,11 +101,11 @@ def carry_ur5(
     return replace(made, gains=leaking, plant_type=plant, admittance=yielding)
 
 
-def _held(grasp: str | Fixture) -> tuple[Fixture, Callable[..., CarryingPlant]]:
+def _held(grasp: str | Fixture) -> tuple[Fixture, Callable[..., HoldingPlant]]:
     """Fixtures, and what makes a plant that has them."""
     if isinstance(grasp, Fixture):
         return grasp, fixture_plant
-    kinds = {"compliant": fixture_plant, "rigid": RigidPlant}
+    kinds: dict[str, Callable[..., HoldingPlant]] = {"compliant": fixture_plant, "rigid": RigidPlant}
     return Fixture(), kinds[choice("grasp", grasp, tuple(kinds))]
 
 
