@@ -16,7 +16,7 @@ from ..coupling.cell import Cell
 from ..errors import InputError
 from ..simulation.plant import Output, Plant
 from ..tasks.edge import AlongEdge
-from ..tasks.measurement import Tips
+from ..tasks.measurement import poses_over_time
 from ..tasks.rotations import exp
 from ..tasks.sliding import Carrier
 from .body import CarriedObject, pose_of
@@ -61,7 +61,8 @@ class BeadPlant(Plant):
 
     def account(self, log: Mapping[str, np.ndarray]) -> tuple[dict[str, Any], dict[str, Output]]:
         """The bead and its errors, and the pose of the body with what was desired of it, all over time."""
-        t, ((p, R, nu), (at, turned, moving)) = log["t"], self._seen(log["q"], log["v"])
+        t, seen = log["t"], poses_over_time(self.cell.robots, log["q"], log["v"])
+        (p, R, nu), (at, turned, moving) = ([part[:, i] for part in seen] for i in self.pair)
         frame: AlongEdge = self.motion.frame
         target, tangent = frame.position(t), frame.tangent(t)
         arm = np.vecmat(at - p, R)  # in the body's axes, as all below
@@ -96,20 +97,6 @@ class BeadPlant(Plant):
         return {"object": self.body.as_dict(), "edge": about}
 
     # -- internals ----------------------------------------------------------------------------------------
-
-    def _seen(self, q: np.ndarray, v: np.ndarray) -> list[tuple[np.ndarray, ...]]:
-        """Positions, orientations and twists over time of the body and of the nozzle."""
-        tips = Tips(self.cell.robots)
-        found = []
-        for q_t, v_t in zip(q, v, strict=True):
-            (p, _), R, J, _ = tips.poses(q_t, v_t)
-            found.append((p[self.pair], R[self.pair], np.matvec(J, v_t)[self.pair]))
-        shapes = (3,), (3, 3), (6,)
-        rows = [
-            np.array([row[k] for row in found]).reshape(-1, 2, *shape).copy()
-            for k, shape in enumerate(shapes)
-        ]
-        return [tuple(part[:, i] for part in rows) for i in range(2)]
 
     def _desired(self, t: np.ndarray) -> np.ndarray:
         x = self.motion(t).x

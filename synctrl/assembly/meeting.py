@@ -18,11 +18,11 @@ from ..errors import InputError
 from ..robots.friction import friction_torque
 from ..simulation.plant import Output, Plant
 from ..tasks.inverse_kinematics import reach
-from ..tasks.measurement import Tips
+from ..tasks.measurement import poses_over_time
 from ..tasks.path import AlongPath
 
 #: axes of outputs
-OVER_TIME, AT_BEADS, ALONG = ("time",), ("time", "bead"), ("time", "bead", "coordinate")
+OVER_TIME, BY_BEAD, AT_BEADS = ("time",), ("time", "bead"), ("time", "bead", "coordinate")
 #: points of the path in the report of a run
 OUTLINE = 101
 
@@ -53,29 +53,22 @@ class MeetingPlant(Plant):
     def account(self, log: Mapping[str, np.ndarray]) -> tuple[dict[str, Any], dict[str, Output]]:
         """Beads, their errors and speeds, the gap between them, and where and when they met."""
         t, phase, feed = log["t"], log.get("phase", log["t"]), log.get("feed", np.ones_like(log["t"]))
-        x, x_dot = self._tips(log["q"], log["v"])
+        x, _, twists = poses_over_time(self.cell.robots, log["q"], log["v"])
         s_d, speed = (np.stack([motion.way(phase)[k][:, 0] for motion in self.motions], 1) for k in (0, 1))
         s, desired = self.path.project(x, s_d), self.path.at(s_d)
         forward = np.sign(self._ends() - s_d[:1]) if len(t) else speed
-        moved = forward * np.vecdot(self.path.at(s).tangent, x_dot)
+        moved = forward * np.vecdot(self.path.at(s).tangent, twists[..., :3])
         gap_error = np.diff(s - s_d, axis=1)[:, 0]
         outputs = {
-            "bead_points": (x, "m", ALONG),
-            "bead_error": (np.vecmat(x - desired.position, desired.axes), "m", ALONG),
-            "bead_speed": (moved, "m/s", AT_BEADS),
-            "speed_error": (moved - forward * speed * feed[:, None], "m/s", AT_BEADS),
+            "bead_points": (x, "m", AT_BEADS),
+            "bead_error": (np.vecmat(x - desired.position, desired.axes), "m", AT_BEADS),
+            "bead_speed": (moved, "m/s", BY_BEAD),
+            "speed_error": (moved - forward * speed * feed[:, None], "m/s", BY_BEAD),
             "gap_error": (gap_error, "m", OVER_TIME),
         }
         return {"path": self._about(), "meeting": self._meeting(t, phase, s, gap_error)}, outputs
 
     # -- internals ----------------------------------------------------------------------------------------
-
-    def _tips(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Positions and velocities of the nozzles over time, (T, 2, 3) each."""
-        tips = Tips(self.cell.robots)
-        found = [tips.positions(*row)[0].copy() for row in zip(q, v, strict=True)]
-        both = np.array(found).reshape(-1, 2, 2, 3)
-        return both[:, 0].copy(), both[:, 1].copy()
 
     def _ends(self) -> np.ndarray:
         return np.array([motion.way(self.duration).x[0] for motion in self.motions])

@@ -73,6 +73,23 @@ class Tips:
         return motion, R, J, J_dot
 
 
+def poses_over_time(
+    robots: Sequence[Robot], q: np.ndarray, v: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions, (T, n, 3), orientations, (T, n, 3, 3), and twists, (T, n, 6), of tips, in world axes.
+
+    Args:
+        robots: the n robots.
+        q, v: joint positions and velocities, (T, n, nv).
+    """
+    tips, (T, n) = Tips(robots), q.shape[:2]
+    p, R, nu = np.empty((T, n, 3)), np.empty((T, n, 3, 3)), np.empty((T, n, 6))
+    for k, motion in enumerate(zip(q, v, strict=True)):
+        (p[k], _), R[k], J, _ = tips.poses(*motion)
+        nu[k] = np.matvec(J, motion[1])
+    return p, R, nu
+
+
 @dataclass(slots=True)
 class Measurement:
     """Task coordinates of all robots and their desired motion, such that e' = xd' - x'.
