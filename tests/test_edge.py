@@ -13,8 +13,9 @@ from refusals import refused
 
 from synctrl import Hold
 from synctrl.errors import InputError
-from synctrl.tasks.edge import DOWN, AlongEdge, Edge, Ramped
+from synctrl.tasks.edge import DOWN, AlongEdge, Edge
 from synctrl.tasks.rotations import log
+from synctrl.tasks.ways import RampUp
 
 SEEDS, TIMES = st.integers(0, 10_000), st.floats(0.1, 4.9)
 
@@ -136,7 +137,7 @@ def test_the_nozzle_does_not_wind_up_on_its_way_round():
 @given(seed=SEEDS, t=TIMES)
 def test_the_way_of_a_nozzle_over_time_has_the_derivatives_of_differences(seed, t):
     rng = np.random.default_rng(seed)
-    frame = AlongEdge(edge_of(rng), Ramped(rng.uniform(-0.2, 0.2), 0.5))
+    frame = AlongEdge(edge_of(rng), RampUp(rng.uniform(-0.2, 0.2), 0.5))
     t += 1e-2 * (abs(t - 0.5) < 4e-3)  # where s''' jumps
     position, turning = frame.position(t), frame.orientation(t)
     np.testing.assert_allclose(derivative(lambda t: frame.position(t).x, t), position.x_dot, atol=1e-6)
@@ -172,9 +173,9 @@ def test_the_way_of_a_nozzle_over_time_has_the_derivatives_of_differences(seed, 
             id="a corner",
         ),
         pytest.param(lambda: Edge.of(lambda u: (np.cos(u), np.sin(u)), 3.0), "points", id="half a circle"),
-        pytest.param(lambda: AlongEdge(SQUARE, Ramped(0.1, 0.5)), "edge", id="points in place of an edge"),
+        pytest.param(lambda: AlongEdge(SQUARE, RampUp(0.1, 0.5)), "edge", id="points in place of an edge"),
         pytest.param(lambda: AlongEdge(Edge(SQUARE), Hold([0, 0])), "way", id="a way of two numbers"),
-        pytest.param(lambda: Ramped(0.1, 0.0), "ramp", id="no ramp"),
+        pytest.param(lambda: RampUp(0.1, 0.0), "ramp", id="no ramp"),
     ],
 )
 def test_what_is_no_edge_and_no_motion_along_one_is_refused(make, subject):

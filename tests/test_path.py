@@ -11,9 +11,10 @@ from refusals import refused
 
 from synctrl.coupling.along_path import Gate, PathWeights
 from synctrl.errors import CouplingError, InputError, TrajectoryError
-from synctrl.tasks.path import AlongPath, Path, Ramped
+from synctrl.tasks.path import AlongPath, Path
 from synctrl.tasks.rotations import skew
 from synctrl.tasks.trajectories import FunctionTrajectory
+from synctrl.tasks.ways import Ramped
 
 H = 1e-5  # of differences
 

@@ -26,12 +26,13 @@ from ..robots.payload import holding
 from ..robots.robot import Robot
 from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
-from ..tasks.edge import AlongEdge, Edge, Ramped
+from ..tasks.edge import AlongEdge, Edge
 from ..tasks.inverse_kinematics import reach
 from ..tasks.pose import PoseSpace
 from ..tasks.poses import AxisRotation, PoseTrajectory
 from ..tasks.rotations import exp
 from ..tasks.sliding import Carrier, Rider, SlidingSpace
+from ..tasks.ways import RampUp
 from .carry import FRICTION
 from .carry import GAINS as CARRYING
 from .parts import ControllerParts, ready_experiment
@@ -75,7 +76,7 @@ def bead_on_edge(
         InputError: a value that is none of these.
     """
     boolean("friction", friction), boolean("push", push)
-    plate, frame = plate_motion(), AlongEdge(plate_edge(), Ramped(SPEED, RAMP))
+    plate, frame = plate_motion(), AlongEdge(plate_edge(), RampUp(SPEED, RAMP))
     rubs = FRICTION if friction else Friction()
     members = [_carrier(Carrier(plate, frame), rubs), _nozzle(Rider(plate, frame), rubs)]
     cell = Cell(members, Coupling.pair(), SlidingSpace(), name="UR5 pair with a bead on an edge")

@@ -27,9 +27,10 @@ from ..robots.robot import Robot
 from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
 from ..tasks.inverse_kinematics import reach
-from ..tasks.path import AlongPath, Path, Ramped
+from ..tasks.path import AlongPath, Path
 from ..tasks.pose import PoseSpace
 from ..tasks.poses import AxisRotation, PoseTrajectory
+from ..tasks.ways import Ramped
 from .carry import FRICTION
 from .carry import GAINS as CARRYING
 from .parts import ControllerParts, ready_experiment

@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, positive_number
 from ..errors import InputError
+from .ways import arc_lengths
 
-#: nodes of the quadrature between two points, and points in which a curve is drawn and looked at
-NODES, DRAWN = 8, 400
+#: points in which a curve is drawn and looked at
+DRAWN = 400
 #: steps of Newton's method from an arc length to its parameter
 STEPS = 4
 #: how far a spline through a function may miss it, as a share of its size: of a smooth one, and of any
@@ -58,7 +59,7 @@ class ClosedCurve:
         p = _closed(points)
         self._u = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1)))
         self._spline = _periodic(self._u, p)
-        self._s = np.append(0.0, np.cumsum(self._lengths(self._u[:-1], self._u[1:])))
+        self._s = np.append(0.0, np.cumsum(arc_lengths(self._spline, self._u[:-1], self._u[1:])))
         self.length = float(self._s[-1])
         _check_outline(self.outline())
 
@@ -79,13 +80,6 @@ class ClosedCurve:
         """Points at equal distances along the curve, (count, 3), m."""
         return self.at(self.length * np.arange(count) / count).p
 
-    def _lengths(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """Arc lengths from one parameter to another that is no further than the next point."""
-        x, weights = np.polynomial.legendre.leggauss(NODES)
-        half = 0.5 * (end - start)
-        speed = np.linalg.norm(self._spline(start[..., None] + half[..., None] * (1 + x), 1), axis=-1)
-        return half * (speed * weights).sum(axis=-1)
-
     def _parameter(self, s: np.ndarray) -> np.ndarray:
         """u at arc lengths s, by Newton's method from the point before."""
         s = s % self.length
@@ -93,7 +87,7 @@ class ClosedCurve:
         start, left = self._u[piece], s - self._s[piece]
         u = start + left / (self._s[piece + 1] - self._s[piece]) * (self._u[piece + 1] - start)
         for _ in range(STEPS):
-            missed = self._lengths(start, u) - left
+            missed = arc_lengths(self._spline, start, u) - left
             u = u - missed / np.linalg.norm(self._spline(u, 1), axis=-1)
         return u
 

@@ -18,12 +18,13 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_number, instance, non_negative_number, positive_number
+from ..checks import finite_number, instance, non_negative_number
 from ..errors import InputError
 from .closed_curve import DRAWN, ClosedCurve, sampled
-from .poses import PoseTrajectory, Turning
+from .poses import PoseTrajectory, Turning, check_dimension
 from .rotations import exp
 from .trajectories import Motion, Trajectory
+from .ways import over_time
 
 DOWN, Z = np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 1.0])
 
@@ -127,8 +128,7 @@ class AlongEdge(PoseTrajectory):
 
     def __init__(self, edge: Edge, way: Trajectory):
         instance("edge", edge, Edge, "an Edge")
-        if getattr(way, "dimension", None) != 1:
-            raise InputError.expected("a trajectory of 1 number, the arc length", way, "way")
+        check_dimension("way", way, 1)
         self.edge, self.way = edge, way
         super().__init__(_Places(edge, way), _Turns(edge, way))
 
@@ -148,41 +148,13 @@ class _Places(_Along):
     dimension = 3
 
     def __call__(self, t: ArrayLike) -> Motion:
-        s, speed, faster = self.way(t)
-        rho, rho_s, rho_ss = self.edge.nozzle(s[..., 0])[:3]
-        return Motion(rho, rho_s * speed, rho_ss * speed**2 + rho_s * faster)
+        way = self.way(t)
+        rho, *by_length = self.edge.nozzle(way[0][..., 0])[:3]
+        return Motion(rho, *over_time(way, *by_length))
 
 
 class _Turns(_Along):
     def __call__(self, t: ArrayLike) -> Turning:
-        s, speed, faster = self.way(t)
-        R, w, w_s = self.edge.nozzle(s[..., 0])[3:]
-        return Turning(R, w * speed, w_s * speed**2 + w * faster)
-
-
-class Ramped:
-    """From rest to a constant speed by a raised cosine; a trajectory of one number.
-
-    Args:
-        speed: in the end, m/s.
-        ramp: how long it takes, s.
-
-    Raises:
-        InputError: no number, or a ramp that is not positive.
-    """
-
-    dimension = 1
-
-    def __init__(self, speed: float, ramp: float):
-        self.speed, self.ramp = finite_number("speed", speed), positive_number("ramp", ramp)
-        self.breaks = (self.ramp,)
-
-    def __call__(self, t: ArrayLike) -> Motion:
-        t, T = np.asarray(t, dtype=float)[..., None], self.ramp
-        early = np.minimum(t, T)
-        angle, half = np.pi * early / T, 0.5 * self.speed
-        return Motion(
-            half * (early - T / np.pi * np.sin(angle)) + self.speed * np.maximum(t - T, 0.0),
-            half * (1 - np.cos(angle)),
-            half * np.pi / T * np.sin(angle) * (t < T),
-        )
+        way = self.way(t)
+        R, *by_length = self.edge.nozzle(way[0][..., 0])[3:]
+        return Turning(R, *over_time(way, *by_length))

@@ -13,9 +13,11 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import count, finite_array, finite_number, instance, positive_number
-from ..errors import InputError, TrajectoryError
+from ..checks import count, finite_array, finite_number, instance
+from ..errors import TrajectoryError
+from .poses import check_dimension
 from .trajectories import Motion, Trajectory
+from .ways import arc_lengths, over_time
 
 #: degree of the spline, three derivatives of which are continuous once it goes by arc length
 DEGREE = 5
@@ -169,15 +171,13 @@ class AlongPath:
 
     def __init__(self, path: Path, way: Trajectory):
         instance("path", path, Path, "a Path")
-        if getattr(way, "dimension", None) != 1:
-            raise InputError.expected("a trajectory of one number", getattr(way, "dimension", None), "way")
+        check_dimension("way", way, 1)
         self.path, self.way, self.breaks = path, way, tuple(way.breaks)
 
     def __call__(self, t: ArrayLike) -> Motion:
-        s, speed, growth = self.way(t)
-        place = self.path.at(s[..., 0])
-        t_hat = place.tangent
-        return Motion(place.position, speed * t_hat, growth * t_hat + speed**2 * place.bend)
+        way = self.way(t)
+        place = self.path.at(way[0][..., 0])
+        return Motion(place.position, *over_time(way, place.tangent, place.bend))
 
     def lag(self, t: float, position: np.ndarray) -> float:
         """How far a position, (3,), next to the path is behind where it should be at t, s: m along the path.
@@ -186,41 +186,6 @@ class AlongPath:
         """
         s, speed, _ = (float(part[0]) for part in self.way(t))
         return float(np.sign(speed)) * (s - float(self.path.project(position, s)))
-
-
-class Ramped:
-    """Along a line from rest to rest, at one speed but for ramps by raised cosines; then held.
-
-    Args:
-        start, end: numbers, m.
-        duration: of the way, s.
-        ramp: how long it takes to get up to speed, and to come to rest, s; up to half of the duration.
-
-    Raises:
-        InputError: no numbers, a duration or ramp that is not positive, or a ramp that is too long.
-    """
-
-    dimension = 1
-
-    def __init__(self, start: float, end: float, duration: float, ramp: float):
-        self.start, self.end = finite_number("start", start), finite_number("end", end)
-        self.duration, self.ramp = positive_number("duration", duration), positive_number("ramp", ramp)
-        if self.ramp > self.duration / 2:
-            raise InputError.expected(f"at most half of {self.duration:g} s", self.ramp, "ramp")
-        self.breaks = (0.0, self.ramp, self.duration - self.ramp, self.duration)
-        self.speed = (self.end - self.start) / (self.duration - self.ramp)
-
-    def __call__(self, t: ArrayLike) -> Motion:
-        now = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
-        late = now > self.duration / 2
-        near = np.where(late, self.duration - now, now)  # to the closer end, s
-        x = np.minimum(near, self.ramp)
-        k = np.pi / self.ramp
-        gone = near - x + 0.5 * (x - np.sin(k * x) / k)
-        s = np.where(late, self.end - self.speed * gone, self.start + self.speed * gone)
-        speed = 0.5 * self.speed * (1 - np.cos(k * x))
-        growth = np.where(late, -0.5, 0.5) * self.speed * k * np.sin(k * x)
-        return Motion(s[..., None], speed[..., None], growth[..., None])
 
 
 # -- internals ---------------------------------------------------------------------------------------------
@@ -232,12 +197,8 @@ def _by_length(points: np.ndarray) -> tuple[Any, np.ndarray]:
 
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     curve = make_interp_spline(np.append(0.0, np.cumsum(chords)), points, k=DEGREE)
-    nodes, weights = np.polynomial.legendre.leggauss(12)
     edges = np.linspace(0.0, chords.sum(), max(NODES, len(points)))
-    half = 0.5 * np.diff(edges)[:, None]
-    inside = edges[:-1, None] + half * (1 + nodes)
-    pieces = half[:, 0] * (np.linalg.norm(curve(inside, 1), axis=-1) @ weights)
-    lengths = np.append(0.0, np.cumsum(pieces))
+    lengths = np.append(0.0, np.cumsum(arc_lengths(curve, edges[:-1], edges[1:])))
     return make_interp_spline(lengths, curve(edges), k=DEGREE), lengths
 
 
