@@ -24,6 +24,7 @@ from synctrl.paper.bodies import bodies_are_left, bodies_of, bodies_section
 from synctrl.paper.carry_task import CARRY
 from synctrl.paper.claims import Claim
 from synctrl.paper.claims_of_cells import a460_claims, own_findings, planar_four_claims
+from synctrl.paper.edge_task import EDGE
 from synctrl.paper.fairness import another_law_does_better, fair_section
 from synctrl.paper.judge import judge_section
 from synctrl.paper.paper_sections import (
@@ -33,6 +34,7 @@ from synctrl.paper.paper_sections import (
     planar_section,
     trial_section,
 )
+from synctrl.paper.path_task import PATH
 from synctrl.paper.plant_sections import (
     friction_section,
     full_a460_section,
@@ -55,8 +57,8 @@ ANIMATED = (
     "planar_four_synchronized_disturbed",
     "planar_four_independent_disturbed",
 )
-#: the tasks of the paper's introduction, with forces
-TASKS = (CARRY,)
+#: the tasks of the paper's introduction
+TASKS = (CARRY, EDGE, PATH)
 TRIAL = 1.0  # s
 #: the run whose estimated bodies are drawn
 BODIES = "a460_pair_synchronized"

@@ -114,6 +114,11 @@ def kind(run: Result) -> str:
     return "synchronized" if np.any(run.info["gains"]["beta"]) else "independent"
 
 
+def findings(name: str, values: Iterable[float], unit: str, who: Iterable[str]) -> list[Finding]:
+    """The same figure of several runs, each with the words for its run."""
+    return [Finding(f"{name}, {each}", value, unit) for each, value in zip(who, values, strict=True)]
+
+
 def late(e: np.ndarray) -> np.ndarray:
     """Largest |e| over the last tenth of the instants, per row and axis."""
     return np.abs(e[-max(1, len(e) // 10) :]).max(axis=0)

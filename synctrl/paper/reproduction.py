@@ -16,7 +16,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any, Self
 
-from ..errors import SimulationError, StepWarning
+from ..errors import GainWarning, SimulationError, StepWarning
 from ..experiments.a460_pair import a460_full_pair, a460_pair
 from ..experiments.planar_four import GAINS, planar_four
 from ..files import reported
@@ -134,7 +134,8 @@ def _work(name: str, run: PlannedRun, folder: Path) -> Path:
     try:
         progress = _reporter(name, duration)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", StepWarning)  # the page has a section on steps
+            for known in (StepWarning, GainWarning):  # what the page has sections on
+                warnings.simplefilter("ignore", known)
             made = experiment.simulate(
                 duration, run.dt, plant=run.plant, log_dt=run.log_dt, progress=progress
             )

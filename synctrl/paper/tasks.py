@@ -117,3 +117,9 @@ def _table(task: Task, runs: Mapping[str, Result]) -> Table:
 def root_mean_square(values: np.ndarray) -> float:
     """Root of the average over instants of equal distance of squared lengths, of (T,) or (T, k)."""
     return float(np.sqrt(np.mean(np.sum(values.reshape(len(values), -1) ** 2, axis=1))))
+
+
+def since_push(run: Result, values: np.ndarray) -> np.ndarray:
+    """Values over time, (T, ...), from the first disturbance on; the last one if the run ends before."""
+    start = min(each["start"] for each in run.info["disturbances"])
+    return values[run.t >= min(start, run.t[-1])]
