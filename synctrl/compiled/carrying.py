@@ -15,6 +15,7 @@ import numpy as np
 from ..assembly.body import Inertia, body_rate, place_of
 from ..assembly.forces import internal_wrenches
 from ..assembly.grasp import fixture_wrenches, grasp_matrix, places_on
+from ..assembly.handling import LOOSE, HandlingPlant
 from ..assembly.plant import CarryingPlant
 from ..robots.mechanism import mechanism
 from ..robots.robot import Robot
@@ -65,23 +66,29 @@ def object_function(name: str) -> Any:
     signature = FUNCTIONS["object"]
     given = {key: ca.SX.sym(key, columns(key, {})) for key in signature.inputs}
     body, lift, row = (array_of(given[key], -1) for key in signature.inputs)
-    mass, com, inertia, gravity = np.split(row, (1, 4, 13))
+    mass, com, inertia, gravity, loose = np.split(row, (1, 4, 13, 16))
     of = Inertia(mass, com, inertia.reshape(3, 3))
-    rate = body_rate(of, body, lift, gravity, _solve)
+    rate = loose * body_rate(of, body, lift, gravity, _solve)
     return function_of(name, signature, given, {"body_dot": rate})
 
 
 def carrying_constants(plant: Plant) -> dict[str, np.ndarray]:
-    """Quantities that do not change while an object is carried; rows without entries where none is."""
+    """Quantities of an object that is carried, at the start; rows without entries where none is."""
     if not isinstance(plant, CarryingPlant):
         none = {name: np.zeros((plant.cell.n, 0)) for name in ("tool", "true_tool", "grasp")}
         return {**none, "inertia": np.zeros((0, columns("inertia", {})))}
     return {
         "tool": _tools(plant.cell.robots),
         "true_tool": _tools(plant.schedule.free),
-        "grasp": _grasps(plant),
-        "inertia": _inertia(plant),
+        **held_constants(plant, plant.hidden0),
     }
+
+
+def held_constants(plant: CarryingPlant, hidden: np.ndarray) -> dict[str, np.ndarray]:
+    """Those that change when hands close or open, in a state of the plant's own."""
+    if not isinstance(plant, HandlingPlant):
+        return {"grasp": _grasps(plant), "inertia": _inertia(plant, 1.0)}
+    return {"grasp": _grasps(plant._held_now(hidden)), "inertia": _inertia(plant, hidden[LOOSE])}
 
 
 def giving_constants(loop: ClosedLoop) -> dict[str, np.ndarray]:
@@ -99,8 +106,9 @@ def _tools(robots: Sequence[Robot]) -> np.ndarray:
 
 
 def _grasps(plant: CarryingPlant) -> np.ndarray:
-    """Places and axes of the hands on the object, K and D, (n, 24); zeros for robots that hold nothing."""
+    """Places and axes of the hands on the object, K and D, (n, 24); no K and D for hands that are open."""
     rows = np.zeros((plant.cell.n, columns("grasp", {"hand": 1})))
+    rows[:, 3:12] = np.eye(3).ravel()
     parts = plant.arms, plant.turned.reshape(-1, 9), plant.K, plant.D
     rows[[grasp.robot for grasp in plant.grasps]] = np.concatenate(parts, axis=1)
     return rows
@@ -121,10 +129,10 @@ def _shares(plant: CarryingPlant) -> np.ndarray:
     return rows
 
 
-def _inertia(plant: CarryingPlant) -> np.ndarray:
-    """Mass, centre of mass and inertia of the object, and gravity, (1, 16)."""
-    body = plant.body
-    return np.concatenate(([body.mass], body.com, body.inertia.ravel(), plant.robots[0].gravity_vector))[None]
+def _inertia(plant: CarryingPlant, loose: float) -> np.ndarray:
+    """Mass, centre of mass and inertia of the object, gravity, and whether it is loose, (1, 17)."""
+    body, gravity = plant.body, plant.robots[0].gravity_vector
+    return np.concatenate(([body.mass], body.com, body.inertia.ravel(), gravity, [loose]))[None]
 
 
 def _solve(M: np.ndarray, b: np.ndarray) -> np.ndarray:
