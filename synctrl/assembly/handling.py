@@ -62,6 +62,12 @@ class HandlingPlant(CarryingPlant):
         v_dot, rate = super(HandlingPlant, self._held_now(hidden)).move(q, v, tau, hidden[BODY])
         return v_dot, np.concatenate((hidden[LOOSE] * rate, np.zeros(hidden.size - rate.size)))
 
+    def felt(self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray) -> np.ndarray:
+        """As of `CarryingPlant`, with nothing from open hands."""
+        held = self._held_now(hidden)
+        none = np.zeros((len(q), 6))
+        return super(HandlingPlant, held).felt(q, v, hidden[BODY]) if held.grasps else none
+
     def meet(
         self, t: float, q: np.ndarray, v: np.ndarray, hidden: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

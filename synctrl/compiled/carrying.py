@@ -20,7 +20,6 @@ from ..assembly.plant import CarryingPlant
 from ..robots.mechanism import mechanism
 from ..robots.robot import Robot
 from ..simulation.closed_loop import ClosedLoop
-from ..simulation.plant import Plant
 from ..tasks.measurement import Kinematics
 from .algebra import array_of, column_of, function_of, solve_positive
 from .quantities import FUNCTIONS, columns
@@ -72,31 +71,28 @@ def object_function(name: str) -> Any:
     return function_of(name, signature, given, {"body_dot": rate})
 
 
-def carrying_constants(plant: Plant) -> dict[str, np.ndarray]:
+def carrying_constants(loop: ClosedLoop) -> dict[str, np.ndarray]:
     """Quantities of an object that is carried, at the start; rows without entries where none is."""
+    plant, giving = loop.plant, loop.controller.admittance
     if not isinstance(plant, CarryingPlant):
-        none = {name: np.zeros((plant.cell.n, 0)) for name in ("tool", "true_tool", "grasp")}
-        return {**none, "inertia": np.zeros((0, columns("inertia", {})))}
+        none = {name: np.zeros((plant.cell.n, 0)) for name in ("tool", "true_tool", "grasp", "share")}
+        return {**none, "inertia": np.zeros((0, columns("inertia", {}))), "giving": np.zeros((1, 0))}
     return {
         "tool": _tools(plant.cell.robots),
         "true_tool": _tools(plant.schedule.free),
-        **held_constants(plant, plant.hidden0),
+        "giving": np.zeros((1, 0)) if giving is None else np.concatenate(giving.giving)[None],
+        **held_constants(loop, plant.hidden0),
     }
 
 
-def held_constants(plant: CarryingPlant, hidden: np.ndarray) -> dict[str, np.ndarray]:
+def held_constants(loop: ClosedLoop, hidden: np.ndarray) -> dict[str, np.ndarray]:
     """Those that change when hands close or open, in a state of the plant's own."""
-    if not isinstance(plant, HandlingPlant):
-        return {"grasp": _grasps(plant), "inertia": _inertia(plant, 1.0)}
-    return {"grasp": _grasps(plant._held_now(hidden)), "inertia": _inertia(plant, hidden[LOOSE])}
-
-
-def giving_constants(loop: ClosedLoop) -> dict[str, np.ndarray]:
-    """The same of an admittance; rows without entries where robots do not give way."""
-    admittance, plant = loop.controller.admittance, loop.plant
-    if admittance is None or not isinstance(plant, CarryingPlant):
-        return {"share": np.zeros((loop.cell.n, 0)), "giving": np.zeros((1, 0))}
-    return {"share": _shares(plant), "giving": np.concatenate(admittance.giving)[None]}
+    plant: Any = loop.plant
+    held, loose = plant, 1.0
+    if isinstance(plant, HandlingPlant):
+        held, loose = plant._held_now(hidden), hidden[LOOSE]
+    share = _shares(held) if loop.controller.admittance else np.zeros((plant.cell.n, 0))
+    return {"grasp": _grasps(held), "inertia": _inertia(plant, loose), "share": share}
 
 
 def _tools(robots: Sequence[Robot]) -> np.ndarray:
@@ -120,11 +116,13 @@ def _shares(plant: CarryingPlant) -> np.ndarray:
     The split is linear and the same in all directions, so it turns with the object: it is asked here what
     it makes of six unit loads in the first hand.
     """
+    rows = np.zeros((plant.cell.n, 36))
+    if not plant.grasps:
+        return rows
     G = grasp_matrix(plant.arms)
     h = np.zeros((6, *plant.arms.shape[:1], 6))
     h[:, 0] = np.linalg.inv(G[0]).T
     loads = np.matvec(G, h - internal_wrenches(h, np.broadcast_to(plant.arms, (6, *plant.arms.shape))))
-    rows = np.zeros((plant.cell.n, 36))
     rows[[grasp.robot for grasp in plant.grasps]] = loads.transpose(1, 2, 0).reshape(-1, 36)
     return rows
 

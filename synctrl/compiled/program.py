@@ -21,7 +21,7 @@ from ..simulation.guard import limits_of
 from ..simulation.plant import Plant
 from . import structs
 from .build import cached_library, content_key, require_casadi
-from .carrying import carrying_constants, giving_constants, held_constants, object_function
+from .carrying import carrying_constants, held_constants, object_function
 from .kind import Classified, Kind, classify, standing
 from .known import check_known, check_untouched
 from .plugged import learner
@@ -107,7 +107,7 @@ class CompiledLoop:
 
     def hold(self, hidden: np.ndarray) -> None:
         """Let those hands hold the object that do so in this state of the plant's own."""
-        for name, array in held_constants(self.loop.plant, hidden).items():  # type: ignore[arg-type]
+        for name, array in held_constants(self.loop, hidden).items():
             self._arrays[name][...] = array
 
     def tell(self, steps: structs.Steps, arrays: Mapping[str, np.ndarray]) -> None:
@@ -276,8 +276,7 @@ def _constants(loop: ClosedLoop, classified: Classified) -> dict[str, np.ndarray
         "gain": gain,
         "limits": plant.torque_limits,
         "bounds": np.array([[*limits_of(cell.task).values()]]),
-        **carrying_constants(plant),
-        **giving_constants(loop),
+        **carrying_constants(loop),
     }
 
 
