@@ -16,6 +16,7 @@ from test_compiled_plant import WAYS, both
 from synctrl import Cell, Coupling, Experiment, Friction, FrictionParameters, Gains, Hold, Member
 from synctrl.assembly.body import place_of
 from synctrl.assembly.grasp import grasp_matrix
+from synctrl.assembly.handling import HandlingPlant
 from synctrl.compiled import build, compiler, program
 from synctrl.compiled.carrying import _shares, felt_at_origin
 from synctrl.compiled.known import check_known
@@ -96,6 +97,21 @@ def test_arms_that_learn_otherwise_or_hold_nothing_are_beside_those_that_give_wa
     run, _ = both(three(), duration=0.01, dt=1e-3)
     y = np.abs(run.outputs["admittance"][-1]).max(axis=1)
     assert y[0] > 0 and y[1] > 0 and y[2] == 0
+
+
+def test_arms_give_way_alike_while_hands_close_and_open():
+    """Where but one hand holds the object there is no force inside: arms are slowed down by dampers alone."""
+    experiment = giving()
+    kept = experiment.plant_type.keywords
+    windows = ({"until": 0.008}, {"until": 0.005}, {"since": 0.012, "xyz": None, "rotation": None})
+    grasps = [replace(kept["grasps"][i], **window) for i, window in zip((0, 1, 1), windows, strict=True)]
+    plant = partial(HandlingPlant, **{**kept, "grasps": grasps})
+    run, _ = both(replace(experiment, plant_type=plant), duration=0.015, dt=1e-3)
+    y_dot = run.outputs["adaptation_state"][..., -6:]
+    slowing = np.exp(-1e-3 * LIGHT.damping / LIGHT.mass).repeat(3)
+    alone = slice(6, 13), slice(5, 12)  # from one hand's opening to its closing again
+    np.testing.assert_allclose(y_dot[alone[0]], slowing * y_dot[alone[1]], rtol=1e-6)
+    assert np.abs(y_dot[5]).max() > 1e-4 and np.abs(y_dot[-1]).max() > 0
 
 
 # -- the split of forces ----------------------------------------------------------------------------------

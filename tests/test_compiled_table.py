@@ -160,7 +160,9 @@ def test_the_driver_counts_columns_as_python_does(name, tmp_path):
 
 # -- the table and the arrays -----------------------------------------------------------------------------
 
-SMALL = dict(zip((*SIZES, "n", "p", "o"), (2, 3, 5, 7, 3, 30, 1, 1, 1, 1, 2, 1, 4, 6, 1), strict=True))
+SMALL = dict(
+    zip((*SIZES, "n", "p", "o", "h"), (2, 3, 5, 7, 3, 30, 1, 1, 1, 1, 2, 1, 1, 4, 6, 1, 14), strict=True)
+)
 
 
 @pytest.mark.parametrize("name", QUANTITIES)

@@ -15,5 +15,6 @@ goes through these modules:
 6. `build`, with `compiler` and `cache`: from C to a library that is loaded;
 7. `program`: library and arrays together. Once in every process, before it is used, the library is compared
    with the reference engine, on the small closed loop of `specimen`;
-8. `engine` again: takes the run through time, some steps with every call of `advance` in `driver.c`.
+8. `engine` again: takes the run through time, some steps with every call of `advance` in `driver.c`. Events,
+   such as hands that close or open, come between two calls.
 """

@@ -15,11 +15,11 @@ import numpy as np
 from ..assembly.body import Inertia, body_rate, place_of
 from ..assembly.forces import internal_wrenches
 from ..assembly.grasp import fixture_wrenches, grasp_matrix, places_on
+from ..assembly.handling import LOOSE, HandlingPlant
 from ..assembly.plant import CarryingPlant
 from ..robots.mechanism import mechanism
 from ..robots.robot import Robot
 from ..simulation.closed_loop import ClosedLoop
-from ..simulation.plant import Plant
 from ..tasks.measurement import Kinematics
 from .algebra import array_of, column_of, function_of, solve_positive
 from .quantities import FUNCTIONS, columns
@@ -65,31 +65,34 @@ def object_function(name: str) -> Any:
     signature = FUNCTIONS["object"]
     given = {key: ca.SX.sym(key, columns(key, {})) for key in signature.inputs}
     body, lift, row = (array_of(given[key], -1) for key in signature.inputs)
-    mass, com, inertia, gravity = np.split(row, (1, 4, 13))
+    mass, com, inertia, gravity, loose = np.split(row, (1, 4, 13, 16))
     of = Inertia(mass, com, inertia.reshape(3, 3))
-    rate = body_rate(of, body, lift, gravity, _solve)
+    rate = loose * body_rate(of, body, lift, gravity, _solve)
     return function_of(name, signature, given, {"body_dot": rate})
 
 
-def carrying_constants(plant: Plant) -> dict[str, np.ndarray]:
-    """Quantities that do not change while an object is carried; rows without entries where none is."""
+def carrying_constants(loop: ClosedLoop) -> dict[str, np.ndarray]:
+    """Quantities of an object that is carried, at the start; rows without entries where none is."""
+    plant, giving = loop.plant, loop.controller.admittance
     if not isinstance(plant, CarryingPlant):
-        none = {name: np.zeros((plant.cell.n, 0)) for name in ("tool", "true_tool", "grasp")}
-        return {**none, "inertia": np.zeros((0, columns("inertia", {})))}
+        none = {name: np.zeros((plant.cell.n, 0)) for name in ("tool", "true_tool", "grasp", "share")}
+        return {**none, "inertia": np.zeros((0, columns("inertia", {}))), "giving": np.zeros((1, 0))}
     return {
         "tool": _tools(plant.cell.robots),
         "true_tool": _tools(plant.schedule.free),
-        "grasp": _grasps(plant),
-        "inertia": _inertia(plant),
+        "giving": np.zeros((1, 0)) if giving is None else np.concatenate(giving.giving)[None],
+        **held_constants(loop, plant.hidden0),
     }
 
 
-def giving_constants(loop: ClosedLoop) -> dict[str, np.ndarray]:
-    """The same of an admittance; rows without entries where robots do not give way."""
-    admittance, plant = loop.controller.admittance, loop.plant
-    if admittance is None or not isinstance(plant, CarryingPlant):
-        return {"share": np.zeros((loop.cell.n, 0)), "giving": np.zeros((1, 0))}
-    return {"share": _shares(plant), "giving": np.concatenate(admittance.giving)[None]}
+def held_constants(loop: ClosedLoop, hidden: np.ndarray) -> dict[str, np.ndarray]:
+    """Those that change when hands close or open, in a state of the plant's own."""
+    plant: Any = loop.plant
+    held, loose = plant, 1.0
+    if isinstance(plant, HandlingPlant):
+        held, loose = plant._held_now(hidden), hidden[LOOSE]
+    share = _shares(held) if loop.controller.admittance else np.zeros((plant.cell.n, 0))
+    return {"grasp": _grasps(held), "inertia": _inertia(plant, loose), "share": share}
 
 
 def _tools(robots: Sequence[Robot]) -> np.ndarray:
@@ -99,8 +102,9 @@ def _tools(robots: Sequence[Robot]) -> np.ndarray:
 
 
 def _grasps(plant: CarryingPlant) -> np.ndarray:
-    """Places and axes of the hands on the object, K and D, (n, 24); zeros for robots that hold nothing."""
+    """Places and axes of the hands on the object, K and D, (n, 24); no K and D for hands that are open."""
     rows = np.zeros((plant.cell.n, columns("grasp", {"hand": 1})))
+    rows[:, 3:12] = np.eye(3).ravel()
     parts = plant.arms, plant.turned.reshape(-1, 9), plant.K, plant.D
     rows[[grasp.robot for grasp in plant.grasps]] = np.concatenate(parts, axis=1)
     return rows
@@ -112,19 +116,21 @@ def _shares(plant: CarryingPlant) -> np.ndarray:
     The split is linear and the same in all directions, so it turns with the object: it is asked here what
     it makes of six unit loads in the first hand.
     """
+    rows = np.zeros((plant.cell.n, 36))
+    if not plant.grasps:
+        return rows
     G = grasp_matrix(plant.arms)
     h = np.zeros((6, *plant.arms.shape[:1], 6))
     h[:, 0] = np.linalg.inv(G[0]).T
     loads = np.matvec(G, h - internal_wrenches(h, np.broadcast_to(plant.arms, (6, *plant.arms.shape))))
-    rows = np.zeros((plant.cell.n, 36))
     rows[[grasp.robot for grasp in plant.grasps]] = loads.transpose(1, 2, 0).reshape(-1, 36)
     return rows
 
 
-def _inertia(plant: CarryingPlant) -> np.ndarray:
-    """Mass, centre of mass and inertia of the object, and gravity, (1, 16)."""
-    body = plant.body
-    return np.concatenate(([body.mass], body.com, body.inertia.ravel(), plant.robots[0].gravity_vector))[None]
+def _inertia(plant: CarryingPlant, loose: float) -> np.ndarray:
+    """Mass, centre of mass and inertia of the object, gravity, and whether it is loose, (1, 17)."""
+    body, gravity = plant.body, plant.robots[0].gravity_vector
+    return np.concatenate(([body.mass], body.com, body.inertia.ravel(), gravity, [loose]))[None]
 
 
 def _solve(M: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import operator
+from collections import deque
 from collections.abc import Iterable, Iterator
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -13,7 +14,7 @@ import numpy as np
 from ..coupling.cell import Cell
 from ..coupling.desired import rows_of
 from ..renamed import names_elsewhere
-from ..simulation.advance import up_to_a_failure
+from ..simulation.advance import due, up_to_a_failure
 from ..simulation.clock import Clock, Stretch
 from ..simulation.engines import Run, before_the_start, finish
 from ..simulation.guard import Alarm, Progress, checks, limits_of, report_time, stopped
@@ -172,9 +173,28 @@ class _Steps:
         self._block: DesiredStretch | None = None
         program.tell(self._steps, {"disturbance": run.schedule.torques, "pi": program.carried})
         ctypes.memset(work.side, 0, 8 * run.loop.cell.n)
+        program.quantities.hidden = run.loop.state(recorder.state).hidden.ctypes.data
+        self._events = deque(sorted(t for t in run.loop.events.tolist() if t >= 0))
 
     def advance(self, block: DesiredStretch, first: int, last: int) -> None:
-        """Make some steps of a block."""
+        """Make some steps of a block; events of the plant come between two calls of the library."""
+        middles = block.steps.middles
+        while first < last:
+            self._meet(middles[first])
+            ahead = self._events[0] if self._events else np.inf
+            end = first + max(1, int(np.searchsorted(middles[first:last], ahead)))
+            self._part(block, first, end)
+            first = end
+
+    def _meet(self, middle: float) -> None:
+        """Let events move the state that are due in a step with this middle, s."""
+        state = self._run.loop.state(self._recorder.state)
+        for event in due(self._events, middle):
+            self._run.loop.at(middle).meet(event, state)
+            self._program.hold(state.hidden)
+
+    def _part(self, block: DesiredStretch, first: int, last: int) -> None:
+        """Make some steps of a block in one go."""
         steps, part = block.steps, slice(first, last)
         joined = self._run.clock.joined(steps.first + first, steps.starts[part])
         marks = _marks(steps.checked[part], steps.logged[part], self._sampled(steps, part), joined)

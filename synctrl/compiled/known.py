@@ -20,6 +20,7 @@ import numpy as np
 
 from ..assembly import grasp
 from ..assembly.body import CarriedObject
+from ..assembly.handling import GRIPS, HandlingPlant
 from ..assembly.plant import CarryingPlant
 from ..control import law
 from ..control.adaptation.gradient import BoundGradient
@@ -49,8 +50,12 @@ SPACES = (JointSpace, CartesianSpace, PoseSpace, SlidingSpace)
 BOUND = (BoundJointSpace, BoundCartesianSpace, BoundPoseSpace, BoundSlidingSpace)
 RIGID = (FullParameters, LinearParameters, BaseParameters)
 INVERSES = (Inverse, Pseudoinverse, DampedInverse)
+#: plants, before those that they are made from
+PLANTS = (HandlingPlant, CarryingPlant, Plant)
 #: numbers of the state of an object that is carried
 BODY = 13
+#: numbers of a grip among those
+GRIP = 8
 #: what a plant may say of a run, or refuse before it, without moving otherwise for it
 TELLS = frozenset({"outputs", "report", "account", "chain", "_checked"})
 COMPILED_BEFORE = "its equations were compiled before"
@@ -102,7 +107,7 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     controller, cell = loop.controller, loop.controller.cell
     task: Any = cell.task
     yield Part("closed loop", loop, (ClosedLoop,))
-    yield Part("plant", loop.plant, (_moved_as(loop.plant), Plant, CarryingPlant))
+    yield Part("plant", loop.plant, (_moved_as(loop.plant), *PLANTS))
     if isinstance(loop.plant, CarryingPlant):
         yield from _held(loop.plant)
     yield Part("schedule of payloads", loop.plant.schedule, (PayloadSchedule,))
@@ -181,7 +186,7 @@ def _check_type(part: Part) -> None:
 
 def _moved_as(plant: Any) -> type:
     """The type of a plant that the package's own moves, of whatever else it tells; else the package's own."""
-    own = CarryingPlant if isinstance(plant, CarryingPlant) else Plant
+    own = next((kind for kind in PLANTS if isinstance(plant, kind)), Plant)
     kinds = type(plant).__mro__
     beside = kinds[: kinds.index(own)] if own in kinds else kinds
     changed = {name for kind in beside for name in vars(kind)}.intersection(_names_of(own)) - TELLS
@@ -234,10 +239,9 @@ def _check_plant(loop: ClosedLoop) -> None:
     robots = [*zip(plant.schedule.free, loop.cell.robots, strict=True)]
     special = {
         f"plant='{plant.physics}'": plant.physics != "pinocchio",
-        "a plant with a state of its own": plant.hidden0.size
-        != (BODY if isinstance(plant, CarryingPlant) else 0),
+        "a plant with a state of its own": plant.hidden0.size != _remembered(plant),
         "a plant with other robots than its schedule": plant.robots is not plant.schedule.robots[0],
-        "a plant with events": len(plant.events) > 0,
+        "a plant with events": len(plant.events) > 0 and not isinstance(plant, HandlingPlant),
         "a plant with other joints than the cell's": any(true.nv != known.nv for true, known in robots),
         "a plant with another gravity than the cell's": not all(
             np.array_equal(true.gravity_vector, known.gravity_vector) for true, known in robots
@@ -248,6 +252,12 @@ def _check_plant(loop: ClosedLoop) -> None:
     }
     for name in (name for name, found in special.items() if found):
         raise _refusal("plant", name, name)
+
+
+def _remembered(plant: Plant) -> int:
+    """How many numbers a plant of the package has for a state of its own."""
+    body = BODY * isinstance(plant, CarryingPlant)
+    return GRIPS.start + GRIP * len(plant.grasps) if isinstance(plant, HandlingPlant) else body
 
 
 def _replaced(role: str, function: Any) -> InputError:

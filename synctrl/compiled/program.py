@@ -21,7 +21,7 @@ from ..simulation.guard import limits_of
 from ..simulation.plant import Plant
 from . import structs
 from .build import cached_library, content_key, require_casadi
-from .carrying import carrying_constants, giving_constants, object_function
+from .carrying import carrying_constants, held_constants, object_function
 from .kind import Classified, Kind, classify, standing
 from .known import check_known, check_untouched
 from .plugged import learner
@@ -64,7 +64,8 @@ class CompiledLoop:
         library: made for these kinds.
 
     Attributes:
-        sizes: lengths of rows, see `SIZES`, and the numbers of robots, pairs and objects, n, p and o.
+        sizes: lengths of rows, see `SIZES`, and the numbers of robots, pairs and objects, n, p and o, and
+            h, of what the plant remembers.
         cell, quantities, work: what the driver is given; see `structs.py`.
         carried: true inertial parameters with every load, (loads, n, bodies).
         scratch: sizes of the scratch arrays arg, res, iw and w that the generated functions ask for.
@@ -77,12 +78,17 @@ class CompiledLoop:
         self.loop, self.library = loop, library
         cell, objects = loop.cell, int(isinstance(loop.plant, CarryingPlant))
         self.sizes = {**largest(classified.kinds), "n": cell.n, "p": cell.coupling.pairs, "o": objects}
+        self.sizes["h"] = loop.plant.hidden0.size
         self._keep: list[np.ndarray] = []
         self.cell = self._cell([*classified.kind_of, len(classified.kinds)])
         self.quantities = structs.Quantities()
         arrays = {name: np.zeros(shape(name, self.sizes)) for name in owned_by("work")}
-        for name, array in {**arrays, **_constants(loop, classified)}.items():
-            setattr(self.quantities, name, self.address(checked(name, array, self.sizes)))
+        self._arrays = {
+            name: checked(name, array, self.sizes)
+            for name, array in {**arrays, **_constants(loop, classified)}.items()
+        }
+        for name, array in self._arrays.items():
+            setattr(self.quantities, name, self.address(array))
         sizes = (ctypes.c_longlong * 4)()
         library.work_sizes(sizes)
         self.scratch = tuple(sizes)
@@ -98,6 +104,11 @@ class CompiledLoop:
         self.tell(steps, {**desired, "weights": weights, "disturbance": disturbance, "pi": self.carried})
         self.call("state_dot", steps, y, y_dot)
         return y_dot
+
+    def hold(self, hidden: np.ndarray) -> None:
+        """Let those hands hold the object that do so in this state of the plant's own."""
+        for name, array in held_constants(self.loop, hidden).items():
+            self._arrays[name][...] = array
 
     def tell(self, steps: structs.Steps, arrays: Mapping[str, np.ndarray]) -> None:
         """Say what is desired and acts in steps, instead of what was said before.
@@ -145,6 +156,7 @@ class CompiledLoop:
             n=cell.n,
             p=coupling.pairs,
             o=self.sizes["o"],
+            h=self.sizes["h"],
             arity=coupling.edges.shape[1],
             rubs=int(plant.rubs),
             saturates=int(plant.saturate),
@@ -264,8 +276,7 @@ def _constants(loop: ClosedLoop, classified: Classified) -> dict[str, np.ndarray
         "gain": gain,
         "limits": plant.torque_limits,
         "bounds": np.array([[*limits_of(cell.task).values()]]),
-        **carrying_constants(plant),
-        **giving_constants(loop),
+        **carrying_constants(loop),
     }
 
 

@@ -24,8 +24,8 @@ class Quantity(NamedTuple):
         owner: where it is: "state" and "rate" in y and y', "cell" for constants, "instant" for what is
             desired at a stage of a step, "load" and "disturbance" for what is constant between edges of
             these, "work" for what generated functions and the driver hand on.
-        rows: "n" for one per robot, "p" for one per pair, "o" for one per object that is carried, "one" for
-            one that all robots share.
+        rows: "n" for one per robot, "p" for one per pair, "o" for one per object that is carried, "h" for
+            one per number that the plant remembers, "one" for one that all robots share.
         columns: length of a row, a product of numbers and of the names in `SIZES`.
         meaning: what it is.
     """
@@ -88,7 +88,7 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "grasp": Quantity("cell", "n", "hand*24", "where a hand holds the object, K and D of its fixture"),
         "share": Quantity("cell", "n", "gives*36", "part of the load at each hand, in the object's axes"),
         "giving": Quantity("cell", "one", "gives*18", "D_a, 1 / M_a, and whether there is a mass"),
-        "inertia": Quantity("cell", "o", "16", "mass, centre of mass and inertia of the object, and gravity"),
+        "inertia": Quantity("cell", "o", "17", "mass, centre, inertia, gravity, and whether it is loose"),
         "pi": Quantity("load", "n", "bodies", "true inertial parameters, with what is carried"),
         "disturbance": Quantity("disturbance", "n", "nv", "torque from outside"),
         "desired": Quantity("instant", "n", "m", "desired coordinates"),
@@ -131,6 +131,7 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "wrench": Quantity("work", "n", "hand*6", "what the fixture does to the object, about its origin"),
         "lift": Quantity("work", "o", "6", "what all fixtures together do to it"),
         "felt": Quantity("work", "n", "gives*6", "force inside at the object's origin, in the desired axes"),
+        "hidden": Quantity("work", "h", "1", "all that the plant remembers, in y"),
         "e_star": Quantity("work", "n", "m", "coupled error"),
         "s_q": Quantity("work", "n", "nv", "error in velocity of the joints"),
         "theta_hat": Quantity("work", "n", "P", "estimates"),
@@ -208,7 +209,7 @@ LOGS: Mapping[str, str] = MappingProxyType(
         "adaptation_state": "z",
         "damping": "damping",
         "velocity_lost": "velocity_lost",
-        "plant_state": "body",
+        "plant_state": "hidden",
     }
 )
 

@@ -54,7 +54,8 @@ class Cell(ctypes.Structure):
     """What does not change in a run: sizes, who is compared with whom, and whether joints rub.
 
     Attributes:
-        n, p, o, arity: robots, pairs, objects that are carried, and robots in one pair.
+        n, p, o, h, arity: robots, pairs, objects that are carried, numbers that the plant remembers, and
+            robots in one pair.
         kind: of each robot, and then of each object.
         edge, sign: (p, arity), robots that are compared, and entries of S.
         first, incident, incident_sign: where the pairs of a robot begin, (n + 1), and robot after robot its
@@ -63,7 +64,7 @@ class Cell(ctypes.Structure):
     """
 
     _fields_ = [
-        *((name, ctypes.c_int) for name in ("n", "p", "o", "arity", "rubs", "saturates")),
+        *((name, ctypes.c_int) for name in ("n", "p", "o", "h", "arity", "rubs", "saturates")),
         *((name, Ints) for name in ("kind", "edge", "first", "incident")),
         *((name, Doubles) for name in ("sign", "incident_sign")),
     ]
