@@ -253,7 +253,8 @@ def measured(experiment: Experiment, engine: Compiled) -> list[float]:
 
 def test_the_table_of_the_page_is_what_runs_give_and_synchronization_keeps_the_bead_on_the_edge():
     pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
-    page = (Path(__file__).parents[1] / "docs" / "assembly.md").read_text("utf-8")
+    whole = (Path(__file__).parents[1] / "docs" / "assembly.md").read_text("utf-8")
+    page = whole.partition("## A bead on a moving edge")[2]  # other tables have rows of the same name
     experiment, engine = bead_on_edge(), Compiled({}, Tables())  # what is desired is tabulated once
     rows = {name: measured(replace(experiment, gains=gains), engine) for name, gains in CASES.items()}
     for name, found in rows.items():
