@@ -24,6 +24,7 @@ import numpy as np
 from IPython.display import HTML, display
 
 from synctrl.experiments import carry_ur5
+from synctrl.experiments.carry import GAINS
 from synctrl.show import scene_of, side_by_side
 from synctrl.show.assembly_figures import internal_force_curves, object_error_curves
 from synctrl.show.curves import overlay
@@ -105,3 +106,41 @@ display(overlay(internal_force_curves, runs))
 
 # %%
 display(overlay(object_error_curves, runs))
+
+# %% [markdown]
+# ## A tare, an admittance, and stiff synchronization
+#
+# What cures it is three things more. With a *tare* the arms agree, when their hands close, on where the box
+# is: the first one's idea of it is taken over, right or wrong, so a constant error vanishes from ε. With an
+# *admittance* each arm feels the wrench inside and gives way to it, as a mass in honey would, so the force
+# goes to zero whatever the arms believe; the leak comes with it. And once nothing is left in ε that cannot
+# vanish, K_ε may be high.
+
+# %%
+STIFF = GAINS.replace(K_eps=[2e4] * 3 + [200.0] * 3)  # N/m and N·m/rad
+yielding = carried(synchronized=False, geometric_error=True, admittance=True)
+calm = carried(geometric_error=True, tare=True, admittance=True, gains=STIFF)
+runs = {"independent": wrong_alone, "independent, admittance": yielding, "with everything": calm}
+display(overlay(internal_force_curves, runs))
+
+
+# %%
+def off_its_path(run):
+    """RMS of the distance of the box from its path, mm."""
+    way = (run.outputs["object_desired"] - run.outputs["object_pose"])[:, :3]
+    return 1e3 * np.sqrt((way**2).sum(axis=1).mean())
+
+
+for name, run in {**runs, "with a leak": leaking, "synchronized": wrong}.items():
+    force = squeeze(run)
+    rms = np.sqrt((force**2).mean())
+    print(f"{name:24} peak {force.max():5.1f} N, rms {rms:5.1f} N, last {force[-1]:5.1f} N", end="; ")
+    print(f"box {off_its_path(run):.1f} mm off its path")
+
+# %% [markdown]
+# **What is not better.** An admittance alone, on arms that are not synchronized at all, already does much
+# of this. And the box is no closer to its path than before: all of this is about what the arms do to each
+# other. Which theorem such a run is about:
+
+# %%
+print(calm.experiment.closed_loop().chain.theorem)

@@ -17,16 +17,19 @@ from test_animation import ends, node
 from synctrl import Cell, Coupling, Experiment, Hold, Member, Result, load_robot
 from synctrl.assembly.body import CarriedObject, place_of
 from synctrl.assembly.grasp import Fixture, Grasp
+from synctrl.assembly.handling import HandlingPlant
 from synctrl.assembly.outline import Outline
 from synctrl.assembly.plant import CarryingPlant
 from synctrl.errors import InputError
+from synctrl.experiments import bead_on_edge, bead_on_path
 from synctrl.show import scene_of, side_by_side
 from synctrl.show.arms import ALARM
-from synctrl.show.carried_scene import ARROW, LAID
+from synctrl.show.carried_scene import ARROW, LAID, OPEN
 from synctrl.show.nodes import TINY
 from synctrl.show.scene import Scene
 from synctrl.show.shapes import prism, triangles
 from synctrl.show.side_by_side import SideBySide
+from synctrl.show.style import read_color
 from synctrl.tasks.rotations import from_quaternion
 
 FPS = 1e3
@@ -152,6 +155,83 @@ def test_a_plate_is_drawn_as_its_outline(run):
     plate = node(scene_of(replace(run, info={**run.info, "object": about}), fps=FPS), "plate L")
     np.testing.assert_allclose(plate.shapes[0].bounds[:, :2], [RIM.min(axis=0), RIM.max(axis=0)], atol=1e-6)
     np.testing.assert_allclose(plate.position, run.outputs["object_pose"][: len(plate.position), :3])
+
+
+# -- hands that open ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def handed(run) -> Result:
+    """The plate goes from the left hand to the right one, and back."""
+    soft, parts = Fixture((1e4, 20.0), (50.0, 0.1)), run.experiment.plant_type.keywords
+    windows = (0, 0.0, 0.01), (1, 0.005, 0.02), (0, 0.015, None)
+    grasps = [Grasp(i, compliance=soft, since=since, until=until) for i, since, until in windows]
+    plant = partial(HandlingPlant, body=parts["body"], at=parts["at"], grasps=grasps)
+    return replace(run.experiment, plant_type=plant, duration=0.025).simulate(dt=1e-4, log_dt=1e-3)
+
+
+def test_a_hand_is_wide_and_grey_while_it_is_open_and_stays_on_its_link(handed):
+    scene = scene_of(handed, fps=FPS)
+    for i, (name, robot) in enumerate(zip(handed.names, handed.experiment.cell.robots, strict=True)):
+        palm = node(scene, f"segment hand of {name}")
+        tips = np.array([robot.tip_position(q) for q in handed.q[: len(palm.position), i]])
+        np.testing.assert_allclose(ends(palm)[1], tips, atol=1e-3)
+        held = [grasp["robot"] == i for grasp in handed.info["grasps"]]
+        closed = handed.outputs["hand_closed"][: len(tips), held].any(axis=1)
+        assert {*closed} == {True, False}
+        wide = palm.scale[:, 0] > 1.1 * palm.scale[:, 0].min()
+        np.testing.assert_array_equal(wide, ~closed)
+        np.testing.assert_allclose(palm.rgb[~closed] - read_color("open", OPEN)[:3], 0.0, atol=1e-12)
+
+
+def test_every_grasp_of_a_robot_has_an_arrow_of_its_own(handed):
+    names = [n.name for n in scene_of(handed, fps=FPS).nodes if n.name.startswith("arrow")]
+    assert len(names) == len(handed.info["grasps"])
+
+
+# -- nozzles ----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def on_edge() -> Result:
+    return bead_on_edge().simulate(0.01)
+
+
+@pytest.fixture(scope="module")
+def on_path() -> Result:
+    return bead_on_path(friction=False).simulate(0.01)
+
+
+def test_a_nozzle_is_drawn_to_its_point_where_no_ball_hides_the_bead(on_edge, on_path):
+    for run, nozzles in ((on_edge, [1]), (on_path, [0, 1])):
+        scene = scene_of(run, fps=FPS)
+        for i in nozzles:
+            tip = [run.experiment.cell.robots[i].tip_position(q) for q in run.q[:, i]]
+            needle = ends(node(scene, f"segment nozzle of {run.names[i]}"))[1]
+            np.testing.assert_allclose(needle, tip[: len(needle)], atol=1e-7)
+        assert not any(n.name.startswith("sphere tip") for n in scene.nodes)
+
+
+def test_a_plate_whose_edge_gets_a_bead_is_drawn_within_that_edge_and_has_a_bar_under_it(on_edge):
+    scene = scene_of(on_edge, fps=FPS)
+    plate, rim = node(scene, "plate plate"), np.array(on_edge.info["edge"]["outline"])
+    np.testing.assert_allclose(
+        plate.shapes[0].bounds[:, :2], [f(rim[:, :2], 0) for f in (np.min, np.max)], atol=1e-3
+    )
+    p, R = place_of(on_edge.outputs["object_pose"][:1])
+    top = (plate.position[:1] - p) @ R[0] + [0, 0, plate.shapes[0].bounds[1, 2]]
+    np.testing.assert_allclose(top[0], rim[0] * [0, 0, 1], atol=1e-9)
+    end = (ends(node(scene, "segment hand of UR5 1"))[1][0] - p[0]) @ R[0]
+    assert end[2] < top[0, 2] - 1e-3
+    assert not any(n.name.startswith("segment ε") for n in scene.nodes)
+
+
+def test_a_loaded_run_shows_what_a_fresh_one_does(on_path, tmp_path):
+    on_path.save(tmp_path / "run.npz")
+    fresh, loaded = (scene_of(run, fps=FPS) for run in (on_path, Result.load(tmp_path / "run.npz")))
+    for one, other in zip(fresh.nodes, loaded.nodes, strict=True):
+        assert one.name == other.name
+        assert [len(link.shapes) for link in one.children] == [len(link.shapes) for link in other.children]
 
 
 # -- plates -----------------------------------------------------------------------------------------------

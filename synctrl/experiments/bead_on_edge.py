@@ -16,6 +16,7 @@ import numpy as np
 from ..assembly.bead import BeadPlant
 from ..assembly.body import CarriedObject, with_share
 from ..assembly.grasp import Grasp
+from ..assembly.outline import Outline
 from ..checks import boolean
 from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
@@ -45,11 +46,12 @@ SPEED, RAMP = 0.14, 0.5  # m/s, s
 TILT, STAND_OFF = np.deg2rad(30.0), 5e-3  # rad, m
 PLATE = CarriedObject(
     2.0, (0.01, 0.02, 0.0), 2.0 / 12 * np.array([0.16**2, 0.24**2, 0.24**2 + 0.16**2]),
-    box=(0.24, 0.16, 0.01), center=(0.0, 0.0, -0.005), name="plate",
+    name="plate",
 )  # fmt: skip
 HAND = Grasp(0, (-0.20, 0.0, 0.0), exp(np.array([0.0, np.pi / 2, 0.0])))
 #: beyond the last link of arm 2, in the axes of its end, which is where adhesive comes out
 NOZZLE, NOZZLE_LENGTH = CarriedObject(0.5, (0.0, 0.0, -0.05), (1e-3,) * 3, name="nozzle"), 0.10
+THICKNESS, CORNERS = 0.01, 80  # m, of the plate, whose upper face has the edge, and corners that are drawn
 POSTURES = (0.0, -1.5, 2.0, -0.5, np.pi / 2, 0.0), (0.0, -1.5, 2.0, -2.0, -np.pi / 2, 0.0)  # rad
 #: share of the true parameters, without the plate, that the controller starts with
 KNOWN = 0.7
@@ -76,12 +78,13 @@ def bead_on_edge(
         InputError: a value that is none of these.
     """
     boolean("friction", friction), boolean("push", push)
-    plate, frame = plate_motion(), AlongEdge(plate_edge(), RampUp(SPEED, RAMP))
+    edge = plate_edge()
+    plate, frame = plate_motion(), AlongEdge(edge, RampUp(SPEED, RAMP))
     rubs = FRICTION if friction else Friction()
     members = [_carrier(Carrier(plate, frame), rubs), _nozzle(Rider(plate, frame), rubs)]
     cell = Cell(members, Coupling.pair(), SlidingSpace(), name="UR5 pair with a bead on an edge")
     made = ready_experiment(cell, DURATION, GAINS, gains, synchronized, parts, disturbances=[PUSH] * push)
-    return replace(made, plant_type=partial(BeadPlant, body=PLATE))
+    return replace(made, plant_type=partial(BeadPlant, body=_drawn(edge)))
 
 
 def plate_edge() -> Edge:
@@ -91,6 +94,12 @@ def plate_edge() -> Edge:
         return 0.12 * (1.1 * np.cos(u) - 0.1 * np.cos(3 * u)), 0.08 * (1.1 * np.sin(u) + 0.1 * np.sin(3 * u))
 
     return Edge.of(curve, 2 * np.pi, TILT, STAND_OFF)
+
+
+def _drawn(edge: Edge) -> CarriedObject:
+    """The plate as figures show it, within its edge."""
+    shape = Outline(edge.outline(CORNERS)[:, :2], THICKNESS)
+    return replace(PLATE, shape=shape, center=(0.0, 0.0, -THICKNESS / 2))
 
 
 def plate_motion() -> PoseTrajectory:

@@ -144,9 +144,11 @@ def holding(robot: Robot, xyz: ArrayLike, rotation: ArrayLike, name: str = "held
 
 
 def _welded(document: Document | None, frame: str, load: Payload) -> Document | None:
-    """The same in the document; None if the frame is no link of it."""
+    """The same in the document, where it has no shape either; None if the frame is no link of it."""
     links = [] if document is None else [link.name for link in document.links]
     if document is None or frame not in links:
         return None
     name = next(name for k in range(len(links) + 1) if (name := f"payload{k}") not in links)
-    return weld(document, frame, load.mass, com=load.com, inertia=load.inertia, name=name)
+    loaded = weld(document, frame, load.mass, com=load.com, inertia=load.inertia, name=name)
+    *others, body = loaded.links
+    return replace(loaded, links=(*others, replace(body, visuals=(), collisions=())))

@@ -48,18 +48,19 @@ def object_error_curves(result: Result) -> list[Curves]:
 def output_curves(result: Result, name: str) -> list[Curves]:
     """An output of a run as it is: over time, and each of its other entries a curve."""
     values = check_output(result, name)
-    unit, factor = display(result.info["outputs"][name]["unit"])
+    about = result.info["outputs"][name]
+    unit, factor = display(about["unit"])
     title = name.replace("_", " ")
-    entries = [_words(at, values.shape) for at in np.ndindex(values.shape[1:]) if at]
+    entries = [_words(at, about["axes"][1:], values.shape[-1]) for at in np.ndindex(values.shape[1:]) if at]
     flat = factor * values.reshape(len(values), -1)
     return [Curves(title, unit, flat, entries if values.ndim > 1 else [title])]
 
 
-def _words(at: tuple[int, ...], shape: tuple[int, ...]) -> str:
-    """An entry of an array, counted from 1; three at its end are x, y and z."""
-    *rest, last = at
-    named = "xyz"[last] if shape[-1] == 3 else f"{last + 1}"
-    return ", ".join([*(f"{k + 1}" for k in rest), named])
+def _words(at: tuple[int, ...], axes: Sequence[str], last: int) -> str:
+    """An entry of an array by its axes, counted from 1; of three coordinates they are x, y and z."""
+    named = {"coordinate": "xyz"} if last == 3 else {}
+    words = [named[axis][k] if axis in named else f"{axis} {k + 1}" for k, axis in zip(at, axes, strict=True)]
+    return ", ".join(words)
 
 
 #: what is drawn of a run that has it, by name, and the output that it needs

@@ -18,20 +18,37 @@ from ..tasks.rotations import quaternion
 from .arms import error_color, tip_positions
 from .runs import check_output
 from .scene import Scene
-from .style import ACCENT, DESIRED, robot_color
+from .style import ACCENT, DESIRED, read_color, robot_color
 
 #: colours of an object that hands carry, of a wrist, and of a bead that is where it should be
 CARRIED, DARK, LAID = "#b9b2a3", "#3c434b", np.array([0.16, 0.62, 0.36])
+#: colour of a hand that is open, and how much wider than a closed one it is
+OPEN, SPREAD = "#aab4c0", 1.3
 #: as shares of the reach of the arms: radius of an arrow and length of the longest, widths of a bead and of a
 #: path, radii of the wrist and of the palm of a hand, and the thickness of that
-SHAFT, ARROW, BEAD, LINE, WRIST, PALM, THICK = 0.009, 0.3, 0.007, 0.006, 0.026, 0.045, 0.02
+SHAFT, ARROW, BEAD, LINE, WRIST, PALM, THICK = 0.009, 0.3, 0.009, 0.006, 0.026, 0.045, 0.02
+#: likewise radii of a bar under a plate, and of the body and of the needle of a nozzle
+BAR, BODY, NEEDLE = 0.012, 0.02, 0.007
+#: of the way from the last joint to the point of a nozzle, how far its body goes; and how far from the middle
+#: of a plate, of the way back to the last joint, the bar under it ends
+SLENDER, UNDER = 0.7, 0.3
 #: forces below which a run is drawn as one without, N, and errors of beads below which they are, m
 NO_FORCE, NO_ERROR = 1e-9, 1e-9
 
 
 def holders(result: Result) -> list[int]:
-    """Which robots hold an object, counted from 0."""
-    return [int(grasp["robot"]) for grasp in result.info.get("grasps", ())]
+    """Which robots hold an object or lay adhesive on it, counted from 0."""
+    edge = result.info.get("edge", {})
+    on_edge = [int(edge[name]) for name in ("carrier", "nozzle") if name in edge]
+    return [int(grasp["robot"]) for grasp in result.info.get("grasps", ())] + on_edge
+
+
+def layers(result: Result) -> list[int]:
+    """Which robot lays each bead, counted from 0."""
+    if "bead_points" not in result.outputs:
+        return []
+    edge, count = result.info.get("edge", {}), result.outputs["bead_points"].shape[1]
+    return [int(edge["nozzle"])] if "nozzle" in edge else [*range(count)]
 
 
 def largest_force(*results: Result) -> float:
@@ -55,6 +72,8 @@ def add_carried(
 ) -> list[str]:
     """All that the functions below add to a scene; returns what a caption says of it."""
     add_object(scene, result, robots, frames, scale)
+    for i in layers(result):
+        _add_nozzle(scene, result, robots, i, frames, scale)
     return [
         add_forces(scene, result, frames, force, scale),
         add_beads(scene, result, frames, bead_error, scale),
@@ -86,11 +105,13 @@ def add_object(
     if about.get("box") is not None or about.get("outline") is not None:
         scene.add_legend(about["name"], CARRIED)
     _add_desired(scene, result, frames, about["name"], scale)
-    for grasp in result.info.get("grasps", ()):
-        i = int(grasp["robot"])
-        hand = place + R @ np.array(grasp["arm"])
-        wrist = _last_joint(robots[i], result.q[frames, i])
-        _add_hand(scene, result.names[i], wrist, hand, scale, robot_color(i))
+    for i in sorted({int(grasp["robot"]) for grasp in result.info.get("grasps", ())}):
+        wrist, hand, closed = (part[frames] for part in _hand(result, robots[i], i))
+        _add_hand(scene, result.names[i], wrist, hand, closed, scale, robot_color(i))
+    if "hand_closed" in result.outputs:
+        scene.add_legend("open hand", OPEN)
+    if "edge" in result.info:
+        _add_bar(scene, result, robots, frames, scale)
 
 
 def add_forces(scene: Scene, result: Result, frames: np.ndarray, limit: float | None, scale: float) -> str:
@@ -104,7 +125,7 @@ def add_forces(scene: Scene, result: Result, frames: np.ndarray, limit: float | 
         scale: reach of the arms, m.
     """
     largest = largest_force(result) if limit is None else positive_number("force", limit)
-    if not holders(result) or "internal_force" not in result.outputs or largest < NO_FORCE:
+    if "grasps" not in result.info or "internal_force" not in result.outputs or largest < NO_FORCE:
         return ""
     place, R = _poses(result, frames)
     length = ARROW * scale / largest
@@ -112,7 +133,7 @@ def add_forces(scene: Scene, result: Result, frames: np.ndarray, limit: float | 
     for k, grasp in enumerate(result.info["grasps"]):
         along = np.zeros((len(frames), 3))
         along[:, : min(3, forces.shape[2])] = length * forces[:, k, :3]
-        start, name = place + R @ np.array(grasp["arm"]), result.names[int(grasp["robot"])]
+        start, name = place + R @ np.array(grasp["arm"]), _grasp_name(result, k)
         scene.add_arrow(f"force inside at {name}", start, along, SHAFT * scale, ACCENT)
     scene.add_legend(f"internal force, {100 * ARROW * scale:.0f} cm for {largest:.3g} N", ACCENT)
     return "Arrows: what hands do to the object beyond carrying it, also where it hides them."
@@ -173,18 +194,74 @@ def _add_desired(scene: Scene, result: Result, frames: np.ndarray, name: str, sc
         scene.add_legend(f"desired path of the {name}", DESIRED)
 
 
-def _last_joint(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Where the last joint before the tip is, (T, 3), m."""
+def _grasp_name(result: Result, k: int) -> str:
+    """The name of the robot of a grasp, with a number from its second grasp on."""
+    held = [int(grasp["robot"]) for grasp in result.info["grasps"]]
+    before = held[:k].count(held[k])
+    return result.names[held[k]] + (f", grasp {before + 1}" if before else "")
+
+
+def _last_joint(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the last joint before the tip is, (T, 3), m, and its axes, (T, 3, 3)."""
     joint = robot.joint_frames[robot.model.frames[robot.tip_id].parentJoint - 1]
-    return tip_positions([robot.with_tip(joint)], q[:, None])[:, 0]
+    poses = [robot.with_tip(joint).tip_pose(row[: robot.nv]) for row in q]
+    return np.array([pose.translation for pose in poses]), np.array([pose.rotation for pose in poses])
+
+
+def _hand(result: Result, robot: Robot, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Over time the last joint of robot i and its hand, (T, 3) each, m, and whether that is closed, (T,).
+
+    A closed hand is where it holds the object, and an open one where its link has it.
+    """
+    (p, R), (wrist, axes) = place_of(check_output(result, "object_pose")), _last_joint(robot, result.q[:, i])
+    own = [k for k, grasp in enumerate(result.info["grasps"]) if grasp["robot"] == i]
+    places = [p + R @ np.array(result.info["grasps"][k]["arm"]) for k in own]
+    if "hand_closed" not in result.outputs:
+        return wrist, places[0], np.ones(len(p), dtype=bool)
+    closed = check_output(result, "hand_closed")[:, own] > 0
+    held = int(np.flatnonzero(closed[:, 0])[-1]) if closed[:, 0].any() else 0
+    hand = wrist + axes @ axes[held].T @ (places[0][held] - wrist[held])
+    for place, holds in zip(places, closed.T, strict=True):
+        hand = np.where(holds[:, None], place, hand)
+    return wrist, np.asarray(hand), np.asarray(closed.any(axis=1))
 
 
 def _add_hand(
-    scene: Scene, name: str, wrist: np.ndarray, place: np.ndarray, scale: float, color: str
+    scene: Scene,
+    name: str,
+    wrist: np.ndarray,
+    place: np.ndarray,
+    closed: np.ndarray,
+    scale: float,
+    color: str,
 ) -> None:
-    """A palm on the object at `place`, (T, 3), and a bar from the wrist, (T, 3), to there."""
+    """A palm at `place`, (T, 3), wide and grey where it is open, and a bar from the wrist, (T, 3)."""
     way = place - wrist
     lengths = np.linalg.norm(way, axis=1, keepdims=True)
     palm = place - way * np.minimum(THICK * scale / np.maximum(lengths, 1e-9), 1.0)
     scene.add_segment(f"wrist of {name}", wrist, palm, WRIST * scale, DARK)
-    scene.add_segment(f"hand of {name}", palm, place, PALM * scale, color)
+    radius = np.where(closed, 1.0, SPREAD) * PALM * scale
+    tint = np.where(closed[:, None], read_color(name, color)[:3], read_color(name, OPEN)[:3])
+    scene.add_segment(f"hand of {name}", palm, place, radius, tint)
+
+
+def _add_bar(scene: Scene, result: Result, robots: Sequence[Robot], frames: np.ndarray, scale: float) -> None:
+    """A bar under a plate, from the last joint of the robot that carries it."""
+    about, i = result.info["object"], int(result.info["edge"]["carrier"])
+    (p, R), (wrist, _) = _poses(result, frames), _last_joint(robots[i], result.q[frames, i])
+    thickness = about["outline"]["thickness"] if about.get("outline") else (about.get("box") or [0.0])[-1]
+    center = np.array(about["center"])
+    end = center + UNDER * (R[0].T @ (wrist[0] - p[0]) - center)
+    end[2] = center[2] - thickness
+    scene.add_segment(f"hand of {result.names[i]}", wrist, p + R @ end, BAR * scale, DARK)
+
+
+def _add_nozzle(
+    scene: Scene, result: Result, robots: Sequence[Robot], i: int, frames: np.ndarray, scale: float
+) -> None:
+    """The body of a nozzle from the last joint on, and a needle from there to its point."""
+    wrist, _ = _last_joint(robots[i], result.q[frames, i])
+    point = tip_positions([robots[i]], result.q[frames, i : i + 1])[:, 0]
+    end, name = wrist + SLENDER * (point - wrist), result.names[i]
+    scene.add_segment(f"body of the nozzle of {name}", wrist, end, BODY * scale, DARK)
+    scene.add_segment(f"nozzle of {name}", end, point, NEEDLE * scale, robot_color(i))

@@ -138,10 +138,10 @@ def _desired_tips(
 def _add_tips(
     scene: Scene, result: Result, tips: np.ndarray, desired: np.ndarray | None, scale: float
 ) -> None:
-    """Tips of robots that hold no object, and where these should go, if that is known."""
+    """Tips of robots that hold nothing, if no nozzle is drawn there, and where they should go, if known."""
     holding = carried_scene.holders(result)
     free = [i for i in range(len(result.names)) if i not in holding]
-    for i in free:
+    for i in set(free).difference(carried_scene.layers(result)):
         scene.add_sphere(f"tip of {result.names[i]}", BALL * scale, tips[:, i], robot_color(i))
     if desired is None:
         return

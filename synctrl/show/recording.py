@@ -161,7 +161,7 @@ class Recording:
         for k, (first, last) in enumerate(pairwise(edges)):
             shown = np.where(frame >= last, 1.0, TINY)[:, None] * np.ones(3)
             color = read_color(name, rgb[first : last + 1].mean(axis=0))
-            piece = shapes.tube(path[first : last + 1], radius, color)
+            piece = shapes.tube(path[first : last + 1], radius, color, ball=1.0)
             node.children.append(Node(label("piece", str(k + 1)), scale=shown, shapes=[piece]))
         self._add(node)
 

@@ -74,16 +74,16 @@ def mesh(vertices: np.ndarray, faces: np.ndarray, color: Color = GREY) -> Solid:
     return Solid(geometry, np.array([np.min(vertices, axis=0), np.max(vertices, axis=0)]), np.eye(4), color)
 
 
-def tube(points: np.ndarray, radius: float, color: Color = GREY) -> Solid:
-    """A round line through `points`, (k, 3), m; a ball where they all coincide.
+def tube(points: np.ndarray, radius: float, color: Color = GREY, ball: float = 2.0) -> Solid:
+    """A round line through `points`, (k, 3), m; where they all coincide a ball, `ball` times as thick.
 
     WebGL draws lines one pixel wide whatever width is asked for.
     """
     points = _apart(points, radius / 2)
     if len(points) == 1:
-        ball = ellipsoid(np.full(3, 2 * radius), color)
-        ball.matrix[:3, 3] = points[0]
-        return ball
+        point = ellipsoid(np.full(3, ball * radius), color)
+        point.matrix[:3, 3] = points[0]
+        return point
     normals, binormals = _frames(points)
     angles = np.linspace(0, 2 * np.pi, TUBE_SIDES, endpoint=False)[:, None]
     rings = np.cos(angles) * normals[:, None] + np.sin(angles) * binormals[:, None]  # (k, sides, 3)
