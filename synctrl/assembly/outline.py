@@ -9,6 +9,7 @@ import numpy as np
 
 from ..checks import finite_array, positive_number
 from ..errors import InputError
+from ..tasks.closed_curve import crossing
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +37,7 @@ class Outline:
             k = int(np.flatnonzero((sides == 0).all(axis=1))[0])
             words = f"expected neighbours apart, found point {k + 1} and the next at the same place"
             raise InputError(words, subject="outline, points", found=k)
-        if (pair := _crossing(rim, sides)) is not None:
+        if (pair := crossing(rim)) is not None:
             a, b = pair
             words = f"expected a rim that does not cross itself, found sides {a + 1} and {b + 1} crossing"
             raise InputError(words, subject="outline, points", found=pair)
@@ -46,18 +47,3 @@ class Outline:
     def as_dict(self) -> dict[str, Any]:
         """Its numbers as plain data."""
         return {"points": self.points.tolist(), "thickness": self.thickness}
-
-
-def _crossing(rim: np.ndarray, sides: np.ndarray) -> tuple[int, int] | None:
-    """The first two sides, counted from 0, that cross; None if none do."""
-    ends = rim + sides
-    start_left, end_left = (_left_of(rim, sides, points) for points in (rim, ends))
-    apart = start_left * end_left < 0  # [i, j]: the ends of side j lie on different sides of side i
-    found = np.argwhere(np.triu(apart & apart.T))
-    return (int(found[0, 0]), int(found[0, 1])) if len(found) else None
-
-
-def _left_of(starts: np.ndarray, along: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Above 0 at [i, j] where point j lies left of the line from start i along side i."""
-    way = points[None] - starts[:, None]
-    return along[:, None, 0] * way[..., 1] - along[:, None, 1] * way[..., 0]

@@ -142,17 +142,26 @@ def _periodic(u: np.ndarray, p: np.ndarray) -> Any:
     return make_interp_spline(u, np.append(p[:-1], p[:1], axis=0), k=5, bc_type="periodic")
 
 
+def crossing(points: np.ndarray) -> tuple[int, int] | None:
+    """The first two sides, counted from 0, of a closed polygon that cross; None if none do.
+
+    Args:
+        points: corners in order, (N, 2); side k goes from point k to the next.
+    """
+    ends = np.roll(points, -1, axis=0)
+    left = [_cross((ends - points)[:, None], some[None] - points[:, None]) > 0 for some in (points, ends)]
+    parted = left[0] != left[1]  # [i, j]: the ends of side j lie on different sides of side i
+    crossed = np.triu(parted & parted.T, k=2)
+    crossed[0, -1] = False  # the last side ends where the first one begins
+    found = np.argwhere(crossed)
+    return (int(found[0, 0]), int(found[0, 1])) if len(found) else None
+
+
 def _check_outline(outline: np.ndarray) -> None:
     """Refuse a curve that crosses itself or goes clockwise."""
     a = outline[:, :2]
-    b = np.roll(a, -1, axis=0)
-    left = [_cross((b - a)[:, None], ends[None] - a[:, None]) > 0 for ends in (a, b)]
-    parted = left[0] != left[1]  # the ends of one segment are on both sides of the other
-    crossed = np.triu(parted & parted.T, k=2)
-    crossed[0, -1] = False
-    if crossed.any():
-        where = a[np.argwhere(crossed)[0][0]]
-        raise InputError.expected("a curve that does not cross itself", where, "points")
-    area = 0.5 * float(_cross(a, b).sum())
+    if (pair := crossing(a)) is not None:
+        raise InputError.expected("a curve that does not cross itself", a[pair[0]], "points")
+    area = 0.5 * float(_cross(a, np.roll(a, -1, axis=0)).sum())
     if area <= 0:
         raise InputError.expected("a curve that goes counter-clockwise, of an area above 0", area, "points")
