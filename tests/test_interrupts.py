@@ -159,7 +159,7 @@ def strike(c):
     ("act", "kind", "subject", "found"),
     [
         (strike, SimulationError, "the weights of the coupling", "Strike"),
-        (lambda c: (np.nan * c, c, c), CouplingError, "c", None),
+        (lambda c: (np.nan * c, c, c), CouplingError, "c", pytest.approx(np.nan, nan_ok=True)),
         (lambda c: (0 * c, 0 * c, 0 * c), CouplingError, "c", ((0.0, 0.0), (0.0, 0.0))),
     ],
 )
