@@ -54,8 +54,8 @@ pytestmark = [
 
 GAMMA = GAINS.Gamma
 #: how long, and in which steps, s
-RUN = {"duration": 0.012, "dt": 1e-3}
-PUSH = Disturbance(0, np.array([10.0, 10.0, 10.0, 0.0, 0.0, 0.0]), 0.004, 0.008)
+RUN = {"duration": 0.01, "dt": 1e-3}
+PUSH = Disturbance(0, np.array([10.0, 10.0, 10.0, 0.0, 0.0, 0.0]), 0.003, 0.007)
 #: what every run with fixtures has beside other reasons, as the certificate begins to say it
 OBJECT = "an object that does not move as the hands do"
 
