@@ -51,7 +51,7 @@ SEEN = {
     "rough_alone": (9.0,),
     "rough_paper": (50.0,),
     "rough_yielding": (6.0,),
-    "rough_whole": (3.0,),
+    "rough_whole": (2.9,),
 }
 HOLD = [True, True, True, False, True, True, True, True]
 

@@ -16,8 +16,8 @@ from .tasks import root_mean_square
 NEAR = 0.05
 SOURCE = "not in the paper: our cell, with forces"
 _DIRECTION = GEOMETRIC_ERROR[:3] / np.linalg.norm(GEOMETRIC_ERROR[:3])
-#: "about a third": at most this share
-THIRD = 0.36
+#: a share of the force that is small
+THIRD = 1 / 3
 
 
 def force(run: Result) -> np.ndarray:
@@ -145,8 +145,8 @@ def whole_leaves_a_third(whole: Result, alone: Result, where: str) -> Claim:
     ours, theirs = ((root_mean_square(force(run)), float(force(run).max())) for run in (whole, alone))
     who, off = ("with everything", "independent"), [1e-3 * off_its_path(run) for run in (whole, alone)]
     return Claim(
-        f"{where}, a tare, a leak, an admittance and a high K_ε leave about a third of the independent "
-        "controller's force, or less.",
+        f"{where}, a tare, a leak, an admittance and a high K_ε leave less than a third of the "
+        "independent controller's RMS force.",
         SOURCE,
         ours[0] <= THIRD * theirs[0] and ours[1] < theirs[1],
         (
@@ -154,7 +154,7 @@ def whole_leaves_a_third(whole: Result, alone: Result, where: str) -> Claim:
             *findings("peak force", (ours[1], theirs[1]), "N", who),
             *findings("payload off its path, RMS", off, "m", who),
         ),
-        f"Asked: at most {THIRD:g} of the RMS force, and a smaller peak. The peak is that of the start or of "
+        "Asked: at most a third of the RMS force, and a smaller peak. The peak is that of the start or of "
         "the push, before anything can give way. The motion of the payload is not asked to be better.",
     )
 
