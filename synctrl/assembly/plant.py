@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array, instance, rotation_matrix
+from ..checks import instance
 from ..control.controller import Controller
 from ..coupling.cell import Cell
 from ..errors import InputError
@@ -18,7 +18,7 @@ from ..tasks.measurement import Tips
 from ..tasks.poses import PoseTrajectory
 from ..tasks.rigid_motions import place_matrix
 from ..tasks.rotations import log
-from .body import CarriedObject, body_rate, place_of, pose_of
+from .body import CarriedObject, Placed, body_rate, place_of, placed, pose_of
 from .forces import internal_wrenches
 from .grasp import Grasp, fixture_wrenches, grasp_matrix, places_on
 from .step import largest_step
@@ -41,7 +41,8 @@ class CarryingPlant(Plant):
         cell: what the controller knows, its robots with their shares of the object.
         body: the object.
         grasps: who holds it where, at least one; no robot twice.
-        at: position, (3,), m, and orientation, (3, 3), of the object at t = 0 in world axes.
+        at: position, (3,), m, and orientation, (3, 3), of the object at t = 0 in world axes;
+            by default where its desired motion begins.
         robots: the robots without the object, whose tips are the hands, with the joints of those of the cell;
             by default these.
         desired: desired motion of the object, for figures.
@@ -58,12 +59,12 @@ class CarryingPlant(Plant):
         *,
         body: CarriedObject,
         grasps: Sequence[Grasp],
-        at: tuple[Any, Any],
+        at: Placed | None = None,
         robots: Sequence[Robot] | None = None,
         desired: PoseTrajectory | None = None,
         **options: Any,
     ):
-        super().__init__(cell, robots=cell.robots if robots is None else _fitting(robots, cell), **options)
+        super().__init__(cell, robots=None if robots is None else _fitting(robots, cell), **options)
         instance("body", body, CarriedObject, "a CarriedObject")
         instance("desired", desired, (PoseTrajectory, NoneType), "a PoseTrajectory")
         self.body, self.grasps, self.desired = body, self._checked(grasps), desired
@@ -71,7 +72,7 @@ class CarryingPlant(Plant):
         self._tips = Tips(self.robots)
         self.K, self.D = (np.stack([getattr(g.compliance, name) for g in self.grasps]) for name in "KD")
         self._gravity = np.array(self.robots[0].gravity_vector)
-        p, R = _place(at)
+        p, R = placed(at, desired)
         self.hidden0 = np.concatenate((pose_of(p, R), self._moving_along(p)))
         self.arms, self.turned = self._closed(p, R)
 
@@ -231,6 +232,7 @@ class CarryingPlant(Plant):
 
 
 def _fitting(robots: Sequence[Robot], cell: Cell) -> tuple[Robot, ...]:
+    instance("cell", cell, Cell, "a Cell")
     instance("robots", robots, Sequence, "a sequence of Robot objects")
     for robot in robots:
         instance("robots", robot, Robot, "Robot objects")
@@ -238,13 +240,6 @@ def _fitting(robots: Sequence[Robot], cell: Cell) -> tuple[Robot, ...]:
     if found != joints:
         raise InputError.expected(f"robots with as many joints as the cell, {joints}", found, "robots")
     return tuple(robots)
-
-
-def _place(at: tuple[Any, Any]) -> tuple[np.ndarray, np.ndarray]:
-    instance("at", at, Sequence, "a position and an orientation")
-    if len(at) != 2:
-        raise InputError.expected("a position and an orientation", f"{len(at)} things", "at")
-    return finite_array("at, position", at[0], (3,)), rotation_matrix("at, orientation", at[1])
 
 
 def check_grasps(grasps: Sequence[Grasp], cell: Cell) -> None:
