@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from ..checks import finite_number, instance, non_negative_number, positive_number
 from ..errors import InputError
 from .closed_curve import DRAWN, ClosedCurve, sampled
-from .poses import PoseTrajectory, Turning
+from .poses import PoseTrajectory, Turning, check_dimension
 from .rotations import exp
 from .trajectories import Motion, Trajectory
 
@@ -84,7 +84,7 @@ class Edge(ClosedCurve):
         Raises:
             InputError: see `Edge` and `sampled`; or a curvature that jumps, if the nozzle is tilted.
         """
-        points, smooth = sampled(curve, period)
+        tilt, (points, smooth) = finite_number("tilt", tilt), sampled(curve, period)
         if tilt and not smooth:
             raise InputError.expected(
                 "an edge whose curvature does not jump, for a nozzle that is tilted", tilt, "tilt"
@@ -127,8 +127,7 @@ class AlongEdge(PoseTrajectory):
 
     def __init__(self, edge: Edge, way: Trajectory):
         instance("edge", edge, Edge, "an Edge")
-        if getattr(way, "dimension", None) != 1:
-            raise InputError.expected("a trajectory of 1 number, the arc length", way, "way")
+        check_dimension("way", way, 1)
         self.edge, self.way = edge, way
         super().__init__(_Places(edge, way), _Turns(edge, way))
 

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import count, finite_array, finite_number, instance, positive_number
 from ..errors import InputError, TrajectoryError
+from .poses import check_dimension
 from .trajectories import Motion, Trajectory
 
 #: degree of the spline, three derivatives of which are continuous once it goes by arc length
@@ -169,8 +170,7 @@ class AlongPath:
 
     def __init__(self, path: Path, way: Trajectory):
         instance("path", path, Path, "a Path")
-        if getattr(way, "dimension", None) != 1:
-            raise InputError.expected("a trajectory of one number", getattr(way, "dimension", None), "way")
+        check_dimension("way", way, 1)
         self.path, self.way, self.breaks = path, way, tuple(way.breaks)
 
     def __call__(self, t: ArrayLike) -> Motion:

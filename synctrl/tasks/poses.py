@@ -54,7 +54,7 @@ class AxisRotation:
     def __init__(self, start: ArrayLike, axis: ArrayLike, angle: Trajectory):
         self.start = rotation_matrix("start", start)
         self.axis = _unit("axis", axis)
-        _check_dimension("angle", angle, 1)
+        check_dimension("angle", angle, 1)
         self.angle = angle
         self.breaks = tuple(angle.breaks)
 
@@ -167,7 +167,7 @@ class PoseTrajectory:
     dimension = 6
 
     def __init__(self, position: Trajectory, orientation: Orientation | None = None):
-        _check_dimension("position", position, 3)
+        check_dimension("position", position, 3)
         self.position = position
         self.orientation = AxisRotation.fixed(np.eye(3)) if orientation is None else orientation
         offers("orientation", self.orientation, ("__call__", "breaks"), "an orientation such as AxisRotation")
@@ -215,9 +215,13 @@ def pose_motion(position: Motion, turning: Turning) -> Motion:
     return Motion(*(np.concatenate(pair, axis=-1) for pair in zip(position, parts, strict=True)))
 
 
-def _check_dimension(name: str, trajectory: Any, m: int) -> None:
-    """Refuse what is no trajectory of m numbers."""
-    dimension = getattr(trajectory, "dimension", None)
+def check_dimension(name: str, trajectory: Any, m: int) -> None:
+    """Refuse what is no trajectory of m numbers.
+
+    Raises:
+        InputError: a class, or something of another dimension or of none.
+    """
+    dimension = None if isinstance(trajectory, type) else getattr(trajectory, "dimension", None)
     if dimension != m:
         numbers = f"{m} number{'s' * (m != 1)}"
         found = repr(trajectory) if dimension is None else f"one of {dimension}"
