@@ -37,7 +37,7 @@ def numbers(name: str, value: ArrayLike, shape: tuple[int | None, ...] | None = 
         InputError: not numbers, or another shape.
     """
     try:
-        if value is None or np.asarray(value).dtype.kind in "USc":  # neither "1" nor 1j is a number here
+        if value is None or np.asarray(value).dtype.kind in "UScMm":  # "1", 1j and dates are none
             raise TypeError
         array = np.array(value, dtype=float)
     except (TypeError, ValueError, OverflowError) as error:

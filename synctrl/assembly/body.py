@@ -6,23 +6,26 @@ in world axes. Poses are kept as (position, unit quaternion x y z w), (7,).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, label, positive_number, rotation_matrix
+from ..checks import finite_array, instance, label, positive_number, rotation_matrix
 from ..errors import InputError
 from ..robots.payload import Payload
 from ..robots.pseudo_inertia import inertial_parameters, pseudo_inertia
 from ..robots.robot import Robot
+from ..tasks.poses import PoseTrajectory
 from ..tasks.rotations import from_quaternion, quaternion, skew
 from .outline import Outline
 
 Solve = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """M and b -> M^-1 b."""
+Placed = tuple[Any, Any]
+"""A position, (3,), m, and an orientation, (3, 3), in world axes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +89,8 @@ class CarriedObject(Inertia):
         load = Payload(0, self.mass, self.com, self.inertia)
         for name in ("mass", "com", "inertia"):
             object.__setattr__(self, name, getattr(load, name))
+        with np.errstate(over="ignore", invalid="ignore"):
+            finite_array("object, parameters about its origin", self.parameters)
         shape = self._shape()
         plate = isinstance(shape, Outline)
         object.__setattr__(self, "shape", shape)
@@ -143,6 +148,7 @@ def with_share(robot: Robot, theta: ArrayLike, xyz: ArrayLike, rotation: ArrayLi
         InputError: not of these shapes, no rotation matrix, or a tip that does not move.
         RobotError: the body would have no positive mass or no positive definite inertia.
     """
+    instance("robot", robot, Robot, "a Robot")
     frame = robot.model.frames[robot.tip_id]
     if frame.parentJoint == 0:
         raise InputError(f"expected a tip that moves, found '{robot.tip}'", subject=f"robot '{robot.name}'")
@@ -152,6 +158,21 @@ def with_share(robot: Robot, theta: ArrayLike, xyz: ArrayLike, rotation: ArrayLi
     pi = robot.inertial_parameters.reshape(-1, 10).copy()
     pi[frame.parentJoint - 1] += moved_parameters(finite_array("share", theta, (10,)), *at)
     return robot.with_parameters(pi.ravel())
+
+
+def placed(at: Placed | None, motion: PoseTrajectory | None = None) -> Placed:
+    """Where an object is at t = 0: where it is said to be, or, if nothing is said, where its motion begins.
+
+    Raises:
+        InputError: no position or no rotation matrix, or neither a place nor a motion.
+    """
+    if at is None and motion is not None:
+        return motion.position(0.0).x, motion.orientation(0.0).R
+    instance("at", at, Sequence, "a position and an orientation")
+    if len(at) != 2:  # type: ignore[arg-type]
+        raise InputError.expected("a position and an orientation", f"{len(at)} things", "at")  # type: ignore[arg-type]
+    p, R = at  # type: ignore[misc]
+    return finite_array("at, position", p, (3,)), rotation_matrix("at, orientation", R)
 
 
 def pose_of(xyz: np.ndarray, R: np.ndarray) -> np.ndarray:

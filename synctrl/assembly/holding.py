@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array, instance, rotation_matrix
+from ..checks import instance
 from ..control.controller import Controller
 from ..coupling.cell import Cell
 from ..errors import InputError
@@ -18,7 +18,7 @@ from ..tasks.measurement import Tips
 from ..tasks.poses import PoseTrajectory
 from ..tasks.rigid_motions import place_matrix
 from ..tasks.rotations import log
-from .body import CarriedObject, place_of, pose_of
+from .body import CarriedObject, Placed, place_of, placed, pose_of
 from .grasp import Grasp, grasp_matrix
 from .theorems import ClosedChain
 
@@ -36,7 +36,8 @@ class HoldingPlant(Plant):
         cell: what the controller knows, its robots with their shares of the object.
         body: the object.
         grasps: who holds it where, at least one; no robot twice.
-        at: position, (3,), m, and orientation, (3, 3), of the object at t = 0 in world axes.
+        at: position, (3,), m, and orientation, (3, 3), of the object at t = 0 in world axes;
+            by default where its desired motion begins.
         robots: the robots without the object, whose tips are the hands, with the joints of those of the cell;
             by default these.
         desired: desired motion of the object, for figures.
@@ -56,18 +57,18 @@ class HoldingPlant(Plant):
         *,
         body: CarriedObject,
         grasps: Sequence[Grasp],
-        at: tuple[Any, Any],
+        at: Placed | None = None,
         robots: Sequence[Robot] | None = None,
         desired: PoseTrajectory | None = None,
         **options: Any,
     ):
-        super().__init__(cell, robots=cell.robots if robots is None else _fitting(robots, cell), **options)
+        super().__init__(cell, robots=None if robots is None else _fitting(robots, cell), **options)
         instance("body", body, CarriedObject, "a CarriedObject")
         instance("desired", desired, (PoseTrajectory, NoneType), "a PoseTrajectory")
         self.body, self.grasps, self.desired = body, self._checked(grasps), desired
         self._hands = np.array([grasp.robot for grasp in self.grasps])
         self._tips = Tips(self.robots)
-        p, R = _place(at)
+        p, R = placed(at, desired)
         self.hidden0 = np.concatenate((pose_of(p, R), self._moving_along(p)))
         self.arms, self.turned = self._closed(p, R)
 
@@ -167,6 +168,7 @@ class HoldingPlant(Plant):
 
 
 def _fitting(robots: Sequence[Robot], cell: Cell) -> tuple[Robot, ...]:
+    instance("cell", cell, Cell, "a Cell")
     instance("robots", robots, Sequence, "a sequence of Robot objects")
     for robot in robots:
         instance("robots", robot, Robot, "Robot objects")
@@ -174,13 +176,6 @@ def _fitting(robots: Sequence[Robot], cell: Cell) -> tuple[Robot, ...]:
     if found != joints:
         raise InputError.expected(f"robots with as many joints as the cell, {joints}", found, "robots")
     return tuple(robots)
-
-
-def _place(at: tuple[Any, Any]) -> tuple[np.ndarray, np.ndarray]:
-    instance("at", at, Sequence, "a position and an orientation")
-    if len(at) != 2:
-        raise InputError.expected("a position and an orientation", f"{len(at)} things", "at")
-    return finite_array("at, position", at[0], (3,)), rotation_matrix("at, orientation", at[1])
 
 
 def check_grasps(grasps: Sequence[Grasp], cell: Cell) -> None:

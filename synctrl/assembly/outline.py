@@ -21,8 +21,8 @@ class Outline:
         thickness: m, above 0.
 
     Raises:
-        InputError: fewer than three points, two neighbours at the same place, a rim that crosses itself, or
-            no thickness.
+        InputError: fewer than three points, two neighbours at the same place, a rim that crosses itself or
+            goes round no area, or no thickness.
     """
 
     points: Any
@@ -41,6 +41,9 @@ class Outline:
             a, b = pair
             words = f"expected a rim that does not cross itself, found sides {a + 1} and {b + 1} crossing"
             raise InputError(words, subject="outline, points", found=pair)
+        area = 0.5 * abs(float((rim[:, 0] * sides[:, 1] - rim[:, 1] * sides[:, 0]).sum()))
+        if not 1e-12 * float((sides * sides).sum()) < area < np.inf:
+            raise InputError.expected("a rim that goes round an area", area, "outline, points")
         object.__setattr__(self, "points", rim)
         object.__setattr__(self, "thickness", positive_number("outline, thickness", self.thickness))
 

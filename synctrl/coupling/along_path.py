@@ -13,12 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import NoneType
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, finite_number, instance, positive_number
+from ..checks import count, finite_array, finite_number, instance, positive_number
 from ..errors import CouplingError, InputError
 from ..tasks.path import AlongPath
 from ..tasks.rotations import skew
@@ -79,8 +80,8 @@ class PathWeights:
     """
 
     def __init__(self, motions: Sequence[AlongPath], a: ArrayLike, gate: Gate | None = None):
-        for motion in motions:
-            instance("motions", motion, AlongPath, "AlongPath objects")
+        _check_motions(motions)
+        instance("gate", gate, (Gate, NoneType), "a Gate")
         self.motions, self.gate, self.robots = tuple(motions), gate, len(motions)
         self.a = finite_array("a", a, (self.robots,))
         if not self.a.all():
@@ -98,10 +99,10 @@ class PathWeights:
         Raises:
             InputError: a robot that stands still or turns back on its way.
         """
+        _check_motions(motions)
         times = np.linspace(0.0, positive_number("duration", duration), INSTANTS)
         speeds = []
         for i, motion in enumerate(motions):
-            instance("motions", motion, AlongPath, "AlongPath objects")
             s, speed, _ = motion.way(times)
             if s[-1] == s[0] or (speed * np.sign(s[-1] - s[0]) < 0).any():
                 raise InputError(
@@ -136,6 +137,13 @@ class PathWeights:
     def size(self, t: float) -> float:
         """Geometric mean of the singular values of all c_i(t)."""
         return float(np.exp(np.linalg.slogdet(self.at(np.array([t]), 3).c[0])[1].mean() / 3))
+
+
+def _check_motions(motions: Sequence[AlongPath]) -> None:
+    instance("motions", motions, Sequence, "a sequence of AlongPath objects")
+    count("number of motions", len(motions))
+    for motion in motions:
+        instance("motions", motion, AlongPath, "AlongPath objects")
 
 
 def _turned(motion: AlongPath, way: Motion) -> np.ndarray:

@@ -16,7 +16,8 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from ..assembly.body import CarriedObject, with_share
+from ..assembly.body import CarriedObject, Placed
+from ..assembly.carrier import carrier
 from ..assembly.grasp import Fixture, Grasp
 from ..assembly.holding import HoldingPlant
 from ..assembly.judged import fixture_plant
@@ -25,23 +26,19 @@ from ..assembly.tare import tared
 from ..checks import boolean, choice, finite_array, instance
 from ..control.admittance import Admittance
 from ..control.gains import Gains
-from ..coupling.cell import Cell, Member
+from ..coupling.cell import Cell
 from ..coupling.coupling import Coupling
 from ..robots.catalog import load_robot
 from ..robots.friction import Friction
-from ..robots.payload import holding
 from ..robots.robot import Robot
 from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
-from ..tasks.inverse_kinematics import reach
 from ..tasks.pose import PoseSpace
-from ..tasks.rotations import exp, log
-from .parts import ControllerParts, ready_experiment
+from ..tasks.rotations import exp
+from .parts import ControllerParts, leaking, ready_experiment
 from .ur5_payload import DISTANCE, DURATION, POSTURE, hand_on_payload, payload_motion
 from .ur5_payload import GAINS as HANDS_ALONE
 
-Pose = tuple[np.ndarray, np.ndarray]
-"""A position, (3,), m, and an orientation, (3, 3)."""
 PAYLOAD = CarriedObject(
     4.0, (0.03, 0.01, 0.0), 4.0 / 12 * np.array([0.12**2 + 0.12**2, 0.4**2 + 0.12**2, 0.4**2 + 0.12**2]),
     box=(0.4, 0.12, 0.12), center=(0.0, 0.0, 0.0), name="payload",
@@ -97,8 +94,8 @@ def carry_ur5(
     cell, pushes, yielding = tared(cell) if tare else cell, [PUSH] * bool(push), _admittance(admittance)
     made = ready_experiment(cell, DURATION, GAINS, gains, synchronized, parts, disturbances=pushes)
     plant = partial(kind, body=PAYLOAD, grasps=grasps, at=at, robots=arms, desired=payload_motion())
-    leaking = _leaking(made.gains, yielding is not None if leak is None else leak)
-    return replace(made, gains=leaking, plant_type=plant, admittance=yielding)
+    forgetful = leaking(made.gains, yielding is not None if leak is None else leak)
+    return replace(made, gains=forgetful, plant_type=plant, admittance=yielding)
 
 
 def _held(grasp: str | Fixture) -> tuple[Fixture, Callable[..., HoldingPlant]]:
@@ -119,41 +116,25 @@ def _admittance(admittance: bool | Admittance) -> Admittance | None:
     return (Admittance() if admittance else None) if isinstance(admittance, bool) else admittance
 
 
-def _leaking(gains: Gains, leak: float | bool) -> Gains:
-    return gains.replace(leak=gains.Lambda if leak is True else leak) if leak else gains
-
-
 def _arm(i: int) -> Robot:
     side, heading = ((-1.0, 0.0), (1.0, np.pi))[i]
     return load_robot("ur5").placed((side * DISTANCE, 0.0, 0.0), (0.0, 0.0, heading), name=f"UR5 {i + 1}")
 
 
-def _start_of_payload() -> Pose:
+def _start_of_payload() -> Placed:
     desired = payload_motion()(0.0).x
     return desired[:3] - OFFSET[:3], exp(-OFFSET[3:]) @ exp(desired[3:])
 
 
-def _cell(arms: list[Robot], grasps: list[Grasp], at: Pose, error: np.ndarray, friction: bool) -> Cell:
+def _cell(arms: list[Robot], grasps: list[Grasp], at: Placed, error: np.ndarray, friction: bool) -> Cell:
     """Both arms, of which the first is wrong by `error` about the payload in its hand."""
     rubs = FRICTION if friction else Friction()
-    members = [_member(arms[i], grasps[i], at, error * (i == 0), rubs, SHARES_KNOWN[i]) for i in range(2)]
+    members = [
+        carrier(
+            arms[i], grasps[i], PAYLOAD, payload_motion(), POSTURE,
+            at=at, known=SHARES_KNOWN[i], error=error * (i == 0),
+        )
+        for i in range(2)
+    ]  # fmt: skip
+    members = [replace(member, friction=rubs) for member in members]
     return Cell(members, Coupling.pair(), PoseSpace(), name="UR5 pair that carries a payload")
-
-
-def _member(
-    arm: Robot,
-    grasp: Grasp,
-    at: Pose,
-    error: np.ndarray,
-    friction: Friction,
-    known: float,
-) -> Member:
-    """An arm controlled at the payload as it believes to hold it, with half of the payload as its load."""
-    (p, R), (d, G) = at, grasp.object_in_hand
-    half = 0.5 * PAYLOAD.parameters
-    loaded = with_share(arm, half, d, G)
-    believed = holding(loaded, d + G @ error[:3], G @ exp(error[3:]), "payload")
-    hand = np.concatenate((p + R @ grasp.xyz, log(R @ grasp.rotation)))
-    q0 = reach(arm, hand, np.array(POSTURE), PoseSpace())
-    guess = arm.inertial_parameters + known * (loaded.inertial_parameters - arm.inertial_parameters)
-    return Member(believed, payload_motion(), q0, theta_hat0=guess, friction=friction, name=arm.name)

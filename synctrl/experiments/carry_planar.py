@@ -34,7 +34,7 @@ from ..tasks.poses import Attached, AxisRotation, PoseTrajectory
 from ..tasks.rotations import exp
 from ..tasks.spaces import CartesianSpace
 from ..tasks.trajectories import Motion
-from .parts import ControllerParts, ready_experiment
+from .parts import ControllerParts, leaking, ready_experiment
 
 MASS, EDGE = 2.0, 0.24  # kg, m
 _IZZ = 2 / 6 * EDGE**2  # kg·m^2
@@ -97,7 +97,7 @@ def carry_planar(
     grasps = [Grasp(i, (*PINS[i], 0.0), compliance=_pin(grasp)) for i in range(4)]
     kept: dict[str, Any] = {"body": PLATE, "grasps": grasps, "at": _start_of_plate(), "robots": arms}
     plant = partial(PinnedPlant, **kept, desired=plate_motion())
-    return replace(made, gains=_leaking(made.gains, leak), plant_type=plant)
+    return replace(made, gains=leaking(made.gains, leak), plant_type=plant)
 
 
 def plate_motion() -> PoseTrajectory:
@@ -176,7 +176,3 @@ def _pin(grasp: str | Pin) -> Pin:
         choice("grasp", grasp, ("compliant",))
         return PIN
     return grasp
-
-
-def _leaking(gains: Gains, leak: float | bool) -> Gains:
-    return gains.replace(leak=gains.Lambda if leak is True else leak) if leak else gains

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypedDict
+from typing import Any, TypedDict
 
-from ..checks import boolean, instance
+import numpy as np
+
+from ..checks import boolean, finite_array, instance
 from ..control.adaptation import Adaptation
 from ..control.gains import Gains
 from ..control.laws import Law
@@ -63,6 +65,18 @@ def ready_experiment(
     title = ", ".join([cell.name, kind, *remarks, *["disturbed"] * bool(disturbances)])
     gains = gains if synchronized else gains.independent()
     return Experiment(cell, gains, duration, disturbances, title=title, **parts)
+
+
+def leaking(gains: Gains, leak: Any) -> Gains:
+    """Gains with a leak of the integrals, 1/s; True stands for Lambda, False and 0 change nothing.
+
+    Raises:
+        InputError: no numbers, or a leak that `Gains` does not take.
+    """
+    if leak is False:
+        return gains
+    rates = gains.Lambda if leak is True else finite_array("leak", leak)
+    return gains.replace(leak=rates) if np.any(rates) else gains
 
 
 def _own(gains: Gains, parts: ControllerParts) -> Gains:

@@ -67,6 +67,9 @@ def check_inertia(robot: str, joint: str, row: np.ndarray) -> None:
     body = f"robot '{robot}', body of '{joint}'"
     if row[0] <= 0:
         raise RobotError.expected("a mass above 0 kg", row[0], body)
+    with np.errstate(over="ignore"):
+        if not np.isfinite(row @ row):
+            raise RobotError.expected("numbers of a size that bodies have", np.abs(row).max(), body)
     lowest, _, highest = principal_moments(row)
     if lowest < -NO_MOMENT or highest <= 0:
         positive, shown = "a positive definite inertia about the centre of mass", f"{lowest:g} kg·m^2"

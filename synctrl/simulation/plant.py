@@ -118,6 +118,7 @@ class Plant:
         saturate: bool = False,
         robots: Sequence[Robot] | None = None,
     ):
+        instance("cell", cell, Cell, "a Cell")
         instance("payloads", payloads, Sequence, "a sequence of Payload objects")
         self.cell, self.physics = cell, choice("plant", physics, tuple(PHYSICS))
         self.payloads, self.saturate = tuple(payloads), saturate

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, positive_number
+from ..checks import finite_array, instance, positive_number
 from ..errors import InputError
 from .ways import arc_lengths
 
@@ -22,6 +22,8 @@ DRAWN = 400
 STEPS = 4
 #: how far a spline through a function may miss it, as a share of its size: of a smooth one, and of any
 SMOOTH, FOLLOWED = 1e-9, 1e-5
+#: size of a curve, m, beyond which numbers do not go on
+LARGEST = 1e9
 #: points of a function, from the fewest to the most
 FEWEST, MOST = 32, 4096
 
@@ -102,6 +104,7 @@ def sampled(curve: Callable[[float], ArrayLike], period: float) -> tuple[np.ndar
     Raises:
         InputError: no function of points, no period, or a curve with a corner.
     """
+    instance("curve", curve, Callable, "a function of one number")  # type: ignore[arg-type]
     period, count = positive_number("period", period), FEWEST
     while True:
         u = period * np.arange(2 * count + 1) / (2 * count)
@@ -125,6 +128,8 @@ def _closed(points: Any) -> np.ndarray:
     if len(p) < 7:
         raise InputError.expected("at least 7 points", len(p), "points")
     size, gap = float(np.ptp(p, axis=0).max()), float(np.linalg.norm(p[-1] - p[0]))
+    if size > LARGEST:
+        raise InputError.expected(f"points within {LARGEST:g} m", size, "points")
     if gap > 1e-9 * size:
         raise InputError.expected("a closed curve, of which the last point is the first", gap, "points")
     steps = np.linalg.norm(np.diff(p, axis=0), axis=1)

@@ -85,7 +85,7 @@ class Edge(ClosedCurve):
         Raises:
             InputError: see `Edge` and `sampled`; or a curvature that jumps, if the nozzle is tilted.
         """
-        points, smooth = sampled(curve, period)
+        tilt, (points, smooth) = finite_number("tilt", tilt), sampled(curve, period)
         if tilt and not smooth:
             raise InputError.expected(
                 "an edge whose curvature does not jump, for a nozzle that is tilted", tilt, "tilt"

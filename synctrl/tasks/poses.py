@@ -219,9 +219,9 @@ def check_dimension(name: str, trajectory: Any, m: int) -> None:
     """Refuse what is no trajectory of m numbers.
 
     Raises:
-        InputError: something of another dimension or of none.
+        InputError: a class, or something of another dimension or of none.
     """
-    dimension = getattr(trajectory, "dimension", None)
+    dimension = None if isinstance(trajectory, type) else getattr(trajectory, "dimension", None)
     if dimension != m:
         numbers = f"{m} number{'s' * (m != 1)}"
         found = repr(trajectory) if dimension is None else f"one of {dimension}"
