@@ -205,7 +205,7 @@ FAULTS = {
     "a share takes another pair": ("sign * a->integral[pair + j]", "sign * a->integral[j]"),
     "the integral's sign is lost": ("sign * a->integral[pair + j]", "a->integral[pair + j]"),
     "the place of the base": ("X(base, n, 12) X(desired", "X(base, one, 12) X(desired"),
-    "the posture's gain": ("X(gain, n, nv)\n", "X(posture, n, nv)\n"),
+    "the posture's gain": ("X(gain, n, nv) X(z, n, Z)", "X(posture, n, nv) X(z, n, Z)"),
     "the weights of W": ("X(weights, n, 4*m*m) X(W_inv, n, nv)", "X(weights, n, 4*m*m) X(gain, n, nv)"),
     "another robot's damping": ("X(leak, one, m) X(K_r, n, K)", "X(leak, one, m) X(K_r, one, K)"),
     "another robot's true parameters": ("X(pi, n, bodies) X(true_base", "X(pi, one, bodies) X(true_base"),
@@ -215,8 +215,8 @@ FAULTS = {
     "which kind a robot is": ("kinds[c->kind[i]].function(", "kinds[c->kind[0]].function("),
     "the integral's rate": ("a->integral_dot[j] = a->epsilon[j]", "a->integral_dot[j] = a->epsilon_dot[j]"),
     "the leak of the integral": (" - a->leak[j % m] * a->integral[j]", ""),
-    "the order of what is desired": ("X(desired_dot, n, m) X(desired_ddot, n, m) X(weights",
-                                     "X(desired_ddot, n, m) X(desired_dot, n, m) X(weights"),
+    "the order of what is desired": ("X(desired_dot, n, m) X(desired_ddot, n, m) X(slide,",
+                                     "X(desired_ddot, n, m) X(desired_dot, n, m) X(slide,"),
 }  # fmt: skip
 
 

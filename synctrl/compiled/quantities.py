@@ -160,6 +160,9 @@ HEARD = "E", "sigma", "sigma_dot"
 
 FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
     {
+        "hand": Signature(
+            ("q", "v", "sine", "cosine", "true_base", "true_tool", "body", "grasp"), ("pull", "wrench")
+        ),
         "measure": Signature(
             (
                 "q", "v", "tool", "base", *DESIRED, *SLIDE, "weights", "W_inv", "posture", "gain",
@@ -178,9 +181,6 @@ FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
                 "felt", "giving",
             ),
             ("tau", "z_dot", "e_star", "s_q", "velocity_lost"),
-        ),
-        "hand": Signature(
-            ("q", "v", "sine", "cosine", "true_base", "true_tool", "body", "grasp"), ("pull", "wrench")
         ),
         "plant": Signature(("q", "v", "sine", "cosine", "moving", "pi", "true_base"), ("v_dot",)),
         "object": Signature(("body", "lift", "inertia"), ("body_dot",)),
