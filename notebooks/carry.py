@@ -16,6 +16,9 @@
 # Two UR5 hold a box of 4 kg between them and swing it about. Fixtures that give a little connect it to the
 # hands, so forces pass through it from arm to arm. Each arm has a controller of its own, which knows its arm,
 # learns a share of the box, and sees no force. How hard do the arms pull on what they hold?
+#
+# Runs are computed by the compiled engine, which needs `pip install 'synctrl[compiled]'` and a C compiler;
+# `ENGINE = "pinocchio"` does without, and takes many times as long.
 
 # %%
 # %matplotlib inline
@@ -31,10 +34,11 @@ from synctrl.show.curves import overlay
 
 # %%
 DURATION = 5.0  # s
+ENGINE = "compiled"
 
 
 def carried(**options):
-    return carry_ur5(**options).simulate(DURATION, dt=2e-3, log_dt=1e-2)
+    return carry_ur5(**options).simulate(DURATION, dt=2e-3, log_dt=1e-2, engine=ENGINE)
 
 
 def squeeze(run):

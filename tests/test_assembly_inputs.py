@@ -27,10 +27,10 @@ from synctrl.coupling.along_path import Gate, PathWeights
 from synctrl.errors import SynctrlError
 from synctrl.experiments import bead_on_edge, bead_on_path, carry_planar, carry_ur5
 from synctrl.tasks.edge import AlongEdge, Edge
-from synctrl.tasks.ways import RampUp as ToSpeed
 from synctrl.tasks.path import AlongPath, Path
-from synctrl.tasks.path import Ramped as ToRest
 from synctrl.tasks.sliding import Carrier, Rider
+from synctrl.tasks.ways import Ramped as ToRest
+from synctrl.tasks.ways import RampUp as ToSpeed
 
 NAN, INF, EYE, ZERO = np.nan, np.inf, np.eye(3), np.zeros(3)
 #: none of these is a part, and only `None` may stand for a default
