@@ -7,6 +7,7 @@ from typing import TypedDict
 
 from ..checks import boolean, instance
 from ..control.adaptation import Adaptation
+from ..control.admittance import Admittance
 from ..control.gains import Gains
 from ..control.laws import Law
 from ..control.network import Network
@@ -63,6 +64,21 @@ def ready_experiment(
     title = ", ".join([cell.name, kind, *remarks, *["disturbed"] * bool(disturbances)])
     gains = gains if synchronized else gains.independent()
     return Experiment(cell, gains, duration, disturbances, title=title, **parts)
+
+
+def giving_way(admittance: bool | Admittance, default: Admittance) -> Admittance | None:
+    """An admittance, the one of a cell for True, or none for False.
+
+    Raises:
+        InputError: neither a bool nor an admittance.
+    """
+    instance("admittance", admittance, (bool, Admittance), "a bool or an Admittance")
+    return (default if admittance else None) if isinstance(admittance, bool) else admittance
+
+
+def leaking(gains: Gains, leak: float | bool) -> Gains:
+    """Gains with a leak of the integrals, 1/s, of which True is Lambda; as they are without one."""
+    return gains.replace(leak=gains.Lambda if leak is True else leak) if leak else gains
 
 
 def _own(gains: Gains, parts: ControllerParts) -> Gains:
