@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
+from inspect import signature
 
 import numpy as np
 import pytest
@@ -14,12 +16,18 @@ from synctrl import Cell, Coupling, Gains, Hold, Member, Result, load_robot
 from synctrl.analysis import certify
 from synctrl.assembly.grasp import Fixture, Grasp, Pin
 from synctrl.assembly.pinned import PinnedPlant
+from synctrl.assembly.plant import CarryingPlant
+from synctrl.assembly.tare import tared_places
+from synctrl.control.admittance import Giving, GivingPlaces
 from synctrl.control.laws import Errors, ShapeKeeping
 from synctrl.control.laws.protocol import no_errors
 from synctrl.errors import InputError
-from synctrl.experiments import carry_planar
+from synctrl.experiments import carry_planar, carry_ur5
+from synctrl.experiments.carry_planar import ADMITTANCE, PINS
 from synctrl.simulation.plant import Plant
+from synctrl.tasks.measurement import Measurement
 from synctrl.tasks.rigid_motions import deformation, deformation_rate, place_matrix
+from synctrl.tasks.rotations import exp
 from synctrl.tasks.spaces import CartesianSpace
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -186,6 +194,131 @@ def test_synchronization_does_not_take_force_out_of_the_plate(run):
     assert force[0] < force[1]
 
 
+# -- a tare, and arms that give way ------------------------------------------------------------------------
+
+
+def apart(r: np.ndarray) -> np.ndarray:
+    """How far places, (..., k, d), are from each other, (..., k, k)."""
+    return np.linalg.norm(r[..., :, None, :] - r[..., None, :, :], axis=-1)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@given(SEEDS)
+def test_a_tare_of_pins_is_the_best_fit_and_does_not_depend_on_where_the_object_is(d, seed):
+    """Nothing is left of the differences of beliefs that a displacement or a turn could explain."""
+    rng, rho, noise = places(seed, d)
+    turn = exp(rng.normal(size=3) * (1.0 if d == 3 else [0.0, 0.0, 1.0]))[:d, :d]
+    way = rng.normal(size=d)
+    np.testing.assert_allclose(tared_places(rho, rho @ turn.T + way), rho, atol=1e-7)
+    pins = rho + 0.01 * noise
+    tared = tared_places(rho, pins @ turn.T + way)
+    np.testing.assert_allclose(apart(tared), apart(pins), atol=1e-9)
+    np.testing.assert_allclose(tared, tared_places(rho, pins), atol=1e-6)
+    np.testing.assert_allclose(place_matrix(rho) @ (tared - rho).ravel(), 0.0, atol=1e-7)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_tare_turns_places_and_never_mirrors_them(d):
+    rho = np.random.default_rng(1).normal(size=(6, d))
+    rho -= rho.mean(axis=0)
+    mirrored = rho * [-1.0, *[1.0] * (d - 1)]
+    turned = np.linalg.lstsq(mirrored, tared_places(rho, mirrored))[0]
+    np.testing.assert_allclose(turned @ turned.T, np.eye(d), atol=1e-12)
+    assert np.linalg.det(turned) == pytest.approx(1.0)
+
+
+def test_a_tare_makes_arms_ask_for_a_plate_of_the_right_shape():
+    times = np.linspace(0.0, 2.0, 5)
+    wrong, right = (
+        np.stack([at_t.xd for at_t in carry_planar(geometric_error=True, tare=tare).cell.references(times)])
+        for tare in (False, True)
+    )
+    shape = np.broadcast_to(apart(PINS), (5, 4, 4))
+    assert np.abs(apart(wrong) - shape).max() > 1e-3
+    np.testing.assert_allclose(apart(right), shape, atol=1e-12)
+    assert np.abs(right - wrong).max() < 2e-3
+
+
+@pytest.mark.parametrize("massless", [False, True])
+@given(SEEDS)
+def test_places_give_way_like_poses_whose_axes_do_not_turn(massless, seed):
+    rng = np.random.default_rng(seed)
+    D, mass = rng.uniform(1.0, 2.0, 6), np.full(6, 0.0 if massless else 0.5)
+    y, e, rates, h = rng.normal(size=(4, 2, 4, 6))
+    task = Measurement(np.zeros_like(e), e, rates)
+    poses = Giving(D, mass, np.sign(mass)).moved(task, y, np.zeros((3, 4, 6)), h[0])[0]
+    cut = Measurement(*(part[..., :2] for part in (task.motion, e, rates)))
+    parts = (part[:2] for part in (D, mass, np.sign(mass)))
+    found, felt = GivingPlaces(*parts).moved(cut, y[..., :2], np.zeros((3, 4, 2)), h[0][:, :2])
+    assert np.array_equal(felt, h[0][:, :2])
+    np.testing.assert_allclose(found.error, poses.error[..., :2])
+    np.testing.assert_allclose(found.rates, poses.rates[..., :2])
+
+
+@pytest.fixture(scope="module")
+def yielding() -> Result:
+    return carry_planar(geometric_error=True, admittance=True).simulate(0.6, dt=1.5e-3)
+
+
+def test_arms_give_way_by_what_the_force_inside_pushed_them(yielding):
+    inner, y = (yielding.outputs[name] for name in ("internal_force", "admittance"))
+    assert y.shape == inner.shape == (len(yielding.t), 4, 2)
+    pushed = np.trapezoid(inner, yielding.t, axis=0)
+    np.testing.assert_allclose(-ADMITTANCE.damping[0] * y[-1], pushed, atol=0.01 * np.abs(pushed).max())
+    np.testing.assert_allclose(y.sum(axis=1), 0.0, atol=1e-12)
+
+
+def test_what_hands_feel_at_pins_is_the_force_inside_and_no_load(yielding):
+    plant = yielding.experiment.closed_loop().plant
+    felt = plant.felt(yielding.q[-1], yielding.v[-1], yielding.outputs["plant_state"][-1])
+    np.testing.assert_allclose(felt[:, :2], yielding.outputs["internal_force"][-1])
+    assert not felt[:, 2].any()
+    np.testing.assert_allclose(felt.sum(axis=0)[[0, 1, 5]], 0.0, atol=1e-10)
+
+
+def late_force(run: Result) -> float:
+    """Root mean square of the force inside after the start, N."""
+    return float(np.sqrt(np.mean(run.outputs["internal_force"][run.t > 0.3] ** 2)))
+
+
+def test_a_tare_and_an_admittance_each_take_out_half_of_the_force_of_wrong_pins(yielding):
+    wrong, tared = (
+        late_force(made.simulate(0.6, dt=1.5e-3, log_dt=0.03))
+        for made in (carry_planar(geometric_error=True, leak=True, tare=tare) for tare in (False, True))
+    )
+    assert late_force(yielding) < 0.5 * wrong and tared < 0.5 * wrong
+
+
+def test_no_theorem_covers_arms_that_give_way_at_pins():
+    made = carry_planar(geometric_error=True, admittance=True)
+    certificate = certify(made.simulate(0.04, dt=1e-3))
+    assert certificate.verdict == "outside the theorem"
+    assert any("not the pose" in words for words in certificate.outside)
+
+
+def test_integrals_leak_with_an_admittance_where_the_law_has_any():
+    assert np.array_equal(carry_planar(admittance=True).gains.leak, carry_planar().gains.Lambda)
+    assert not np.any(carry_planar(law=ShapeKeeping(), admittance=True).gains.leak)
+    assert not np.any(carry_planar(admittance=True, leak=0.0).gains.leak)
+
+
+@pytest.mark.parametrize("plant", [PinnedPlant, CarryingPlant])
+def test_the_compiled_engine_refuses_arms_that_give_way_at_pins(plant):
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    made = carry_planar(admittance=True)
+    made = replace(made, plant_type=partial(plant, **made.plant_type.keywords))
+    with refused(InputError, "plant" if plant is PinnedPlant else "admittance"):
+        made.simulate(0.01, dt=1e-3, engine="compiled")
+
+
+def test_both_cells_that_carry_have_the_same_options():
+    options = [
+        {name: option.default for name, option in signature(cell).parameters.items()}
+        for cell in (carry_planar, carry_ur5)
+    ]
+    assert options[0] == options[1]
+
+
 def with_pins(**changed) -> PinnedPlant:
     experiment = carry_planar()
     return PinnedPlant(experiment.cell, **{**experiment.plant_type.keywords, **changed})
@@ -201,8 +334,10 @@ def with_pins(**changed) -> PinnedPlant:
         (lambda: carry_planar(grasp="rigid"), "grasp"),
         (lambda: carry_planar(grasp=Fixture()), "grasp"),
         (lambda: carry_planar(geometric_error=1e-3), "geometric_error"),
-        (lambda: carry_planar(tare=True), "tare"),
-        (lambda: carry_planar(admittance=True), "admittance"),
+        (lambda: carry_planar(tare=1), "tare"),
+        (lambda: carry_planar(admittance=1.0), "admittance"),
+        (lambda: carry_planar(law=ShapeKeeping(), admittance=True, leak=1.0).closed_loop(), "leak"),
+        (lambda: tared_places(np.eye(3), np.eye(2)), "found"),
         (lambda: carry_planar(friction=1), "friction"),
     ],
 )

@@ -30,11 +30,8 @@ class PinnedPlant(CarryingPlant):
 
     def account(self, log: Mapping[str, np.ndarray]) -> tuple[dict[str, Any], dict[str, Output]]:
         report, found = super().account(log)
-        forces, _, axes = found["hand_wrench"]
-        r = self._levers(log["plant_state"])[..., :2]
-        flat = forces[..., :2].reshape(len(r), -1)
-        inner = np.matvec(deformation(r), flat).reshape(r.shape)
-        return report, {**found, "internal_force": (inner, "N", axes)}
+        inner, _, axes = found["internal_force"]
+        return report, {**found, "internal_force": (inner[..., :2], "N", axes)}
 
     # -- internals ----------------------------------------------------------------------------------------
 
@@ -44,3 +41,10 @@ class PinnedPlant(CarryingPlant):
                 found = type(grasp.compliance).__name__
                 raise InputError.expected("pins, compliance=Pin(...)", found, "grasps")
         return tuple(grasps)
+
+    def _inside(self, wrenches: np.ndarray, levers: np.ndarray) -> np.ndarray:
+        """N h along x and y, and nothing else."""
+        inner, r = np.zeros_like(wrenches), levers[..., :2]
+        flat = wrenches[..., :2].reshape(*r.shape[:-2], -1)
+        inner[..., :2] = np.matvec(deformation(r), flat).reshape(r.shape)
+        return inner

@@ -50,7 +50,7 @@ class CarryingPlant(HoldingPlant):
     def felt(self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray) -> np.ndarray:
         """Internal wrenches about the object's origin, (n, 6); zeros for robots that do not hold it."""
         levers, found = self._levers(hidden[None])[0], np.zeros((len(q), 6))
-        inner = internal_wrenches(self._wrenches(q, v, hidden)[0], levers)
+        inner = self._inside(self._wrenches(q, v, hidden)[0], levers)
         found[self._hands] = np.matvec(grasp_matrix(levers), inner)
         return found
 
@@ -73,7 +73,11 @@ class CarryingPlant(HoldingPlant):
         rows = zip(log["q"], log["v"], log["plant_state"], strict=True)
         levers = self._levers(log["plant_state"])
         h = np.array([self._wrenches(*row)[0] for row in rows]).reshape(*levers.shape[:2], 6)
-        return h, internal_wrenches(h, levers)
+        return h, self._inside(h, levers)
+
+    def _inside(self, wrenches: np.ndarray, levers: np.ndarray) -> np.ndarray:
+        """Internal part of wrenches of the hands, (..., k, 6) each, at levers, (..., k, 3)."""
+        return internal_wrenches(wrenches, levers)
 
     def _object_rate(self, hidden: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
         levers = self.arms @ place_of(hidden[:7])[1].T

@@ -8,6 +8,9 @@ T_o = T_hand,1 D_1, can be everybody's:
 
 for the tips are the object's frame as each arm believes it. Constant errors of grasps then vanish from
 epsilon as long as the geometry is kept; wrong orientations of bases come back as the object turns.
+
+At pins no arm knows by itself how the object is turned. There the common belief is the pose in which the
+places that all of them believe fit best to where their pins are, and each takes its own place from that.
 """
 
 from __future__ import annotations
@@ -15,8 +18,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..checks import index, instance
+from ..checks import finite_array, index, instance
 from ..coupling.cell import Cell, Member
 from ..robots.payload import holding
 from ..tasks.rotations import log
@@ -46,6 +50,31 @@ def believed_poses(cell: Cell) -> tuple[np.ndarray, np.ndarray]:
     """Where each robot's tip is at t = 0: positions, (n, 3), m, and orientations, (n, 3, 3)."""
     tips = [robot.tip_pose(q[: robot.nv]) for robot, q in zip(cell.robots, cell.q0, strict=True)]
     return np.array([tip.translation for tip in tips]), np.array([tip.rotation for tip in tips])
+
+
+def tared_places(believed: ArrayLike, found: ArrayLike) -> np.ndarray:
+    """Places on an object after a tare: where pins are in the pose that all beliefs together fit best.
+
+    With T_o of least sum |T_o rho_i - p_i|^2 they are T_o^-1 p_i, as far apart from each other as the pins
+    are. Constant errors of the rho_i vanish but for one displacement and one turn that all of them share.
+
+    Args:
+        believed: rho_i, where each arm believes its pin on the object, (k, d), m.
+        found: p_i, where the pins are at closure, (k, d), m, in any axes.
+
+    Returns:
+        Places in the object's axes, (k, d), m.
+
+    Raises:
+        InputError: numbers that are not finite, or another number of pins than of places.
+    """
+    rho = finite_array("believed", believed, (None, None))
+    p = finite_array("found", found, rho.shape)
+    middle = rho.mean(axis=0)
+    U, _, V = np.linalg.svd((rho - middle).T @ (p - p.mean(axis=0)))
+    sign = np.ones(len(V))
+    sign[-1] = np.linalg.det(U @ V)  # a turn, not a mirror
+    return middle + (p - p.mean(axis=0)) @ (U * sign @ V).T
 
 
 def disagreement(cell: Cell, than: int = 0) -> np.ndarray:

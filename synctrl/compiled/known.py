@@ -58,6 +58,8 @@ BODY = 13
 GRIP = 8
 #: what a plant may say of a run, or refuse before it, without moving otherwise for it
 TELLS = frozenset({"outputs", "report", "account", "chain", "_checked"})
+#: what of a plant only arms that give way ask for
+FELT = frozenset({"felt", "_inside"})
 COMPILED_BEFORE = "its equations were compiled before"
 #: modules whose functions the parts of a closed loop call, beside those of their own
 LINES = (law, algebra, rotations, grasp)
@@ -107,7 +109,8 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     controller, cell = loop.controller, loop.controller.cell
     task: Any = cell.task
     yield Part("closed loop", loop, (ClosedLoop,))
-    yield Part("plant", loop.plant, (_moved_as(loop.plant), *PLANTS))
+    beside = TELLS if controller.admittance else TELLS | FELT
+    yield Part("plant", loop.plant, (_moved_as(loop.plant, beside), *PLANTS))
     if isinstance(loop.plant, CarryingPlant):
         yield from _held(loop.plant)
     yield Part("schedule of payloads", loop.plant.schedule, (PayloadSchedule,))
@@ -184,12 +187,12 @@ def _check_type(part: Part) -> None:
         raise _refusal(part.role, name, f"{name}, only {names} and no subclass: {COMPILED_BEFORE}")
 
 
-def _moved_as(plant: Any) -> type:
+def _moved_as(plant: Any, tells: frozenset[str]) -> type:
     """The type of a plant that the package's own moves, of whatever else it tells; else the package's own."""
     own = next((kind for kind in PLANTS if isinstance(plant, kind)), Plant)
     kinds = type(plant).__mro__
     beside = kinds[: kinds.index(own)] if own in kinds else kinds
-    changed = {name for kind in beside for name in vars(kind)}.intersection(_names_of(own)) - TELLS
+    changed = {name for kind in beside for name in vars(kind)}.intersection(_names_of(own)) - tells
     return own if changed else type(plant)
 
 

@@ -8,6 +8,9 @@ object's origin, as `h_i` sums to zero over the hands,
 
 y is kept in the axes of the desired pose R_d, in which an error of the geometry of grasps is constant; in
 world axes it is Y = R_d y with Y' = R_d y' + w_d x Y. With M_a = 0 y' = -h / D_a, and y counts in e alone.
+
+Of arms that are told places alone, as at pins, h is a force and y a displacement, both in world axes: places
+have no axes of their own. An error of the geometry then turns with the object, and y has to follow it.
 """
 
 from __future__ import annotations
@@ -23,6 +26,7 @@ from ..errors import InputError
 from ..tasks.measurement import Measurement
 from ..tasks.pose import PoseSpace
 from ..tasks.rotations import exp
+from ..tasks.spaces import CartesianSpace
 from .adaptation import BoundAdaptation, Seen, after_sample
 from .adaptation.protocol import check_still, check_three_rows
 
@@ -31,7 +35,8 @@ class Admittance:
     """Arms that give way to internal wrenches, as a mass and a damper would.
 
     V stays a Lyapunov function if D_a > (Lambda + beta d) M_a, d the largest eigenvalue of S^T S, with
-    integrals that leak at Lambda; runs of which this does not hold warn and are outside the theorem.
+    integrals that leak at Lambda; runs of which this does not hold warn and are outside the theorem. So are
+    arms that are told places, which have no use for the second numbers.
 
     Args:
         mass: M_a against displacement, kg, and against turning, kg·m^2, at least 0.
@@ -57,9 +62,10 @@ class Admittance:
             adaptation, network: for its robots.
 
         Raises:
-            InputError: another space than that of poses, or one in which errors count at points that slide;
-                weights other than the identity or minus it; an adaptation that moves or slows down the
-                desired motion too; or a network whose messages would tell of errors that do not give way.
+            InputError: another space than those of poses and of places, or one in which errors count at
+                points that slide; weights other than the identity or minus it; an adaptation that moves or
+                slows down the desired motion too; or a network whose messages would tell of errors that do
+                not give way.
         """
         _check_cell(cell)
         check_still("an admittance", adaptation, adaptation)
@@ -67,7 +73,10 @@ class Admittance:
             words = "an admittance expects a network without messages, for example Ideal(), found"
             name = type(network).__name__
             raise InputError(f"{words} {name}", subject="network", found=name)
-        return BoundAdmittance(adaptation, np.repeat(self.mass, 3), np.repeat(self.damping, 3))
+        if isinstance(cell.space, PoseSpace):
+            return BoundAdmittance(adaptation, np.repeat(self.mass, 3), np.repeat(self.damping, 3))
+        mass, damping = (np.full(cell.m, pair[0]) for pair in (self.mass, self.damping))
+        return BoundPlaceAdmittance(adaptation, mass, damping, cell.space.rows)  # type: ignore[attr-defined]
 
     def as_dict(self) -> dict[str, Any]:
         """Its settings as plain data."""
@@ -78,9 +87,9 @@ class Giving(NamedTuple):
     """How arms give way, robot by robot; plain array arithmetic, which runs on symbols too.
 
     Attributes:
-        damping: D_a of the six directions, (6,).
-        inverse_mass: 1 / M_a, (6,); 0 without a mass.
-        inertial: whether there is a mass, 1 or 0, (6,).
+        damping: D_a of the m directions, (m,).
+        inverse_mass: 1 / M_a, (m,); 0 without a mass.
+        inertial: whether there is a mass, 1 or 0, (m,).
     """
 
     damping: np.ndarray
@@ -105,31 +114,48 @@ class Giving(NamedTuple):
         """
         axes = exp(desired[0][..., 3:])[..., None, :, :]
         h = np.matvec(axes.mT, wrenches.reshape(*wrenches.shape[:-1], 2, 3)).reshape(wrenches.shape)
-        Y = _in_world(axes, desired, np.stack((y[0], *self.rates(y[1], h))))
+        return self._added(task, _in_world(axes, desired, np.stack((y[0], *self.rates(y[1], h))))), h
+
+    def _added(self, task: Measurement, Y: np.ndarray) -> Measurement:
+        """What was measured, with Y, Y' and Y'', (3, ..., m), in its errors and rates."""
         error, rates = task.error + Y[:2], task.rates + self.inertial * Y[1:]
-        found = task.motion, error, rates, task.J, task.J_inv, task.J_dot, task.inversion
-        return Measurement(*found), h
+        return Measurement(task.motion, error, rates, task.J, task.J_inv, task.J_dot, task.inversion)
+
+
+class GivingPlaces(Giving):
+    """How arms that are told places give way: as they are pushed, along the axes of the world."""
+
+    __slots__ = ()
+
+    def moved(
+        self, task: Measurement, y: np.ndarray, desired: np.ndarray, wrenches: np.ndarray
+    ) -> tuple[Measurement, np.ndarray]:
+        """What was measured after it gave way, and the forces as they are; all rows are (..., m)."""
+        return self._added(task, np.stack((y[0], *self.rates(y[1], wrenches)))), wrenches
 
 
 class BoundAdmittance:
-    """`Admittance` with the adaptation of a cell: its z is the adaptation's, and behind it y and y', (n, 6).
+    """`Admittance` with the adaptation of a cell: its z is the adaptation's, and behind it y and y', (n, m).
 
     Attributes:
-        mass, damping: M_a and D_a of the six directions, (6,).
+        mass, damping: M_a and D_a of the m directions, (m,).
         giving: the same for the equations.
     """
+
+    kind: type[Giving] = Giving
+    unit = "m, rad"
 
     def __init__(self, adaptation: Any, mass: np.ndarray, damping: np.ndarray):
         self.adaptation, self.mass, self.damping = adaptation, mass, damping
         self._first = adaptation.start()
         self._Z = self._first.shape[1]
         inertial = (mass > 0).astype(float)
-        self.giving = Giving(damping, inertial / np.where(mass > 0, mass, 1.0), inertial)
+        self.giving = self.kind(damping, inertial / np.where(mass > 0, mass, 1.0), inertial)
 
     # -- what gives way -----------------------------------------------------------------------------------
 
     def given_way(self, z: np.ndarray) -> np.ndarray:
-        """y and y' of states z, (..., n, Z), in the desired axes: (2, ..., n, 6)."""
+        """y and y' of states z, (..., n, Z), in the desired axes: (2, ..., n, m)."""
         return np.stack(np.split(z[..., self._Z :], 2, axis=-1))
 
     def moved(
@@ -144,7 +170,7 @@ class BoundAdmittance:
             wrenches: internal wrenches in world axes, (n, 6), N and N·m.
 
         Returns:
-            The same with errors that gave way, and the wrenches in the desired axes, (n, 6).
+            The same with errors that gave way, and the wrenches in the desired axes, (n, m).
 
         Raises:
             InputError: nobody measured wrenches.
@@ -154,7 +180,7 @@ class BoundAdmittance:
     # -- the adaptation, with y and y' behind its state ---------------------------------------------------
 
     def start(self) -> np.ndarray:
-        return np.concatenate((self._first, np.zeros((len(self._first), 12))), axis=1)
+        return np.concatenate((self._first, np.zeros((len(self._first), 2 * len(self.mass)))), axis=1)
 
     def estimate(self, z: np.ndarray) -> np.ndarray:
         return self.adaptation.estimate(z[:, : self._Z])
@@ -176,7 +202,7 @@ class BoundAdmittance:
 
     def outputs(self, z: np.ndarray) -> dict[str, tuple[np.ndarray, str, tuple[str, ...]]]:
         """What a result gets of states z, (T, n, Z): y, by how much each arm gave way."""
-        return {"admittance": (self.given_way(z)[0], "m, rad", ("time", "robot", "axis"))}
+        return {"admittance": (self.given_way(z)[0], self.unit, ("time", "robot", "axis"))}
 
     def storage(self, z: np.ndarray, theta: np.ndarray) -> float:
         return self.adaptation.storage(z[:, : self._Z], theta)
@@ -186,6 +212,29 @@ class BoundAdmittance:
 
     def powers(self, z: np.ndarray, theta: np.ndarray, seen: Seen) -> Mapping[str, float]:
         return self.adaptation.powers(z[:, : self._Z], theta, seen)
+
+
+class BoundPlaceAdmittance(BoundAdmittance):
+    """The same of arms that are told places: of wrenches they feel the forces along their coordinates.
+
+    Args:
+        adaptation: of the cell.
+        mass, damping: M_a and D_a, (m,).
+        rows: which of x, y and z the m coordinates are.
+    """
+
+    kind = GivingPlaces
+    unit = "m"
+
+    def __init__(self, adaptation: Any, mass: np.ndarray, damping: np.ndarray, rows: list[int]):
+        super().__init__(adaptation, mass, damping)
+        self._rows = rows
+
+    def moved(
+        self, task: Measurement, z: np.ndarray, reference: Reference, wrenches: np.ndarray | None
+    ) -> tuple[Measurement, np.ndarray]:
+        """As of poses, with the forces along the coordinates, (n, m), for what is felt."""
+        return super().moved(task, z, reference, _felt(wrenches)[:, self._rows])
 
 
 def _felt(wrench: np.ndarray | None) -> np.ndarray:
@@ -206,10 +255,11 @@ def _in_world(axes: np.ndarray, desired: np.ndarray, y: np.ndarray) -> np.ndarra
 
 
 def _check_cell(cell: Cell) -> None:
-    instance("space", cell.space, PoseSpace, "PoseSpace(), in which an admittance gives way")
+    spaces = "PoseSpace() or CartesianSpace(), in which an admittance gives way"
+    instance("space", cell.space, (PoseSpace, CartesianSpace), spaces)
     check_three_rows("an admittance", cell.space)
     weights = cell.references(np.zeros(1))[0].weights
-    if weights.move or not np.array_equal(np.abs(weights.c), np.tile(np.eye(6), (cell.n, 1, 1))):
+    if weights.move or not np.array_equal(np.abs(weights.c), np.tile(np.eye(cell.m), (cell.n, 1, 1))):
         raise InputError(
             "an admittance expects weights of one object's frame, the identity or minus it",
             subject="coupling",

@@ -23,7 +23,7 @@ from ..assembly.holding import HoldingPlant
 from ..assembly.judged import fixture_plant
 from ..assembly.rigid import RigidPlant
 from ..assembly.tare import tared
-from ..checks import boolean, choice, finite_array, instance
+from ..checks import boolean, choice, finite_array
 from ..control.admittance import Admittance
 from ..control.gains import Gains
 from ..coupling.cell import Cell
@@ -35,7 +35,7 @@ from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
 from ..tasks.pose import PoseSpace
 from ..tasks.rotations import exp
-from .parts import ControllerParts, leaking, ready_experiment
+from .parts import ControllerParts, giving_way, leaking, ready_experiment
 from .ur5_payload import DISTANCE, DURATION, POSTURE, hand_on_payload, payload_motion
 from .ur5_payload import GAINS as HANDS_ALONE
 
@@ -91,7 +91,8 @@ def carry_ur5(
     grasps = [Grasp(i, *hand_on_payload(i), fixture) for i in range(2)]
     at, arms = _start_of_payload(), [_arm(i) for i in range(2)]
     cell = _cell(arms, grasps, at, _error(geometric_error), friction)
-    cell, pushes, yielding = tared(cell) if tare else cell, [PUSH] * bool(push), _admittance(admittance)
+    cell, pushes = tared(cell) if tare else cell, [PUSH] * bool(push)
+    yielding = giving_way(admittance, Admittance())
     made = ready_experiment(cell, DURATION, GAINS, gains, synchronized, parts, disturbances=pushes)
     plant = partial(kind, body=PAYLOAD, grasps=grasps, at=at, robots=arms, desired=payload_motion())
     forgetful = leaking(made.gains, yielding is not None if leak is None else leak)
@@ -109,11 +110,6 @@ def _held(grasp: str | Fixture) -> tuple[Fixture, Callable[..., HoldingPlant]]:
 def _error(given: bool | Any) -> np.ndarray:
     error = GEOMETRIC_ERROR * given if isinstance(given, bool) else given
     return finite_array("geometric_error", error, (6,))
-
-
-def _admittance(admittance: bool | Admittance) -> Admittance | None:
-    instance("admittance", admittance, (bool, Admittance), "a bool or an Admittance")
-    return (Admittance() if admittance else None) if isinstance(admittance, bool) else admittance
 
 
 def _arm(i: int) -> Robot:

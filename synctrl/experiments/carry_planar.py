@@ -8,6 +8,7 @@ our choice and not the paper's.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any, Unpack
@@ -18,12 +19,13 @@ from numpy.typing import ArrayLike
 from ..assembly.body import CarriedObject, with_share
 from ..assembly.grasp import Grasp, Pin
 from ..assembly.pinned import PinnedPlant
+from ..assembly.tare import tared_places
 from ..checks import boolean, choice, finite_array
+from ..control.admittance import Admittance
 from ..control.gains import Gains
 from ..control.laws import ShapeKeeping
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
-from ..errors import InputError
 from ..robots.catalog import load_robot
 from ..robots.friction import Friction
 from ..robots.robot import Robot
@@ -34,7 +36,7 @@ from ..tasks.poses import Attached, AxisRotation, PoseTrajectory
 from ..tasks.rotations import exp
 from ..tasks.spaces import CartesianSpace
 from ..tasks.trajectories import Motion
-from .parts import ControllerParts, leaking, ready_experiment
+from .parts import ControllerParts, giving_way, leaking, ready_experiment
 
 MASS, EDGE = 2.0, 0.24  # kg, m
 _IZZ = 2 / 6 * EDGE**2  # kg·m^2
@@ -56,6 +58,8 @@ PUSH = Disturbance(0, (1.0, 1.0), 1.0, 1.25)
 PIN = Pin(1e5, 100.0)
 GAINS = Gains(Lambda=10.0, beta=20.0, K_r=0.5, K_eps=20.0, Gamma=0.5)
 DURATION = 4.0  # s
+#: without a mass; the second numbers, against turning, have no part in it
+ADMITTANCE = Admittance(mass=(0.0, 0.0), damping=(200.0, 200.0))
 SPACE = CartesianSpace("xy")
 
 
@@ -65,9 +69,9 @@ def carry_planar(
     geometric_error: bool | ArrayLike = False,
     friction: bool = False,
     push: bool = False,
-    leak: float | bool = 0.0,
+    leak: float | bool | None = None,
     tare: bool = False,
-    admittance: bool = False,
+    admittance: bool | Admittance = False,
     gains: Gains | None = None,
     **parts: Unpack[ControllerParts],
 ) -> Experiment:
@@ -75,29 +79,29 @@ def carry_planar(
 
     Args:
         synchronized, gains, parts: see `ready_experiment`; with `law=ShapeKeeping()`, which has no place for
-            it, the gains of the cell leave out K_eps.
+            them, the gains of the cell leave out K_eps and a leak.
         grasp: "compliant" for the pins of the cell, or a `Pin`.
         geometric_error: whether the arms are wrong about where their pins are on the plate, by about 1 mm, or
             by how much, (4, 2), m, in the plate's axes.
         friction: whether the joints rub, which the controller does not know.
         push: whether both joints of arm 1 are pushed for a quarter of a second.
-        leak: of the integrals of epsilon, 1/s, see `Gains`; True for Lambda.
-        tare, admittance: False; pins have neither yet.
+        leak: of the integrals of epsilon, 1/s, see `Gains`; True for Lambda, which is the default with an
+            admittance; without one it is 0.
+        tare: whether all arms take over at closure where their beliefs together put the plate, see
+            `tared_places`.
+        admittance: whether the arms give way to the forces inside, as `ADMITTANCE` does, or how.
 
     Raises:
         InputError: a value that is none of these.
     """
-    _refuse(tare=tare, admittance=admittance)
-    boolean("friction", friction), boolean("push", push)
+    boolean("friction", friction), boolean("push", push), boolean("tare", tare)
     arms = [load_robot("planar2r").placed((*BASES[i], 0.0), name=f"arm {i + 1}") for i in range(4)]
-    cell = _cell(arms, _errors(geometric_error), FRICTION if friction else Friction())
-    default = GAINS.replace(K_eps=0.0) if isinstance(parts.get("law"), ShapeKeeping) else GAINS
-    pushes = [PUSH] * bool(push)
+    cell = _cell(arms, _places(geometric_error, tare), FRICTION if friction else Friction())
+    shape, yielding = isinstance(parts.get("law"), ShapeKeeping), giving_way(admittance, ADMITTANCE)
+    default, pushes = GAINS.replace(K_eps=0.0) if shape else GAINS, [PUSH] * bool(push)
     made = ready_experiment(cell, DURATION, default, gains, synchronized, parts, disturbances=pushes)
-    grasps = [Grasp(i, (*PINS[i], 0.0), compliance=_pin(grasp)) for i in range(4)]
-    kept: dict[str, Any] = {"body": PLATE, "grasps": grasps, "at": _start_of_plate(), "robots": arms}
-    plant = partial(PinnedPlant, **kept, desired=plate_motion())
-    return replace(made, gains=leaking(made.gains, leak), plant_type=plant)
+    gains = leaking(made.gains, yielding is not None and not shape if leak is None else leak)
+    return replace(made, gains=gains, plant_type=_plant(arms, grasp), admittance=yielding)
 
 
 def plate_motion() -> PoseTrajectory:
@@ -136,20 +140,15 @@ class InPlane:
         return Motion(x[..., :2], x_dot[..., :2], x_ddot[..., :2])
 
 
-def _refuse(**wanted: Any) -> None:
-    for name, value in wanted.items():
-        if value is not False:
-            raise InputError.expected("False, for pins have none yet", value, name)
-
-
-def _errors(given: bool | ArrayLike) -> np.ndarray:
-    """By how much the arms are wrong about where their pins are, (4, 2), m."""
+def _places(given: bool | ArrayLike, tare: bool) -> np.ndarray:
+    """Where the arms believe their pins on the plate, (4, 2), m."""
     error = GEOMETRIC_ERROR * given if isinstance(given, bool) else given
-    return finite_array("geometric_error", error, (4, 2))
+    places = PINS + finite_array("geometric_error", error, (4, 2))
+    return tared_places(places, _start_of_pins()) if tare else places
 
 
-def _cell(arms: list[Robot], errors: np.ndarray, friction: Friction) -> Cell:
-    members = [_member(arm, i, errors[i], friction) for i, arm in enumerate(arms)]
+def _cell(arms: list[Robot], places: np.ndarray, friction: Friction) -> Cell:
+    members = [_member(arm, i, places[i], friction) for i, arm in enumerate(arms)]
     return Cell(members, Coupling.signed_ring(4), SPACE, name="four planar arms that carry a plate")
 
 
@@ -157,18 +156,29 @@ def _start_of_plate() -> tuple[np.ndarray, np.ndarray]:
     return -OFFSET, exp(np.array([0.0, 0.0, -TURNED]))
 
 
-def _member(arm: Robot, i: int, error: np.ndarray, friction: Friction) -> Member:
-    """An arm controlled at its pin, with a quarter of the plate's mass there, wherever it believes that."""
+def _start_of_pins() -> np.ndarray:
+    """Where the pins are when the hands close, (4, 2), m."""
+    p, R = _start_of_plate()
+    return p[:2] + PINS @ R[:2, :2].T
+
+
+def _member(arm: Robot, i: int, place: np.ndarray, friction: Friction) -> Member:
+    """An arm controlled at its pin, with a quarter of the plate's mass there, at a place that it believes."""
     quarter = np.array([MASS / 4, *[0.0] * 9])
     loaded = with_share(arm, quarter, np.zeros(3), np.eye(3))
-    p, R = _start_of_plate()
-    pin = p + R @ (*PINS[i], 0.0)
-    heading = np.arctan2(*(pin[:2] - BASES[i])[::-1])
-    q0 = inverse_kinematics(arm, pin[:2], np.array([heading - 0.7, 1.4]), SPACE)
+    pin = _start_of_pins()[i]
+    heading = np.arctan2(*(pin - BASES[i])[::-1])
+    q0 = inverse_kinematics(arm, pin, np.array([heading - 0.7, 1.4]), SPACE)
     known = ARMS_KNOWN * arm.inertial_parameters
     share = SHARES_KNOWN[i] * (loaded.inertial_parameters - arm.inertial_parameters)
-    motion = InPlane(plate_motion(), PINS[i] + error)
+    motion = InPlane(plate_motion(), place)
     return Member(loaded, motion, q0, theta_hat0=known + share, friction=friction, name=arm.name)
+
+
+def _plant(arms: list[Robot], grasp: str | Pin) -> Callable[..., PinnedPlant]:
+    grasps = [Grasp(i, (*PINS[i], 0.0), compliance=_pin(grasp)) for i in range(4)]
+    kept: dict[str, Any] = {"body": PLATE, "grasps": grasps, "at": _start_of_plate(), "robots": arms}
+    return partial(PinnedPlant, **kept, desired=plate_motion())
 
 
 def _pin(grasp: str | Pin) -> Pin:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..checks import boolean, finite_array, instance
 from ..control.adaptation import Adaptation
+from ..control.admittance import Admittance
 from ..control.gains import Gains
 from ..control.laws import Law
 from ..control.network import Network
@@ -65,6 +66,16 @@ def ready_experiment(
     title = ", ".join([cell.name, kind, *remarks, *["disturbed"] * bool(disturbances)])
     gains = gains if synchronized else gains.independent()
     return Experiment(cell, gains, duration, disturbances, title=title, **parts)
+
+
+def giving_way(admittance: bool | Admittance, default: Admittance) -> Admittance | None:
+    """An admittance, the one of a cell for True, or none for False.
+
+    Raises:
+        InputError: neither a bool nor an admittance.
+    """
+    instance("admittance", admittance, (bool, Admittance), "a bool or an Admittance")
+    return (default if admittance else None) if isinstance(admittance, bool) else admittance
 
 
 def leaking(gains: Gains, leak: Any) -> Gains:
