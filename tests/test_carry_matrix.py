@@ -58,6 +58,8 @@ RUN = {"duration": 0.01, "dt": 1e-3}
 PUSH = Disturbance(0, np.array([10.0, 10.0, 10.0, 0.0, 0.0, 0.0]), 0.003, 0.007)
 #: what every run with fixtures has beside other reasons, as the certificate begins to say it
 OBJECT = "an object that does not move as the hands do"
+#: what theorem 2 counts exactly, and laws without a theorem only where it is large enough to be seen
+FIXTURES = "fixtures that give, of which the theorem is to the first order"
 
 
 def checked(made: Experiment, **options) -> tuple[Result, Certificate]:
@@ -115,7 +117,7 @@ def test_every_law_carries_and_the_certificate_says_whether_a_theorem_knows_it(n
     law, number, outside = LAWS[name]
     _, certificate = checked(carry_ur5(law=law))
     assert certificate.theorem == THEOREMS[number]
-    assert reasons(certificate) == {OBJECT, *outside}
+    assert reasons(certificate) - (set() if number else {FIXTURES}) == {OBJECT, *outside}
     assert not (number and certificate.doubts)
     alone = f"law of robots that nothing connects: {law.statement}"
     assert alone in str(certificate)

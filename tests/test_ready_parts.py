@@ -13,11 +13,12 @@ from synctrl.errors import InputError
 CELLS = [name for name in experiments.__all__ if name != "quadratic_analysis"]
 WITHOUT_BODIES = {"planar_four": "robot 1", "rigid_object": "robot 1", "mobile_robot": "left wheel"}
 DIFFERENT = {"mixed_four"}  # its robots have different numbers of bodies
+ALONE = {"bead_on_path": {"mode": "independent"}}  # how a cell is told that its robots are on their own
 
 
 @pytest.mark.parametrize("name", CELLS)
 def test_a_ready_cell_takes_a_law(name):
-    experiment = getattr(experiments, name)(law=SlotineLi(), synchronized=False)
+    experiment = getattr(experiments, name)(law=SlotineLi(), **ALONE.get(name, {"synchronized": False}))
     assert experiment.closed_loop().controller.law_settings["name"] == "SlotineLi"
 
 

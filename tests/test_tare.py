@@ -49,7 +49,7 @@ def test_after_a_tare_beliefs_agree_wherever_hands_carry_the_object_rigidly(erro
     for grasp, arm, robot, q0 in zip(kept["grasps"], kept["robots"], cell.robots, cell.q0, strict=True):
         hand = np.concatenate((p + R @ grasp.xyz, log(R @ grasp.rotation)))
         tips.append(robot.tip_pose(reach(arm, hand, q0, PoseSpace())))
-    np.testing.assert_allclose(tips[0].homogeneous, tips[1].homogeneous, atol=1e-6)
+    np.testing.assert_allclose(tips[0].homogeneous, tips[1].homogeneous, atol=4e-6)  # `reach`: 1e-6 each
 
 
 def test_a_base_that_is_thought_to_stand_turned_is_wrong_again_as_the_object_turns():
