@@ -483,7 +483,9 @@ def test_the_camera_sees_the_whole_box(box: tuple[np.ndarray, np.ndarray]) -> No
     slope = np.tan(np.radians(view.FIELD_OF_VIEW / 2))
     assert (depth > 0).all()
     assert (np.abs(offset @ np.cross(back, right)) <= depth * slope).all()
-    assert (np.abs(offset @ right) <= depth * slope * view.ASPECT).all()
+    narrowest = view.narrowest(np.array([low, low + extent]), position, target)
+    assert np.abs(offset @ right / depth).max() == pytest.approx(slope * narrowest)
+    assert narrowest <= view.ASPECT
 
 
 def test_the_camera_looks_at_everything_that_moves_at_any_time() -> None:

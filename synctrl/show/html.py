@@ -28,6 +28,8 @@ class Pane:
     Attributes:
         commands: packed MeshCat commands, in order.
         target: what the camera aims at and turns about, in the viewer's axes.
+        aspect: width over height of the narrowest pane in which the camera sees everything; in one that is
+            narrower all is shown smaller.
         title: heading; text, never markup.
         caption: line below it; text, never markup.
         legend: label and colour (#rrggbb) pairs.
@@ -36,6 +38,7 @@ class Pane:
 
     commands: Sequence[bytes]
     target: Sequence[float]
+    aspect: float
     title: str = ""
     caption: str = ""
     legend: Sequence[tuple[str, str]] = ()
@@ -72,7 +75,7 @@ def _view(pane: Pane) -> str:
     target = json.dumps(list(pane.target))
     return "\n".join(
         [
-            f'<div class="view"><div class="pane" data-target="{target}"></div>',
+            f'<div class="view"><div class="pane" data-target="{target}" data-aspect="{pane.aspect}"></div>',
             f'<div class="words">{_words(pane)}</div>',
             f'<script type="text/plain" class="commands">{lines}</script></div>',
         ]
@@ -125,6 +128,7 @@ def _viewer_source(name: str) -> str:
 # -- camera, light and ground -----------------------------------------------------------------------------
 
 FIELD_OF_VIEW = 40.0  # degrees, vertical
+_SLOPE = np.tan(np.radians(FIELD_OF_VIEW / 2))
 ASPECT = 4 / 3  # narrowest window, width over height, in which everything is seen
 MARGIN = 1.04
 GRID_STEP = 0.5  # m, squares of the viewer's grid
@@ -146,15 +150,25 @@ def fit_camera(box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return target + _distance(box - target, back) * back, target
 
 
+def narrowest(box: np.ndarray, position: np.ndarray, target: np.ndarray) -> float:
+    """Width over height of the narrowest picture in which a camera sees the whole box, (2, 3), m."""
+    back = (position - target) / np.linalg.norm(position - target)
+    right, _, points = _in_view(box - position, back)
+    return float((abs(right @ points) / -(back @ points)).max() / _SLOPE)
+
+
 def _distance(box: np.ndarray, back: np.ndarray) -> float:
     """Distance from the box's centre at which its corners are inside the picture."""
+    right, up, points = _in_view(box, back)
+    needed = back @ points + MARGIN * np.maximum(abs(up @ points), abs(right @ points) / ASPECT) / _SLOPE
+    return max(float(needed.max()), 0.1)
+
+
+def _in_view(box: np.ndarray, back: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What is right and up for a camera that looks against back, (3,) each, and corners of a box, (3, 8)."""
     right = np.cross([0, 0, 1.0], back)
     right /= np.linalg.norm(right)
-    up = np.cross(back, right)
-    points = np.array(np.meshgrid(*box.T)).reshape(3, 8)
-    slope = np.tan(np.radians(FIELD_OF_VIEW / 2))
-    needed = back @ points + MARGIN * np.maximum(abs(up @ points), abs(right @ points) / ASPECT) / slope
-    return max(float(needed.max()), 0.1)
+    return right, np.cross(back, right), np.array(np.meshgrid(*box.T)).reshape(3, 8)
 
 
 def viewer_axes(point: np.ndarray) -> list[float]:

@@ -21,6 +21,12 @@ function arrangeControls(viewer) {
   viewer.gui.open();
 }
 
+// Panes are narrow: at their top controls would cover the title.
+function moveDown(gui) {
+  gui.close();
+  Object.assign(gui.domElement.style, {top: "auto", bottom: "20px"});  // its button hangs below it
+}
+
 function showTime() {
   viewers.slice(1).forEach(follow);
   viewers.forEach((each, k) => {
@@ -29,11 +35,18 @@ function showTime() {
   requestAnimationFrame(showTime);
 }
 
+// A pane that is narrower than the camera was placed for shows everything smaller, and nothing less.
+function fit(shown, pane) {
+  shown.camera.zoom = Math.min(1, pane.offsetWidth / pane.offsetHeight / Number(pane.dataset.aspect));
+  shown.set_dirty();
+}
+
 // The time of all scenes is that of the first, whose controls are the only ones.
 function follow(other) {
   other.animator.pause();
   other.animator.seek(viewer.animator.time);
   other.animator.display_progress(viewer.animator.time);
+  other.render();
 }
 
 // Who turns or moves one scene turns and moves all.
@@ -58,7 +71,9 @@ async function show(view) {
   shade(shown.scene);
   arrangeControls(shown);
   if (viewers.length > 1) shown.gui.hide();
-  if (document.querySelectorAll(".view").length > 1) shown.gui.close();
+  if (document.querySelectorAll(".view").length > 1) moveDown(shown.gui);
+  fit(shown, pane);
+  addEventListener("resize", () => fit(shown, pane));
 }
 
 async function start() {

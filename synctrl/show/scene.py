@@ -13,7 +13,7 @@ from ..checks import finite_array, instance, positive_number, printable
 from ..errors import InputError, RobotWarning, warn
 from ..renamed import names_elsewhere
 from ..robots.model import joint_poses
-from .html import Pane, fit_camera, page, view_commands, viewer_axes
+from .html import ASPECT, Pane, fit_camera, narrowest, page, view_commands, viewer_axes
 from .meshes import MeshLibrary
 from .nodes import TINY, Node, bounding_box, continuous, label, pack, paint, scene_commands
 from .recording import Recording
@@ -132,9 +132,11 @@ class Scene(Recording, Shown):
 
     def pane(self, box: np.ndarray | None = None) -> Pane:
         """The scene as a part of a page; `box` as for `commands`."""
-        _, target = self._camera or fit_camera(self.box() if box is None else box)
-        packed = [pack(command) for command in self.commands(box)]
-        return Pane(packed, viewer_axes(target), self.title, self.caption, self._legend, self._remarks)
+        seen = self.box() if box is None else box
+        position, target = self._camera or fit_camera(seen)
+        aspect = narrowest(seen, position, target) if self._camera is None else ASPECT
+        packed, words = [pack(command) for command in self.commands(box)], (self.title, self.caption)
+        return Pane(packed, viewer_axes(target), aspect, *words, self._legend, self._remarks)
 
     def page(self) -> str:
         """The scene as the text of a self-contained HTML page."""
