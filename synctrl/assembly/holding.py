@@ -152,8 +152,8 @@ class HoldingPlant(Plant, ABC):
         return p[self._hands], R[self._hands], np.matvec(J, v[self._hands]), J
 
     def _levers(self, hidden: np.ndarray) -> np.ndarray:
-        """From the object's origin to its grasps in world axes, (T, k, 3)."""
-        return self.arms @ place_of(hidden[:, :7])[1].mT
+        """From the object's origin to its grasps in world axes, (..., k, 3), of states (..., 13)."""
+        return self.arms @ place_of(hidden[..., :7])[1].mT
 
     def _moving_along(self, p: np.ndarray) -> np.ndarray:
         """Twist of the object at t = 0: that which fits the hands best, which is 0 at rest."""
