@@ -50,6 +50,34 @@ def test_the_power_of_forces_inside_is_the_rate_of_a_storage_and_a_loss(seed):
     assert (np.linalg.eigvalsh(D * np.eye(4) - M * A)[0] > 0) == (bound < D)
 
 
+@given(SEEDS)
+def test_integrals_that_leak_less_than_lambda_keep_the_proof_if_k_eps_is_at_least_beta_d_a(seed):
+    """In one direction along an eigenvector of L: a storage above zero takes all power but what is lost."""
+    rng = np.random.default_rng(seed)
+    M, Lambda, beta, mu = 10 ** rng.uniform(-1, 1, 4)
+    leak, A = rng.uniform(0, Lambda), Lambda + beta * mu
+    D = M * A * (1 + 10 ** rng.uniform(-3, 2))
+    K, rest = beta * D * (1 + rng.choice([0.0, 1.0]) * rng.uniform()), (Lambda - leak) * beta
+    both = rest * (D + M * leak)
+    of_E = rest * (K + leak * (D + M * leak) / mu)
+    stored = np.array(
+        [[M, M * A, rest * M], [M * A, K * mu + D * A - rest * M * mu, both], [rest * M, both, of_E]]
+    )
+    of_y = K * (Lambda + beta * mu) * mu - both * mu
+    lost = np.array([D - M * A, of_y, leak * of_E])
+    y, y_dot, y_ddot, E = rng.normal(size=4)
+    E_dot = mu * y - leak * E
+    x, x_dot = np.array([y_dot, y, E]), np.array([y_ddot, y_dot, E_dot])
+    inside = (y_dot + A * y + rest * E) * -(M * y_ddot + D * y_dot)
+    synchronized = K * mu * y * y_dot + K * rest * E * E_dot  # the rate of its energies, and what it takes
+    taken = K * Lambda * mu * y**2 + K * beta * mu**2 * y**2 + leak * K * rest * E**2
+    power = inside - synchronized - taken
+    size = np.abs(x) @ np.abs(stored) @ np.abs(x_dot) + lost @ x**2
+    assert power == pytest.approx(-x @ stored @ x_dot - lost @ x**2, abs=1e-12 * size)
+    scale = 1 / np.sqrt(stored.diagonal())
+    assert np.linalg.eigvalsh(scale[:, None] * stored * scale)[0] > 0 and lost.min() >= 0
+
+
 def bound(admittance: Admittance) -> BoundAdmittance:
     nothing = SimpleNamespace(start=lambda: np.zeros((2, 0)))
     return BoundAdmittance(nothing, np.repeat(admittance.mass, 3), np.repeat(admittance.damping, 3))
@@ -86,6 +114,36 @@ def test_what_gives_way_moves_errors_and_desired_motion_together(massless, seed)
     if not massless:
         np.testing.assert_allclose(here[2], here[1])
         np.testing.assert_allclose(here[3], rate[1], atol=1e-7)
+
+
+@pytest.mark.parametrize("turning", [False, True])
+@given(SEEDS)
+def test_axes_that_turn_leave_the_power_of_what_was_given_way_through_them(turning, seed):
+    """Of what the controller is told: e = -R_d delta and its rate, with y on top, in world axes."""
+    rng = np.random.default_rng(seed)
+    giving, (Lambda, beta) = bound(SOFT), rng.uniform(0.5, 5, 2)
+    M, D, L = giving.mass, giving.damping, np.array([[1.0, -1.0], [-1.0, 1.0]])
+    xd, h = np.zeros((3, 2, 6)), rng.normal(size=6) * [[1.0], [-1.0]]
+    xd[:, :, 3:] = rng.normal(size=(3, 1, 3)) * [[[1.0]], [[turning]], [[turning]]]
+    R, w, (y, y_dot, delta) = exp(xd[0, 0, 3:]), xd[1, 0, 3:], rng.normal(size=(3, 2, 6))
+
+    def in_world(rows: np.ndarray) -> np.ndarray:
+        return (rows.reshape(2, 2, 3) @ R.T).reshape(2, 6)
+
+    def swept(rows: np.ndarray) -> np.ndarray:
+        return np.cross(w, rows.reshape(2, 2, 3)).reshape(2, 6)
+
+    error = np.stack((-in_world(delta), -swept(in_world(delta))))
+    task = Measurement(np.zeros((2, 2, 6)), error, np.zeros((2, 2, 6)))
+    state, wrenches = np.concatenate((y, y_dot), axis=1), in_world(h)
+    e, e_dot = giving.moved(task, state, Reference(xd, None), wrenches)[0].error
+    power = np.sum((e_dot + Lambda * e + beta * L @ e) * wrenches)
+    y_ddot, tilde = giving.giving.rates(y_dot, h)[1], y - delta
+    A_tilde, A_dot = (Lambda * x + beta * L @ x for x in (tilde, y_dot))
+    stored = np.sum(M * (y_dot * y_ddot + y_ddot * A_tilde + y_dot * A_dot) + D * tilde * A_dot)
+    left = np.sum(swept(in_world(tilde)) * wrenches)
+    assert power == pytest.approx(-stored - np.sum(y_dot * (D * y_dot - M * A_dot)) + left, rel=1e-8)
+    assert (left != 0) == turning
 
 
 def test_arms_give_way_against_each_other_and_take_the_force_out_of_a_wrong_geometry():

@@ -83,7 +83,7 @@ def test_of_the_independent_controller_fixtures_lose_what_the_theorem_says():
         y = loop.state(_state(result, k))
         signals = loop.look(loop.cell.references(result.t[k : k + 1])[0], y)
         d, d_dot = loop.chain.energies._deflections(y, signals)
-        G = grasp_matrix(loop.plant._levers(y.hidden[None])[0])
+        G = grasp_matrix(loop.plant._levers(y.hidden))
         d, d_dot = np.vecmat(d, G), np.vecmat(d_dot, G)
         lost = np.sum(d_dot * loop.plant.D * d_dot) + np.sum(loop.controller.Lambda * d * loop.plant.K * d)
         assert record.power["fixtures"][k] == pytest.approx(-lost, rel=0.03)
@@ -119,9 +119,7 @@ def test_an_admittance_stores_what_forces_inside_give_it_and_the_load_is_left():
     one = np.random.default_rng(0).normal(size=(2, 6)) * [[0.02], [0.1]]
     one[:, 3:] = 0.0
     found = with_changed(made, rest, np.stack((one.ravel(), -one.ravel())))[0]
-    h = np.matvec(
-        grasp_matrix(loop.plant._levers(y.hidden[None])[0]), loop.plant._wrenches(y.q, y.v, y.hidden)[0]
-    )
+    h = np.matvec(grasp_matrix(loop.plant._levers(y.hidden)), loop.plant._wrenches(y.q, y.v, y.hidden)[0])
     load = h - loop.plant.felt(y.q, y.v, y.hidden)
     R_d = exp(loop.cell.references(np.array([0.03]))[0].xd[0, 3:])
     moved = R_d @ (one[1] + (6.0 + 2 * 6.0) * one[0])[:3]  # A y = (Lambda + 2 beta) y

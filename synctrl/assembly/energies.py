@@ -82,7 +82,7 @@ class Energies:
         plant, controller = self._plant, self._controller
         wrenches, back, J = plant._wrenches(y.q, y.v, y.hidden)
         (p, R), nu = place_of(y.hidden[:7]), y.hidden[7:13]
-        load = np.matvec(grasp_matrix(plant._levers(y.hidden[None])[0]), wrenches).sum(axis=0)
+        load = np.matvec(grasp_matrix(plant._levers(y.hidden)), wrenches).sum(axis=0)
         e, _, left = _errors(signals.reference.desired[:, 0], p, R, nu)
         coordinates = controller.Lambda * e
         coordinates[:3] += signals.reference.xd_dot[0, :3]
@@ -109,7 +109,7 @@ class Energies:
         K, D, rest = plant.K, plant.D, (controller.Lambda - leak) * controller.beta
         E = self._unweighted(np.stack((signals.E, signals.sigma - leak * signals.E)))
         d = self._deflections(y, signals)
-        levers, w = plant._levers(y.hidden[None])[0], y.hidden[10:13]
+        levers, w = plant._levers(y.hidden), y.hidden[10:13]
 
         def carried(x: np.ndarray) -> np.ndarray:
             """Rows of the arms and their rates, (2, n, 6), at the grasps, (2, k, 6)."""

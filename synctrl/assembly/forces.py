@@ -24,9 +24,12 @@ def internal_wrenches(h: np.ndarray, arms: np.ndarray, gyration: float = GYRATIO
     """Internal wrenches at the hands, (..., k, 6), by the split of Erhart and Hirche with equal masses.
 
     Args:
-        h: wrenches of the hands on the object, (..., k, 6), in world axes, each at its hand.
+        h: wrenches of the hands on the object, (..., k, 6), N and N·m, in world axes, each at its hand.
         arms: from the object's origin to the hands, (..., k, 3), m, in world axes.
-        gyration: k, m.
+        gyration: radius of the virtual bodies, m, above 0.
+
+    Returns:
+        N and N·m, of the shape of h: in world axes, each at its hand.
     """
     G = grasp_matrix(arms)
     weight = np.array([1.0] * 3 + [gyration**2] * 3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from types import NoneType
 from typing import Any
@@ -26,7 +27,7 @@ from .theorems import ClosedChain
 CLOSED = 1e-6
 
 
-class HoldingPlant(Plant):
+class HoldingPlant(Plant, ABC):
     """The true robots, and an object that their hands hold; its state is the object's pose and twist, (13,).
 
     Subclasses say how it is held: by `move`, and by `_forces`, the wrenches of the hands. At t = 0 every hand
@@ -99,9 +100,9 @@ class HoldingPlant(Plant):
 
     # -- internals ----------------------------------------------------------------------------------------
 
+    @abstractmethod
     def _forces(self, log: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """What the hands do to the object, and the internal part of it, (T, k, 6) each."""
-        raise NotImplementedError
 
     def _checked(self, grasps: Sequence[Grasp]) -> tuple[Grasp, ...]:
         """Grasps that this plant can have."""
@@ -151,8 +152,8 @@ class HoldingPlant(Plant):
         return p[self._hands], R[self._hands], np.matvec(J, v[self._hands]), J
 
     def _levers(self, hidden: np.ndarray) -> np.ndarray:
-        """From the object's origin to its grasps in world axes, (T, k, 3)."""
-        return self.arms @ place_of(hidden[:, :7])[1].mT
+        """From the object's origin to its grasps in world axes, (..., k, 3), of states (..., 13)."""
+        return self.arms @ place_of(hidden[..., :7])[1].mT
 
     def _moving_along(self, p: np.ndarray) -> np.ndarray:
         """Twist of the object at t = 0: that which fits the hands best, which is 0 at rest."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 from ..checks import choice
@@ -14,7 +15,8 @@ from .rigid import ChainPlant, Mover
 class JudgedPlant(ChainPlant, CarryingPlant):
     """`CarryingPlant` of which MuJoCo computes all: arms, object, and where the fixtures' hands are."""
 
-    def _make_mover(self) -> Mover:
+    @cached_property
+    def _mover(self) -> Mover:
         parts = self.robots, self._hands.tolist(), self.body, (self.arms, self.turned)
         return SprungChain(self.K, self.D, *parts)
 

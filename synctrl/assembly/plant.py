@@ -49,7 +49,7 @@ class CarryingPlant(HoldingPlant):
 
     def felt(self, q: np.ndarray, v: np.ndarray, hidden: np.ndarray) -> np.ndarray:
         """Internal wrenches about the object's origin, (n, 6); zeros for robots that do not hold it."""
-        levers, found = self._levers(hidden[None])[0], np.zeros((len(q), 6))
+        levers, found = self._levers(hidden), np.zeros((len(q), 6))
         inner = self._inside(self._wrenches(q, v, hidden)[0], levers)
         found[self._hands] = np.matvec(grasp_matrix(levers), inner)
         return found
@@ -80,8 +80,7 @@ class CarryingPlant(HoldingPlant):
         return internal_wrenches(wrenches, levers)
 
     def _object_rate(self, hidden: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
-        levers = self.arms @ place_of(hidden[:7])[1].T
-        load = np.matvec(grasp_matrix(levers), wrenches).sum(axis=0)
+        load = np.matvec(grasp_matrix(self._levers(hidden)), wrenches).sum(axis=0)
         return body_rate(self.body, hidden, load, self._gravity)
 
     def _together(self, K_r: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

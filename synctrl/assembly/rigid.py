@@ -6,6 +6,7 @@ too, see `robots/rigid_chain.py`, and jump where these do.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, Protocol, Self
@@ -57,13 +58,10 @@ class ChainPlant(HoldingPlant):
         h = np.linalg.solve(grasp_matrix(levers), about_origin[..., None])[..., 0]
         return h, internal_wrenches(h, levers)
 
-    @cached_property
+    @property
+    @abstractmethod
     def _mover(self) -> Mover:
-        """Arms and object as they are now."""
-        return self._make_mover()
-
-    def _make_mover(self) -> Mover:
-        raise NotImplementedError
+        """Arms and object as they are now; made once for every stage."""
 
     def _moved(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, hidden: np.ndarray) -> Motion:
         """v', nu', and the wrenches of the hands about the object's origin."""
@@ -107,7 +105,8 @@ class RigidPlant(ChainPlant):
 
     # -- internals ----------------------------------------------------------------------------------------
 
-    def _make_mover(self) -> Mover:
+    @cached_property
+    def _mover(self) -> Mover:
         hands, places = self._hands.tolist(), (self.arms, self.turned)
         made: dict[str, Any] = {
             "pinocchio": lambda: RigidChain(self.robots, hands, self.body.parameters, places),

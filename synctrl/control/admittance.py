@@ -15,7 +15,6 @@ have no axes of their own. An error of the geometry then turns with the object, 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +26,8 @@ from ..tasks.measurement import Measurement
 from ..tasks.pose import PoseSpace
 from ..tasks.rotations import exp
 from ..tasks.spaces import CartesianSpace
-from .adaptation import BoundAdaptation, Seen, after_sample
+from .adaptation import BoundAdaptation, Seen
+from .adaptation.beside import Beside
 from .adaptation.protocol import check_still, check_three_rows
 
 
@@ -134,7 +134,7 @@ class GivingPlaces(Giving):
         return self._added(task, np.stack((y[0], *self.rates(y[1], wrenches)))), wrenches
 
 
-class BoundAdmittance:
+class BoundAdmittance(Beside):
     """`Admittance` with the adaptation of a cell: its z is the adaptation's, and behind it y and y', (n, m).
 
     Attributes:
@@ -146,9 +146,8 @@ class BoundAdmittance:
     unit = "m, rad"
 
     def __init__(self, adaptation: Any, mass: np.ndarray, damping: np.ndarray):
-        self.adaptation, self.mass, self.damping = adaptation, mass, damping
-        self._first = adaptation.start()
-        self._Z = self._first.shape[1]
+        super().__init__(adaptation, np.zeros(2 * len(mass)))
+        self.mass, self.damping = mass, damping
         inertial = (mass > 0).astype(float)
         self.giving = self.kind(damping, inertial / np.where(mass > 0, mass, 1.0), inertial)
 
@@ -156,7 +155,7 @@ class BoundAdmittance:
 
     def given_way(self, z: np.ndarray) -> np.ndarray:
         """y and y' of states z, (..., n, Z), in the desired axes: (2, ..., n, m)."""
-        return np.stack(np.split(z[..., self._Z :], 2, axis=-1))
+        return np.stack(np.split(self.own(z), 2, axis=-1))
 
     def moved(
         self, task: Measurement, z: np.ndarray, reference: Reference, wrenches: np.ndarray | None
@@ -179,39 +178,14 @@ class BoundAdmittance:
 
     # -- the adaptation, with y and y' behind its state ---------------------------------------------------
 
-    def start(self) -> np.ndarray:
-        return np.concatenate((self._first, np.zeros((len(self._first), 2 * len(self.mass)))), axis=1)
-
-    def estimate(self, z: np.ndarray) -> np.ndarray:
-        return self.adaptation.estimate(z[:, : self._Z])
-
     def rate(self, z: np.ndarray, seen: Seen) -> np.ndarray:
         h = _felt(seen.wrench)
-        learned = self.adaptation.rate(z[:, : self._Z], seen)
+        learned = self.adaptation.rate(self.learned(z), seen)
         return np.concatenate((learned, *self.giving.rates(self.given_way(z)[1], h)), axis=1)
-
-    def settle(self, z: np.ndarray) -> np.ndarray:
-        learned = z[:, : self._Z]
-        settled = self.adaptation.settle(learned)
-        return z if settled is learned else np.concatenate((settled, z[:, self._Z :]), axis=1)
-
-    def leap(self, z: np.ndarray, z_dot: np.ndarray, h: float) -> np.ndarray:
-        """What is learned as the adaptation has it, and y along its rate."""
-        learned = after_sample(self.adaptation, z[:, : self._Z], z_dot[:, : self._Z], h)
-        return np.concatenate((learned, z[:, self._Z :] + h * z_dot[:, self._Z :]), axis=1)
 
     def outputs(self, z: np.ndarray) -> dict[str, tuple[np.ndarray, str, tuple[str, ...]]]:
         """What a result gets of states z, (T, n, Z): y, by how much each arm gave way."""
         return {"admittance": (self.given_way(z)[0], self.unit, ("time", "robot", "axis"))}
-
-    def storage(self, z: np.ndarray, theta: np.ndarray) -> float:
-        return self.adaptation.storage(z[:, : self._Z], theta)
-
-    def storage_rate(self, z: np.ndarray, z_dot: np.ndarray, theta: np.ndarray) -> float:
-        return self.adaptation.storage_rate(z[:, : self._Z], z_dot[:, : self._Z], theta)
-
-    def powers(self, z: np.ndarray, theta: np.ndarray, seen: Seen) -> Mapping[str, float]:
-        return self.adaptation.powers(z[:, : self._Z], theta, seen)
 
 
 class BoundPlaceAdmittance(BoundAdmittance):

@@ -24,7 +24,8 @@ from ...coupling.cell import Cell, Reference
 from ...errors import InputError
 from ...robots.regressors import make_regressors
 from ...tasks.spaces import CartesianSpace, JointSpace
-from .protocol import Adaptation, Seen, after_sample, check_still
+from .beside import Beside
+from .protocol import Adaptation, Seen, check_still
 
 #: share of a limit from which on missing torque counts in full
 FULL = 0.02
@@ -84,13 +85,12 @@ class Hedged:
         return {"name": "Hedged", **settings}
 
 
-class BoundHedged:
+class BoundHedged(Beside):
     """`Hedged` for the robots of a cell: its z is the adaptation's, and behind it xi and xi', (n, m) each."""
 
     def __init__(self, cell: Cell, adaptation: Any, pull: float, speeds: np.ndarray):
-        self._cell, self._adaptation, self._pull = cell, adaptation, pull
-        self._first = np.zeros((cell.n, 2 * cell.m))
-        self._Z = adaptation.start().shape[1]
+        super().__init__(adaptation, np.zeros(2 * cell.m))
+        self._cell, self._pull = cell, pull
         self._regressor = make_regressors(cell.parameters, [robot.nv for robot in cell.robots])
         self._theta_h = cell.theta_hat0
         self._missing = np.array([np.arange(cell.nv) >= robot.nv for robot in cell.robots])
@@ -100,22 +100,6 @@ class BoundHedged:
         self._v_bar = np.linalg.norm(self._c, 2, axis=(1, 2))[:, None] * speeds
         self._check_mass()
 
-    def start(self) -> np.ndarray:
-        return np.concatenate((self._adaptation.start(), self._first), axis=1)
-
-    def estimate(self, z: np.ndarray) -> np.ndarray:
-        return self._adaptation.estimate(z[:, : self._Z])
-
-    def settle(self, z: np.ndarray) -> np.ndarray:
-        learned = z[:, : self._Z]
-        settled = self._adaptation.settle(learned)
-        return z if settled is learned else np.concatenate((settled, z[:, self._Z :]), axis=1)
-
-    def leap(self, z: np.ndarray, z_dot: np.ndarray, h: float) -> np.ndarray:
-        """What is learned as the adaptation has it, and the hedge along its rate."""
-        learned = after_sample(self._adaptation, z[:, : self._Z], z_dot[:, : self._Z], h)
-        return np.concatenate((learned, z[:, self._Z :] + h * z_dot[:, self._Z :]), axis=1)
-
     def shift(self, z: np.ndarray, reference: Reference) -> np.ndarray:
         """xd - c^-1 xi with its rates, (3, n, m), with xi'' as it is where nothing is cut off."""
         xi, xi_dot = self.hedge(z)
@@ -123,7 +107,7 @@ class BoundHedged:
 
     def hedge(self, z: np.ndarray) -> np.ndarray:
         """xi and xi' of states z, (..., n, Z): (2, ..., n, m)."""
-        return np.stack(np.split(z[..., self._Z :], 2, axis=-1))
+        return np.stack(np.split(self.own(z), 2, axis=-1))
 
     def outputs(self, z: np.ndarray) -> dict[str, tuple[np.ndarray, str, tuple[str, ...]]]:
         """What a result gets of states z, (T, n, Z): by how much the desired motion gave way, c^-1 xi."""
@@ -134,17 +118,11 @@ class BoundHedged:
         xi, xi_dot = self.hedge(z)
         cut = self._cut(z, seen)
         xi_ddot = self._back(xi, xi_dot) + np.matvec(self._c, self._in_task(seen, cut.Delta))
-        return np.concatenate((self._adaptation.rate(z[:, : self._Z], cut.seen), xi_dot, xi_ddot), axis=1)
+        return np.concatenate((self.adaptation.rate(self.learned(z), cut.seen), xi_dot, xi_ddot), axis=1)
 
     def given_up(self, z: np.ndarray, seen: Seen) -> np.ndarray:
         """Delta: by how much v_ref' is less than a_ref, (n, nv), rad/s^2."""
         return self._cut(z, seen).Delta
-
-    def storage(self, z: np.ndarray, theta: np.ndarray) -> float:
-        return self._adaptation.storage(z[:, : self._Z], theta)
-
-    def storage_rate(self, z: np.ndarray, z_dot: np.ndarray, theta: np.ndarray) -> float:
-        return self._adaptation.storage_rate(z[:, : self._Z], z_dot[:, : self._Z], theta)
 
     def powers(self, z: np.ndarray, theta: np.ndarray, seen: Seen) -> Mapping[str, float]:
         """Those of the adaptation; and "hedge", which has what the shifted motion does to V' too."""
@@ -152,7 +130,7 @@ class BoundHedged:
         M_Delta = np.matvec(seen.regressor - self._seen_regressor(seen, cut.Delta), theta)
         missed = (seen.gradient - cut.seen.gradient) * (theta - self.estimate(z))
         hedge = float(np.sum(missed) - np.sum(seen.s_q * M_Delta))
-        return {**self._adaptation.powers(z[:, : self._Z], theta, cut.seen), "hedge": hedge}
+        return {**self.adaptation.powers(self.learned(z), theta, cut.seen), "hedge": hedge}
 
     # -- internals ----------------------------------------------------------------------------------------
 

@@ -12,7 +12,6 @@ state: with e -> 0 the feed goes to 1. The state rides in that of the adaptation
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +21,8 @@ from ...checks import finite_number, instance, offers, positive_number
 from ...coupling.cell import Cell, Reference
 from ...coupling.weights import Weights
 from ...errors import InputError
-from .protocol import Adaptation, Seen, after_sample, check_still, check_three_rows
+from .beside import Beside
+from .protocol import Adaptation, Seen, check_still, check_three_rows
 
 
 @dataclass(frozen=True)
@@ -91,12 +91,12 @@ class Paced:
         return {"name": "Paced", **override, "adaptation": self.adaptation.as_dict()}
 
 
-class BoundPaced:
+class BoundPaced(Beside):
     """`Paced` for the robots of a cell: its z is the adaptation's, and behind it phi and f in every row."""
 
     def __init__(self, cell: Cell, adaptation: Any, motions: list[Any], override: Override):
-        self._cell, self._adaptation, self._motions, self._override = cell, adaptation, motions, override
-        self._Z = adaptation.start().shape[1]
+        super().__init__(adaptation, [0.0, 1.0])
+        self._cell, self._motions, self._override = cell, motions, override
 
     # -- phase and feed -----------------------------------------------------------------------------------
 
@@ -108,13 +108,13 @@ class BoundPaced:
             motion: joint positions and velocities, (2, n, nv).
             reference: what would be desired without override; of it only the time is kept.
         """
-        phase, feed = z[0, self._Z :].tolist()
+        phase, feed = self.own(z)[0].tolist()
         there = self._cell.references(np.array([phase]))[0]
         return slowed(there, reference.t, feed, self._growth(motion[0], phase, feed))
 
     def outputs(self, z: np.ndarray) -> dict[str, tuple[np.ndarray, str, tuple[str, ...]]]:
         """What a result gets of states z, (T, n, Z): phase and feed."""
-        phase, feed = np.ascontiguousarray(z[:, 0, self._Z :].T)
+        phase, feed = np.ascontiguousarray(self.own(z)[:, 0].T)
         return {"phase": (phase, "s", ("time",)), "feed": (feed, "", ("time",))}
 
     def _growth(self, q: np.ndarray, phase: float, feed: float) -> float:
@@ -126,39 +126,16 @@ class BoundPaced:
 
     # -- the adaptation, with phase and feed behind its state ---------------------------------------------
 
-    def start(self) -> np.ndarray:
-        first = self._adaptation.start()
-        return np.concatenate((first, np.tile([0.0, 1.0], (len(first), 1))), axis=1)
-
-    def estimate(self, z: np.ndarray) -> np.ndarray:
-        return self._adaptation.estimate(z[:, : self._Z])
-
     def rate(self, z: np.ndarray, seen: Seen) -> np.ndarray:
-        phase, feed = z[0, self._Z :].tolist()
+        phase, feed = self.own(z)[0].tolist()
         own = np.tile([feed, self._growth(seen.q, phase, feed)], (len(z), 1))
-        return np.concatenate((self._adaptation.rate(z[:, : self._Z], seen), own), axis=1)
-
-    def settle(self, z: np.ndarray) -> np.ndarray:
-        learned = z[:, : self._Z]
-        settled = self._adaptation.settle(learned)
-        return z if settled is learned else np.concatenate((settled, z[:, self._Z :]), axis=1)
+        return np.concatenate((self.adaptation.rate(self.learned(z), seen), own), axis=1)
 
     def leap(self, z: np.ndarray, z_dot: np.ndarray, h: float) -> np.ndarray:
         """What is learned as the adaptation has it; the phase along a parabola, the feed along its rate."""
-        learned = after_sample(self._adaptation, z[:, : self._Z], z_dot[:, : self._Z], h)
-        own, own_dot = z[:, self._Z :], z_dot[:, self._Z :]
-        moved = own + h * own_dot
-        moved[:, 0] += 0.5 * h * h * own_dot[:, 1]
-        return np.concatenate((learned, moved), axis=1)
-
-    def storage(self, z: np.ndarray, theta: np.ndarray) -> float:
-        return self._adaptation.storage(z[:, : self._Z], theta)
-
-    def storage_rate(self, z: np.ndarray, z_dot: np.ndarray, theta: np.ndarray) -> float:
-        return self._adaptation.storage_rate(z[:, : self._Z], z_dot[:, : self._Z], theta)
-
-    def powers(self, z: np.ndarray, theta: np.ndarray, seen: Seen) -> Mapping[str, float]:
-        return self._adaptation.powers(z[:, : self._Z], theta, seen)
+        moved = super().leap(z, z_dot, h)
+        self.own(moved)[:, 0] += 0.5 * h * h * self.own(z_dot)[:, 1]
+        return moved
 
 
 def slowed(there: Reference, t: float, feed: float, growth: float) -> Reference:
