@@ -28,7 +28,6 @@ from ..control.admittance import Admittance
 from ..control.gains import Gains
 from ..coupling.cell import Cell
 from ..coupling.coupling import Coupling
-from ..robots.catalog import load_robot
 from ..robots.friction import Friction
 from ..robots.robot import Robot
 from ..simulation.schedules import Disturbance
@@ -36,7 +35,7 @@ from ..simulation.simulate import Experiment
 from ..tasks.pose import PoseSpace
 from ..tasks.rotations import exp
 from .parts import ControllerParts, giving_way, leaking, ready_experiment
-from .ur5_payload import DISTANCE, DURATION, POSTURE, hand_on_payload, payload_motion
+from .ur5_payload import DURATION, POSTURE, facing_ur5, hand_on_payload, payload_motion
 from .ur5_payload import GAINS as HANDS_ALONE
 
 PAYLOAD = CarriedObject(
@@ -89,7 +88,7 @@ def carry_ur5(
     boolean("friction", friction), boolean("push", push), boolean("tare", tare)
     fixture, kind = _held(grasp)
     grasps = [Grasp(i, *hand_on_payload(i), fixture) for i in range(2)]
-    at, arms = _start_of_payload(), [_arm(i) for i in range(2)]
+    at, arms = _start_of_payload(), [facing_ur5(i) for i in range(2)]
     cell = _cell(arms, grasps, at, _error(geometric_error), friction)
     cell, pushes = tared(cell) if tare else cell, [PUSH] * bool(push)
     yielding = giving_way(admittance, Admittance())
@@ -110,11 +109,6 @@ def _held(grasp: str | Fixture) -> tuple[Fixture, Callable[..., HoldingPlant]]:
 def _error(given: bool | Any) -> np.ndarray:
     error = GEOMETRIC_ERROR * given if isinstance(given, bool) else given
     return finite_array("geometric_error", error, (6,))
-
-
-def _arm(i: int) -> Robot:
-    side, heading = ((-1.0, 0.0), (1.0, np.pi))[i]
-    return load_robot("ur5").placed((side * DISTANCE, 0.0, 0.0), (0.0, 0.0, heading), name=f"UR5 {i + 1}")
 
 
 def _start_of_payload() -> Placed:
