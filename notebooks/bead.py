@@ -171,7 +171,7 @@ display(table(heading, *(path_row(name, run) for name, run in path.items())))
 # ## A motion that waits
 #
 # With `override=True` all that is desired goes on at a feed, which falls where the arms lag along the path.
-# Here without friction, whose lag would need a shorter step, and not in the compiled engine, which has no
+# Here without friction, which would ask for a shorter step, and not in the compiled engine, which has no
 # motion that waits.
 
 # %%

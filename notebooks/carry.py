@@ -50,8 +50,8 @@ def squeeze(run):
 # ## What is held
 #
 # Either arm is controlled at the middle of the box, as it believes to hold it. So both are given the same
-# desired motion, and ε = e_1 - e_2 says how far their ideas of where the box is are apart. The box starts a
-# centimetre and two degrees beside its path. Nobody knows its mass: the first arm begins with 0.8 of its
+# desired motion, and ε = e_1 - e_2 says how far their ideas of where the box is are apart. The box starts
+# 17 mm and two degrees beside its path. Nobody knows its mass: the first arm begins with 0.8 of its
 # half, the second with nothing.
 #
 # The *internal* force is what the hands do to the box beyond carrying it: the part of their forces that moves

@@ -105,9 +105,8 @@ def test_a_path_that_halts_bends_sharply_or_goes_along_up_is_refused():
     line = np.outer(np.linspace(0, 1, 8), (1.0, 0.0, 0.0))
     with refused(InputError, "number of points", found=5):
         Path(line[:5])
-    with refused(TrajectoryError, "points") as caught:
+    with refused(InputError, "points", found=0.0):
         Path(np.repeat(line, 2, axis=0))
-    assert np.array_equal(caught.value.found, line[0])
     across = np.linspace(-1, 1, 601)
     with refused(TrajectoryError, "points"):
         Path(np.stack((across, np.abs(across), 0 * across), 1))

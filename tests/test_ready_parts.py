@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from refusals import refused
 
@@ -32,3 +33,15 @@ def test_a_ready_cell_of_bodies_takes_an_adaptation_of_bodies(name):
 def test_a_ready_cell_without_bodies_refuses_an_adaptation_of_bodies_and_names_the_robot(name):
     with refused(InputError, f"{WITHOUT_BODIES[name]}, adaptation"):
         getattr(experiments, name)(adaptation=Natural(0.1))
+
+
+@pytest.mark.parametrize("name", ["carry_ur5", "carry_planar"])
+@pytest.mark.parametrize("option", ["leak", "geometric_error", "admittance"])
+def test_yes_and_no_may_be_said_by_numpy(name, option):
+    for answer in (True, False):
+        plain, other = (getattr(experiments, name)(**{option: said}) for said in (answer, np.bool_(answer)))
+        assert (other.admittance is None) == (plain.admittance is None)
+        assert np.array_equal(other.gains.leak, plain.gains.leak)
+        for one, two in zip(other.cell.members, plain.cell.members, strict=True):
+            assert np.array_equal(one.robot.tip_position(one.q0), two.robot.tip_position(two.q0))
+            assert np.array_equal(one.trajectory(0.0).x, two.trajectory(0.0).x)

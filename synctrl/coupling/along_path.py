@@ -121,8 +121,8 @@ class PathWeights:
         if m not in (3, 6):
             raise CouplingError.expected("positions or poses, of dimension 3 or 6", m, "c")
         ways = [motion.way(times) for motion in self.motions]
-        gate = np.zeros((3, len(times))) if self.gate is None else self.gate.at(ways, times)
-        gate[0] += self.gate is None
+        always = np.outer((1.0, 0.0, 0.0), np.ones(len(times)))
+        gate = always if self.gate is None else self.gate.at(ways, times)
         pairs = zip(self.motions, ways, strict=True)
         turned = np.stack([_turned(motion, way) for motion, way in pairs], axis=2)
         w, w_dot, w_ddot = gate[..., None, None, None] * self.a[:, None, None]

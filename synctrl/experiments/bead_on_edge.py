@@ -21,7 +21,6 @@ from ..checks import boolean
 from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
-from ..robots.catalog import load_robot
 from ..robots.friction import Friction
 from ..robots.payload import holding
 from ..robots.robot import Robot
@@ -34,12 +33,13 @@ from ..tasks.poses import AxisRotation, PoseTrajectory
 from ..tasks.rotations import exp
 from ..tasks.sliding import Carrier, Rider, SlidingSpace
 from ..tasks.ways import RampUp
+from .bead_on_path import nozzle
 from .carry import FRICTION
 from .carry import GAINS as CARRYING
 from .parts import ControllerParts, ready_experiment
-from .ur5_payload import DURATION, swing
+from .ur5_payload import DURATION, facing_ur5, swing
 
-BASES = ((-0.65, 0.0, 0.0), 0.0), ((0.5, 0.0, 0.0), np.pi)  # m, and heading, rad
+DISTANCES = 0.65, 0.5  # m, of the bases from the middle
 HEIGHT, SWING = 0.25, np.array([0.03, 0.06, 0.05])  # m
 TURN, TURN_AXIS = 0.25, (0.3, 0.4, 1.0)  # rad
 SPEED, RAMP = 0.14, 0.5  # m/s, s
@@ -49,8 +49,6 @@ PLATE = CarriedObject(
     name="plate",
 )  # fmt: skip
 HAND = Grasp(0, (-0.20, 0.0, 0.0), exp(np.array([0.0, np.pi / 2, 0.0])))
-#: beyond the last link of arm 2, in the axes of its end, which is where adhesive comes out
-NOZZLE, NOZZLE_LENGTH = CarriedObject(0.5, (0.0, 0.0, -0.05), (1e-3,) * 3, name="nozzle"), 0.10
 THICKNESS, CORNERS = 0.01, 80  # m, of the plate, whose upper face has the edge, and corners that are drawn
 POSTURES = (0.0, -1.5, 2.0, -0.5, np.pi / 2, 0.0), (0.0, -1.5, 2.0, -2.0, -np.pi / 2, 0.0)  # rad
 #: share of the true parameters, without the plate, that the controller starts with
@@ -80,10 +78,10 @@ def bead_on_edge(
     boolean("friction", friction), boolean("push", push)
     edge = plate_edge()
     plate, frame = plate_motion(), AlongEdge(edge, RampUp(SPEED, RAMP))
-    rubs = FRICTION if friction else Friction()
+    rubs, pushes = FRICTION if friction else Friction(), [PUSH] * bool(push)
     members = [_carrier(Carrier(plate, frame), rubs), _nozzle(Rider(plate, frame), rubs)]
     cell = Cell(members, Coupling.pair(), SlidingSpace(), name="UR5 pair with a bead on an edge")
-    made = ready_experiment(cell, DURATION, GAINS, gains, synchronized, parts, disturbances=[PUSH] * push)
+    made = ready_experiment(cell, DURATION, GAINS, gains, synchronized, parts, disturbances=pushes)
     return replace(made, plant_type=partial(BeadPlant, body=_drawn(edge)))
 
 
@@ -109,22 +107,16 @@ def plate_motion() -> PoseTrajectory:
 
 
 def _carrier(motion: Carrier, friction: Friction) -> Member:
-    arm, (d, G) = _arm(0), HAND.object_in_hand
+    arm, (d, G) = facing_ur5(0, DISTANCES[0]), HAND.object_in_hand
     loaded = holding(with_share(arm, PLATE.parameters, d, G), d, G, "plate")
     return _member(loaded, motion, 0, KNOWN * arm.inertial_parameters, friction)
 
 
 def _nozzle(motion: Rider, friction: Friction) -> Member:
-    end = np.array([0.0, 0.0, NOZZLE_LENGTH]), np.eye(3)
-    loaded = holding(with_share(_arm(1), NOZZLE.parameters, *end), *end, "nozzle")
-    return _member(loaded, motion, 1, KNOWN * loaded.inertial_parameters, friction)
-
-
-def _arm(i: int) -> Robot:
-    place, heading = BASES[i]
-    return load_robot("ur5").placed(place, (0.0, 0.0, heading), name=f"UR5 {i + 1}")
+    robot = nozzle(facing_ur5(1, DISTANCES[1]))
+    return _member(robot, motion, 1, KNOWN * robot.inertial_parameters, friction)
 
 
 def _member(robot: Robot, motion: Carrier | Rider, i: int, guess: np.ndarray, friction: Friction) -> Member:
     q0 = reach(robot, motion(0.0).x, np.array(POSTURES[i]), PoseSpace())
-    return Member(robot, motion, q0, theta_hat0=guess, friction=friction, name=f"UR5 {i + 1}")
+    return Member(robot, motion, q0, theta_hat0=guess, friction=friction, name=robot.name)

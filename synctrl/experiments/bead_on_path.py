@@ -20,12 +20,12 @@ from ..coupling.along_path import Gate, PathWeights
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
 from ..errors import GainWarning, InputError, warn
-from ..robots.catalog import load_robot
 from ..robots.friction import Friction
 from ..robots.payload import Payload, carrying, holding
 from ..robots.robot import Robot
 from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
+from ..tasks.edge import DOWN
 from ..tasks.inverse_kinematics import reach
 from ..tasks.path import AlongPath, Path
 from ..tasks.pose import PoseSpace
@@ -34,10 +34,10 @@ from ..tasks.ways import Ramped
 from .carry import FRICTION
 from .carry import GAINS as CARRYING
 from .parts import ControllerParts, ready_experiment
+from .ur5_payload import facing_ur5
 
 DISTANCE = 0.5  # m, of each base from the path
 HEIGHT, WIDTH, HALF = 0.25, 0.06, 0.3  # m, of the path: above the bases, to the sides, and from end to middle
-DOWN = np.diag([1.0, -1.0, -1.0])  # axes of a nozzle
 NOZZLE = (0.0, 0.0, 0.10)  # m, from the tip of an arm
 SHARE = 0.55  # of the path, that robot 1 goes
 GAP, CLEARANCE = 0.02, 0.005  # m: what is left between the nozzles, and what their size needs
@@ -153,13 +153,10 @@ def _weights(mode: str, motions: list[PoseTrajectory], duration: float, gap: flo
 
 
 def _member(i: int, motion: PoseTrajectory, friction: Friction) -> Member:
-    side, heading = ((-1.0, 0.0), (1.0, np.pi))[i]
-    name = f"UR5 {i + 1}"
-    arm = load_robot("ur5").placed((side * DISTANCE, 0.0, 0.0), (0.0, 0.0, heading), name=name)
-    robot = nozzle(arm)
+    robot = nozzle(facing_ur5(i, DISTANCE))
     q0 = reach(robot, motion(0.0).x, np.array(POSTURE), PoseSpace())
     known = KNOWN * robot.inertial_parameters
-    return Member(robot, motion, q0, theta_hat0=known, friction=friction, name=name)
+    return Member(robot, motion, q0, theta_hat0=known, friction=friction, name=robot.name)
 
 
 def _push(duration: float) -> Disturbance:

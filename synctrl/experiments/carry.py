@@ -12,9 +12,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..assembly.body import CarriedObject, Placed
 from ..assembly.carrier import carrier
@@ -23,20 +24,19 @@ from ..assembly.holding import HoldingPlant
 from ..assembly.judged import fixture_plant
 from ..assembly.rigid import RigidPlant
 from ..assembly.tare import tared
-from ..checks import boolean, choice, finite_array
+from ..checks import boolean, choice
 from ..control.admittance import Admittance
 from ..control.gains import Gains
 from ..coupling.cell import Cell
 from ..coupling.coupling import Coupling
-from ..robots.catalog import load_robot
 from ..robots.friction import Friction
 from ..robots.robot import Robot
 from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
 from ..tasks.pose import PoseSpace
 from ..tasks.rotations import exp
-from .parts import ControllerParts, giving_way, leaking, ready_experiment
-from .ur5_payload import DISTANCE, DURATION, POSTURE, hand_on_payload, payload_motion
+from .parts import ControllerParts, error_of_geometry, giving_way, leaking, ready_experiment
+from .ur5_payload import DURATION, POSTURE, facing_ur5, hand_on_payload, payload_motion
 from .ur5_payload import GAINS as HANDS_ALONE
 
 PAYLOAD = CarriedObject(
@@ -60,7 +60,7 @@ GAINS = HANDS_ALONE.replace(Gamma=np.array([*[0.3] * 40, *[0.03] * 10, *LAST_LIN
 def carry_ur5(
     synchronized: bool = True,
     grasp: str | Fixture = "compliant",
-    geometric_error: bool | Any = False,
+    geometric_error: bool | ArrayLike = False,
     friction: bool = False,
     push: bool = False,
     leak: float | bool | None = None,
@@ -89,8 +89,8 @@ def carry_ur5(
     boolean("friction", friction), boolean("push", push), boolean("tare", tare)
     fixture, kind = _held(grasp)
     grasps = [Grasp(i, *hand_on_payload(i), fixture) for i in range(2)]
-    at, arms = _start_of_payload(), [_arm(i) for i in range(2)]
-    cell = _cell(arms, grasps, at, _error(geometric_error), friction)
+    at, arms = _start_of_payload(), [facing_ur5(i) for i in range(2)]
+    cell = _cell(arms, grasps, at, error_of_geometry(geometric_error, GEOMETRIC_ERROR), friction)
     cell, pushes = tared(cell) if tare else cell, [PUSH] * bool(push)
     yielding = giving_way(admittance, Admittance())
     made = ready_experiment(cell, DURATION, GAINS, gains, synchronized, parts, disturbances=pushes)
@@ -105,16 +105,6 @@ def _held(grasp: str | Fixture) -> tuple[Fixture, Callable[..., HoldingPlant]]:
         return grasp, fixture_plant
     kinds: dict[str, Callable[..., HoldingPlant]] = {"compliant": fixture_plant, "rigid": RigidPlant}
     return Fixture(), kinds[choice("grasp", grasp, tuple(kinds))]
-
-
-def _error(given: bool | Any) -> np.ndarray:
-    error = GEOMETRIC_ERROR * given if isinstance(given, bool) else given
-    return finite_array("geometric_error", error, (6,))
-
-
-def _arm(i: int) -> Robot:
-    side, heading = ((-1.0, 0.0), (1.0, np.pi))[i]
-    return load_robot("ur5").placed((side * DISTANCE, 0.0, 0.0), (0.0, 0.0, heading), name=f"UR5 {i + 1}")
 
 
 def _start_of_payload() -> Placed:

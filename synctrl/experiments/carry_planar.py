@@ -20,7 +20,7 @@ from ..assembly.body import CarriedObject, with_share
 from ..assembly.grasp import Grasp, Pin
 from ..assembly.pinned import PinnedPlant
 from ..assembly.tare import tared_places
-from ..checks import boolean, choice, finite_array
+from ..checks import boolean, choice
 from ..control.admittance import Admittance
 from ..control.gains import Gains
 from ..control.laws import ShapeKeeping
@@ -36,7 +36,7 @@ from ..tasks.poses import Attached, AxisRotation, PoseTrajectory
 from ..tasks.rotations import exp
 from ..tasks.spaces import CartesianSpace
 from ..tasks.trajectories import Motion
-from .parts import ControllerParts, giving_way, leaking, ready_experiment
+from .parts import ControllerParts, error_of_geometry, giving_way, leaking, ready_experiment
 
 MASS, EDGE = 2.0, 0.24  # kg, m
 _IZZ = 2 / 6 * EDGE**2  # kg·m^2
@@ -142,8 +142,7 @@ class InPlane:
 
 def _places(given: bool | ArrayLike, tare: bool) -> np.ndarray:
     """Where the arms believe their pins on the plate, (4, 2), m."""
-    error = GEOMETRIC_ERROR * given if isinstance(given, bool) else given
-    places = PINS + finite_array("geometric_error", error, (4, 2))
+    places = PINS + error_of_geometry(given, GEOMETRIC_ERROR)
     return tared_places(places, _start_of_pins()) if tare else places
 
 

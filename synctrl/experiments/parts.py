@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any, TypedDict
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..checks import boolean, finite_array, instance
 from ..control.adaptation import Adaptation
@@ -16,6 +17,9 @@ from ..control.network import Network
 from ..coupling.cell import Cell
 from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
+
+#: what says yes or no where an option may also be a value of one's own
+BOOLS = bool, np.bool_
 
 
 class Parts(TypedDict, total=False):
@@ -74,8 +78,20 @@ def giving_way(admittance: bool | Admittance, default: Admittance) -> Admittance
     Raises:
         InputError: neither a bool nor an admittance.
     """
-    instance("admittance", admittance, (bool, Admittance), "a bool or an Admittance")
-    return (default if admittance else None) if isinstance(admittance, bool) else admittance
+    if isinstance(admittance, BOOLS):
+        return default if admittance else None
+    instance("admittance", admittance, Admittance, "a bool or an Admittance")
+    return admittance
+
+
+def error_of_geometry(given: bool | ArrayLike, default: np.ndarray) -> np.ndarray:
+    """An error of what arms believe of the geometry, the one of a cell for True, none for False; m and rad.
+
+    Raises:
+        InputError: neither a bool nor numbers of the shape of the default.
+    """
+    error = default * given if isinstance(given, BOOLS) else given
+    return finite_array("geometric_error", error, default.shape)
 
 
 def leaking(gains: Gains, leak: Any) -> Gains:
@@ -84,9 +100,7 @@ def leaking(gains: Gains, leak: Any) -> Gains:
     Raises:
         InputError: no numbers, or a leak that `Gains` does not take.
     """
-    if leak is False:
-        return gains
-    rates = gains.Lambda if leak is True else finite_array("leak", leak)
+    rates = gains.Lambda * leak if isinstance(leak, BOOLS) else finite_array("leak", leak)
     return gains.replace(leak=rates) if np.any(rates) else gains
 
 

@@ -74,16 +74,21 @@ def hand_on_payload(i: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array([side * LENGTH / 2, 0.0, 0.0]), pointing
 
 
-def _member(i: int) -> Member:
+def facing_ur5(i: int, distance: float = DISTANCE) -> Robot:
+    """UR5 1 or 2, i = 0 or 1, at x = -distance or distance, m, where it faces the middle of its cell."""
     side, heading = ((-1.0, 0.0), (1.0, np.pi))[i]
-    robot = load_robot("ur5").placed((side * DISTANCE, 0.0, 0.0), (0.0, 0.0, heading), name=f"UR5 {i + 1}")
+    return load_robot("ur5").placed((side * distance, 0.0, 0.0), (0.0, 0.0, heading), name=f"UR5 {i + 1}")
+
+
+def _member(i: int) -> Member:
+    robot = facing_ur5(i)
     motion = Attached(payload_motion(), *hand_on_payload(i))
     return Member(
         robot,
         motion,
         _start(robot, motion(0.0).x, OFFSETS[i]),
         theta_hat0=KNOWN * robot.inertial_parameters,
-        name=f"UR5 {i + 1}",
+        name=robot.name,
     )
 
 

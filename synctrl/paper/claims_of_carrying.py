@@ -67,14 +67,10 @@ def carry_claims(runs: Mapping[str, Result]) -> list[Claim]:
 
 def synchronization_helps(exact: Result, alone: Result) -> Claim:
     """RMS and final force are smaller with synchronization, where the geometry is exact."""
-    ours, theirs = (_rms_and_end(run) for run in (exact, alone))
-    return Claim(
+    return _less_force(
         "With exact geometry synchronization takes force out of the payload.",
-        SOURCE,
-        all(a.value < b.value for a, b in zip(ours, theirs, strict=True)),
-        (*_named("synchronized", ours), *_named("independent", theirs)),
-        "Asked: RMS and final internal force smaller than under independent control. The fixtures give a "
-        "little, so ε is not zero and synchronization has something to act on.",
+        {"synchronized": exact, "independent": alone},
+        "The fixtures give a little, so ε is not zero and synchronization has something to act on.",
     )
 
 
@@ -112,14 +108,10 @@ def leak_stops_it(leak: Result, paper: Result) -> Claim:
 
 def leak_is_better(leak: Result, alone: Result) -> Claim:
     """RMS and final force are smaller than under independent control, with geometric error and a leak."""
-    ours, theirs = (_rms_and_end(run) for run in (leak, alone))
-    return Claim(
+    return _less_force(
         "With a leak, synchronization has less force than independent control, geometric error or not.",
-        SOURCE,
-        all(a.value < b.value for a, b in zip(ours, theirs, strict=True)),
-        (*_named("with a leak", ours), *_named("independent", theirs)),
-        "Asked: RMS and final internal force smaller than under independent control. A leak keeps the harm "
-        "away; it does not make synchronization useful where the geometry is wrong.",
+        {"with a leak": leak, "independent": alone},
+        "A leak keeps the harm away; it does not make synchronization useful where the geometry is wrong.",
     )
 
 
@@ -174,6 +166,18 @@ def whole_is_better(whole: Result, yielding: Result) -> Claim:
 def largest_moment(run: Result) -> float:
     """RMS of the internal moment, at the hand where it is larger, N·m."""
     return max(moment(run, hand) for hand in (0, 1))
+
+
+def _less_force(text: str, runs: Mapping[str, Result], remark: str) -> Claim:
+    """RMS and final force are smaller in the first of two runs than in the second, independent control."""
+    ours, theirs = (_rms_and_end(run) for run in runs.values())
+    return Claim(
+        text,
+        SOURCE,
+        all(a.value < b.value for a, b in zip(ours, theirs, strict=True)),
+        tuple(each for who, found in zip(runs, (ours, theirs), strict=True) for each in _named(who, found)),
+        f"Asked: RMS and final internal force smaller than under independent control. {remark}",
+    )
 
 
 def _rms_and_end(run: Result) -> tuple[Finding, Finding]:

@@ -203,8 +203,8 @@ def _grasp_name(result: Result, k: int) -> str:
 
 def _last_joint(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Where the last joint before the tip is, (T, 3), m, and its axes, (T, 3, 3)."""
-    joint = robot.joint_frames[robot.model.frames[robot.tip_id].parentJoint - 1]
-    poses = [robot.with_tip(joint).tip_pose(row[: robot.nv]) for row in q]
+    there = robot.with_tip(robot.joint_frames[robot.model.frames[robot.tip_id].parentJoint - 1])
+    poses = [there.tip_pose(row[: robot.nv]) for row in q]
     return np.array([pose.translation for pose in poses]), np.array([pose.rotation for pose in poses])
 
 

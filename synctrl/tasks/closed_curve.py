@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance, positive_number
 from ..errors import InputError
-from .ways import arc_lengths
+from .ways import arc_lengths, chords
 
 #: points in which a curve is drawn and looked at
 DRAWN = 400
@@ -58,8 +58,7 @@ class ClosedCurve:
     """
 
     def __init__(self, points: ArrayLike):
-        p = _closed(points)
-        self._u = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1)))
+        p, self._u = _closed(points)
         self._spline = _periodic(self._u, p)
         self._s = np.append(0.0, np.cumsum(arc_lengths(self._spline, self._u[:-1], self._u[1:])))
         self.length = float(self._s[-1])
@@ -108,7 +107,7 @@ def sampled(curve: Callable[[float], ArrayLike], period: float) -> tuple[np.ndar
     period, count = positive_number("period", period), FEWEST
     while True:
         u = period * np.arange(2 * count + 1) / (2 * count)
-        fine = _closed([finite_array("curve", curve(x), (2,)) for x in u.tolist()])
+        fine, _ = _closed([finite_array("curve", curve(x), (2,)) for x in u.tolist()])
         missed = np.abs(_periodic(u[::2], fine[::2])(u[1::2]) - fine[1::2]).max() / np.ptp(fine, axis=0).max()
         if missed < SMOOTH or count >= MOST:
             break
@@ -122,8 +121,8 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def _closed(points: Any) -> np.ndarray:
-    """Points that end where they began, each away from the one before."""
+def _closed(points: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Points that end where they began, each away from the one before, and the chords' length up to each."""
     p = finite_array("points", points, (None, 2))
     if len(p) < 7:
         raise InputError.expected("at least 7 points", len(p), "points")
@@ -132,13 +131,7 @@ def _closed(points: Any) -> np.ndarray:
         raise InputError.expected(f"points within {LARGEST:g} m", size, "points")
     if gap > 1e-9 * size:
         raise InputError.expected("a closed curve, of which the last point is the first", gap, "points")
-    steps = np.linalg.norm(np.diff(p, axis=0), axis=1)
-    if steps.min() <= 1e-12 * size:
-        k = int(np.argmin(steps))
-        raise InputError.expected(
-            f"a distance between the points at {k} and {k + 1}", float(steps[k]), "points"
-        )
-    return p
+    return p, np.append(0.0, np.cumsum(chords(p)))
 
 
 def _periodic(u: np.ndarray, p: np.ndarray) -> Any:

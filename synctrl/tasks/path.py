@@ -17,7 +17,7 @@ from ..checks import count, finite_array, finite_number, instance
 from ..errors import TrajectoryError
 from .poses import check_dimension
 from .trajectories import Motion, Trajectory
-from .ways import arc_lengths, over_time
+from .ways import arc_lengths, chords, over_time
 
 #: degree of the spline, three derivatives of which are continuous once it goes by arc length
 DEGREE = 5
@@ -61,8 +61,8 @@ class Path:
         up: direction that is never along the path, (3,); the normal of a path in a plane.
 
     Raises:
-        InputError: points that are none or too few.
-        TrajectoryError: two neighbours at one place, or a path that goes along `up` somewhere.
+        InputError: points that are none or too few, or two neighbours at one place.
+        TrajectoryError: a sharp bend, or a path that goes along `up` somewhere.
 
     Attributes:
         length: m.
@@ -72,7 +72,6 @@ class Path:
         through = finite_array("points", points, (None, 3))
         count("number of points", len(through), DEGREE + 1)
         self.up = finite_array("up", up, (3,))
-        self._refuse_halts(through)
         by_length, lengths = _by_length(through)
         self.length = float(lengths[-1])
         self._places = self._tabulated(by_length, lengths)
@@ -125,13 +124,6 @@ class Path:
         return s
 
     # -- internals ----------------------------------------------------------------------------------------
-
-    def _refuse_halts(self, points: np.ndarray) -> None:
-        steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        k = int(np.argmin(steps))
-        if steps[k] <= 1e-9 * steps.sum():
-            halt = f"expected a way between neighbours, found points {k} and {k + 1} at one place"
-            raise TrajectoryError(halt, subject="points", found=points[k])
 
     def _tabulated(self, by_length: Any, lengths: np.ndarray) -> Any:
         """A spline through the numbers of `Place` at some arc lengths."""
@@ -195,9 +187,9 @@ def _by_length(points: np.ndarray) -> tuple[Any, np.ndarray]:
     """A spline by arc length through points, and the arc lengths of its nodes, m."""
     from scipy.interpolate import make_interp_spline
 
-    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    curve = make_interp_spline(np.append(0.0, np.cumsum(chords)), points, k=DEGREE)
-    edges = np.linspace(0.0, chords.sum(), max(NODES, len(points)))
+    numbers = np.append(0.0, np.cumsum(chords(points)))
+    curve = make_interp_spline(numbers, points, k=DEGREE)
+    edges = np.linspace(0.0, numbers[-1], max(NODES, len(points)))
     lengths = np.append(0.0, np.cumsum(arc_lengths(curve, edges[:-1], edges[1:])))
     return make_interp_spline(lengths, curve(edges), k=DEGREE), lengths
 

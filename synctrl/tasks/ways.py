@@ -13,6 +13,8 @@ from .trajectories import Motion
 
 #: nodes of the quadrature between two parameters of a curve
 NODES = 8
+#: share of the whole length up to which neighbouring points of a curve are at one place
+HALT = 1e-9
 
 
 class RampUp:
@@ -83,6 +85,23 @@ def over_time(way: Motion, x_s: np.ndarray, x_ss: np.ndarray) -> tuple[np.ndarra
     """
     _, speed, growth = way
     return x_s * speed, x_ss * speed**2 + x_s * growth
+
+
+def chords(points: np.ndarray) -> np.ndarray:
+    """Distances of points from the ones before, (N - 1,), m.
+
+    Args:
+        points: (N, k), m.
+
+    Raises:
+        InputError: two neighbours at one place.
+    """
+    found = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    k = int(np.argmin(found))
+    if found[k] <= HALT * found.sum():
+        what = f"a distance between the points at {k} and {k + 1}"
+        raise InputError.expected(what, float(found[k]), "points")
+    return found
 
 
 def arc_lengths(curve: Any, start: np.ndarray, end: np.ndarray) -> np.ndarray:
