@@ -6,10 +6,20 @@ from typing import Any
 
 import numpy as np
 
-from synctrl import Experiment
+from synctrl import Experiment, Robot
 from synctrl.tasks.inverse_kinematics import reach
 from synctrl.tasks.pose import PoseSpace
 from synctrl.tasks.rotations import exp, log
+
+
+def posture(robot: Robot, p: np.ndarray, R: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Joint positions, (nv,), that bring the tip to a place and an orientation to the last bits."""
+    space, pose = PoseSpace(), np.concatenate((p, log(R)))
+    q = reach(robot, pose, q, space)
+    for _ in range(2):  # by Newton's method, on from where `reach` has stopped
+        e, J = space.miss(robot, pose, q)
+        q = q + np.linalg.solve(J, e)
+    return q
 
 
 def carried_along(made: Experiment, moved: np.ndarray, twist: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -20,8 +30,7 @@ def carried_along(made: Experiment, moved: np.ndarray, twist: np.ndarray) -> tup
     for i, (grasp, arm, robot) in enumerate(
         zip(kept["grasps"], kept["robots"], made.cell.robots, strict=True)
     ):
-        hand = np.concatenate((p + R @ grasp.xyz, log(R @ grasp.rotation)))
-        q[i] = reach(arm, hand, made.cell.q0[i], PoseSpace())
+        q[i] = posture(arm, p + R @ grasp.xyz, R @ grasp.rotation, made.cell.q0[i])
         v[i] = np.linalg.solve(robot.jacobian(q[i]), twist)
     return q, v
 

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from faults import check_fault, empty_cache, sources_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import random_robot, rod_arm
@@ -33,7 +34,7 @@ from synctrl.assembly import grasp as grasp_module
 from synctrl.assembly.body import CarriedObject, Inertia, body_rate, with_share
 from synctrl.assembly.grasp import Fixture, Grasp, fixture_wrenches, grasp_matrix, places_on
 from synctrl.assembly.plant import CarryingPlant
-from synctrl.compiled import build, compiler, program
+from synctrl.compiled import program
 from synctrl.compiled.carrying import _solve
 from synctrl.compiled.known import check_known
 from synctrl.compiled.program import Program
@@ -41,7 +42,7 @@ from synctrl.compiled.structs import functions_of
 from synctrl.control.adaptation import Leakage
 from synctrl.control.laws import ComputedTorque
 from synctrl.coupling.cell import Reference
-from synctrl.errors import CompilationError, InputError, NonFiniteError
+from synctrl.errors import InputError, NonFiniteError
 from synctrl.experiments import carry_planar, carry_ur5
 from synctrl.experiments.ur5_payload import payload_motion
 from synctrl.robots.payload import holding
@@ -287,19 +288,15 @@ FAULTS = {
 }
 
 
+@pytest.fixture(scope="module")
+def sources():
+    return sources_of(mixed().closed_loop())
+
+
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_fault_of_the_driver_that_carries_is_found(name, monkeypatch, tmp_path):
-    monkeypatch.setenv("SYNCTRL_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(build, "_CHECKED", {})
-    monkeypatch.setattr(compiler, "FLAGS", ("-O0", "-fPIC", "-ffp-contract=off"))
-    loop, (text, other) = mixed().closed_loop(), FAULTS[name]
-    *functions, driver = program.generate(program.classify(loop).kinds)
-    assert text in driver
-    broken = [*functions, driver.replace(text, other)]
-    monkeypatch.setattr(program, "generate", lambda kinds: iter(broken))
-    with refused(CompilationError, "generated code") as caught:
-        Program(loop)
-    assert not caught.value.found <= program.AGREEMENT
+def test_a_fault_of_the_driver_that_carries_is_found(name, sources, monkeypatch, tmp_path):
+    empty_cache(monkeypatch, tmp_path)
+    check_fault(mixed().closed_loop(), sources, FAULTS[name], monkeypatch)
 
 
 # -- what is refused --------------------------------------------------------------------------------------

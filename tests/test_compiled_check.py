@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from cells import SMALL_GAINS, random_experiment, small_cell, smooth_motion
+from faults import check_fault, empty_cache, sources_of
 from machines import random_robot, rod_arm
 from refusals import refused
 
@@ -22,7 +23,7 @@ from synctrl import (
     Redundancy,
     load_robot,
 )
-from synctrl.compiled import build, compiler, program
+from synctrl.compiled import build, program
 from synctrl.compiled.kind import classify
 from synctrl.compiled.program import Program
 from synctrl.compiled.specimen import Specimen
@@ -34,11 +35,9 @@ pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[c
 
 
 @pytest.fixture(autouse=True)
-def empty_cache(tmp_path, monkeypatch):
-    """Each test compiles its own code: without optimization, to be quick."""
-    monkeypatch.setenv("SYNCTRL_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(build, "_CHECKED", {})
-    monkeypatch.setattr(compiler, "FLAGS", ("-O0", "-fPIC", "-ffp-contract=off"))
+def own_code(tmp_path, monkeypatch):
+    """Each test compiles its own."""
+    empty_cache(monkeypatch, tmp_path / "cache")
 
 
 def specimen(experiment: Experiment) -> Specimen:
@@ -222,20 +221,12 @@ FAULTS = {
 
 @pytest.fixture(scope="module")
 def sources():
-    loop = mixed().closed_loop()
-    return list(program.generate(classify(loop).kinds))
+    return sources_of(mixed().closed_loop())
 
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_fault_of_the_driver_is_found(name, sources, monkeypatch, tmp_path):
-    text, other = FAULTS[name]
-    *functions, driver = sources
-    assert text in driver
-    broken = [*functions, driver.replace(text, other)]
-    monkeypatch.setattr(program, "generate", lambda kinds: iter(broken))
-    with refused(CompilationError, "generated code") as caught:
-        Program(mixed().closed_loop())
-    assert not caught.value.found <= program.AGREEMENT
+    check_fault(mixed().closed_loop(), sources, FAULTS[name], monkeypatch)
     assert not list((tmp_path / "cache").iterdir())
 
 
@@ -246,7 +237,7 @@ def test_code_that_was_made_from_a_wrong_line_of_the_law_is_found(monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(law, "compute_weighted_errors", lambda weights, error: np.matvec(weights.c, error))
-        wrong = list(program.generate(classify(loop).kinds))
+        wrong = sources_of(loop)
     monkeypatch.setattr(program, "generate", lambda kinds: iter(wrong))
     with refused(CompilationError, "generated code") as caught:
         Program(loop)

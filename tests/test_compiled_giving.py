@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from faults import check_fault, empty_cache, sources_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
@@ -17,13 +18,12 @@ from synctrl import Cell, Coupling, Experiment, Friction, FrictionParameters, Ga
 from synctrl.assembly.body import place_of
 from synctrl.assembly.grasp import grasp_matrix
 from synctrl.assembly.handling import HandlingPlant
-from synctrl.compiled import build, compiler, program
 from synctrl.compiled.carrying import _shares, felt_at_origin
 from synctrl.compiled.known import check_known
 from synctrl.compiled.program import Program
 from synctrl.control.adaptation import Box, Natural
 from synctrl.control.admittance import Admittance, BoundAdmittance
-from synctrl.errors import CompilationError, InputError
+from synctrl.errors import InputError
 from synctrl.experiments import carry_ur5
 from synctrl.robots.catalog import load_robot
 from synctrl.tasks.rotations import log
@@ -152,19 +152,15 @@ FAULTS = {
 }
 
 
+@pytest.fixture(scope="module")
+def sources():
+    return sources_of(giving().closed_loop())
+
+
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_fault_in_what_gives_way_is_found(name, monkeypatch, tmp_path):
-    monkeypatch.setenv("SYNCTRL_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(build, "_CHECKED", {})
-    monkeypatch.setattr(compiler, "FLAGS", ("-O0", "-fPIC", "-ffp-contract=off"))
-    loop, (text, other) = giving().closed_loop(), FAULTS[name]
-    *functions, driver = program.generate(program.classify(loop).kinds)
-    assert text in driver
-    broken = [*functions, driver.replace(text, other)]
-    monkeypatch.setattr(program, "generate", lambda kinds: iter(broken))
-    with refused(CompilationError, "generated code") as caught:
-        Program(loop)
-    assert not caught.value.found <= program.AGREEMENT
+def test_a_fault_in_what_gives_way_is_found(name, sources, monkeypatch, tmp_path):
+    empty_cache(monkeypatch, tmp_path)
+    check_fault(giving().closed_loop(), sources, FAULTS[name], monkeypatch)
 
 
 # -- what is refused --------------------------------------------------------------------------------------

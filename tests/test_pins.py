@@ -168,9 +168,15 @@ def test_the_compiled_engine_refuses_a_law_that_mixes_robots():
 # -- four arms and a plate --------------------------------------------------------------------------------
 
 
+def compiled(duration: float, **options) -> Result:
+    """A run by the engine that is quick, of arms that do not give way."""
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    return carry_planar(**options).simulate(duration, dt=1.5e-3, log_dt=1.5e-2, engine="compiled")
+
+
 @pytest.fixture(scope="module")
 def run() -> Result:
-    return carry_planar().simulate(0.3, dt=1.5e-3, log_dt=1.5e-2)
+    return compiled(0.3)
 
 
 def test_pins_pass_no_moment_and_what_is_inside_is_no_load(run):
@@ -189,7 +195,7 @@ def test_pins_pass_no_moment_and_what_is_inside_is_no_load(run):
 def test_synchronization_does_not_take_force_out_of_the_plate(run):
     force = [
         np.sqrt(np.mean(some.outputs["internal_force"] ** 2))
-        for some in (carry_planar(synchronized=False).simulate(0.3, dt=1.5e-3, log_dt=1.5e-2), run)
+        for some in (compiled(0.3, synchronized=False), run)
     ]
     assert force[0] < force[1]
 
@@ -283,8 +289,7 @@ def late_force(run: Result) -> float:
 
 def test_a_tare_and_an_admittance_each_take_out_half_of_the_force_of_wrong_pins(yielding):
     wrong, tared = (
-        late_force(made.simulate(0.6, dt=1.5e-3, log_dt=0.03))
-        for made in (carry_planar(geometric_error=True, leak=True, tare=tare) for tare in (False, True))
+        late_force(compiled(0.6, geometric_error=True, leak=True, tare=tare)) for tare in (False, True)
     )
     assert late_force(yielding) < 0.5 * wrong and tared < 0.5 * wrong
 

@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 import pinocchio as pin
 import pytest
+from held import posture
 from refusals import refused
 
 from synctrl import (
@@ -36,9 +37,8 @@ from synctrl.experiments import carry_ur5
 from synctrl.experiments.carry import PAYLOAD
 from synctrl.robots.rigid_chain import RigidChain
 from synctrl.tasks.measurement import Tips
-from synctrl.tasks.pose import PoseSpace
 from synctrl.tasks.poses import AxisRotation, PoseTrajectory
-from synctrl.tasks.rotations import exp, log, skew
+from synctrl.tasks.rotations import exp, skew
 
 BODY = CarriedObject(3.0, (0.05, -0.02, 0.03), (0.03, 0.05, 0.04))
 
@@ -177,13 +177,7 @@ def closed(**options):
     """A run of arms whose hands are on their places to the last bits, so that geometry is exact."""
     experiment = carry_ur5(grasp="rigid", **options)
     p, R = experiment.plant_type.keywords["at"]
-    members = []
-    for member in experiment.cell.members:
-        q = member.q0
-        for _ in range(2):
-            e, J = PoseSpace().miss(member.robot, np.concatenate((p, log(R))), q)
-            q = q + np.linalg.solve(J, e)
-        members.append(replace(member, q0=q))
+    members = [replace(m, q0=posture(m.robot, p, R, m.q0)) for m in experiment.cell.members]
     cell = Cell(members, experiment.cell.coupling, experiment.cell.space)
     return replace(experiment, cell=cell).simulate(0.16, dt=1e-3)
 

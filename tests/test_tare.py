@@ -15,9 +15,8 @@ from synctrl.assembly.tare import believed_poses, disagreement, tared
 from synctrl.coupling.cell import Cell
 from synctrl.errors import InputError
 from synctrl.experiments import carry_ur5
-from synctrl.tasks.inverse_kinematics import reach
 from synctrl.tasks.pose import PoseSpace
-from synctrl.tasks.rotations import exp, log
+from synctrl.tasks.rotations import log
 
 ERRORS = st.lists(st.floats(-0.02, 0.02), min_size=6, max_size=6)
 
@@ -42,14 +41,9 @@ def test_arms_disagree_by_the_geometric_error_and_with_a_tare_not_at_all():
 def test_after_a_tare_beliefs_agree_wherever_hands_carry_the_object_rigidly(error, moved):
     """A constant error of a grasp vanishes for good, for the hands move as one."""
     experiment = carry_ur5(geometric_error=np.array(error), tare=True)
-    kept, cell = experiment.plant_type.keywords, experiment.cell
-    (p, R), moved = kept["at"], np.array(moved)
-    p, R = p + moved[:3], exp(10 * moved[3:]) @ R
-    tips = []
-    for grasp, arm, robot, q0 in zip(kept["grasps"], kept["robots"], cell.robots, cell.q0, strict=True):
-        hand = np.concatenate((p + R @ grasp.xyz, log(R @ grasp.rotation)))
-        tips.append(robot.tip_pose(reach(arm, hand, q0, PoseSpace())))
-    np.testing.assert_allclose(tips[0].homogeneous, tips[1].homogeneous, atol=4e-6)  # `reach`: 1e-6 each
+    q, _ = carried_along(experiment, np.repeat([1.0, 10.0], 3) * moved, np.zeros(6))
+    tips = [robot.tip_pose(q_i).homogeneous for robot, q_i in zip(experiment.cell.robots, q, strict=True)]
+    np.testing.assert_allclose(tips[0], tips[1], atol=1e-11)
 
 
 def test_a_base_that_is_thought_to_stand_turned_is_wrong_again_as_the_object_turns():

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..assembly import grasp
 from ..assembly.body import CarriedObject
-from ..assembly.handling import GRIPS, HandlingPlant
+from ..assembly.handling import BODY, GRIPS, HandlingPlant
 from ..assembly.plant import CarryingPlant
 from ..control import law
 from ..control.adaptation.gradient import BoundGradient
@@ -52,9 +52,7 @@ RIGID = (FullParameters, LinearParameters, BaseParameters)
 INVERSES = (Inverse, Pseudoinverse, DampedInverse)
 #: plants, before those that they are made from
 PLANTS = (HandlingPlant, CarryingPlant, Plant)
-#: numbers of the state of an object that is carried
-BODY = 13
-#: numbers of a grip among those
+#: numbers of a grip in the state of a plant
 GRIP = 8
 #: what a plant may say of a run, or refuse before it, without moving otherwise for it
 TELLS = frozenset({"outputs", "report", "account", "chain", "_checked"})
@@ -259,7 +257,7 @@ def _check_plant(loop: ClosedLoop) -> None:
 
 def _remembered(plant: Plant) -> int:
     """How many numbers a plant of the package has for a state of its own."""
-    body = BODY * isinstance(plant, CarryingPlant)
+    body = BODY.stop * isinstance(plant, CarryingPlant)
     return GRIPS.start + GRIP * len(plant.grasps) if isinstance(plant, HandlingPlant) else body
 
 

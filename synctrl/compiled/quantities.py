@@ -226,7 +226,7 @@ def columns(name: str, sizes: Mapping[str, int]) -> int:
 
 
 def shape(name: str, sizes: Mapping[str, int]) -> tuple[int, int]:
-    """Shape of the array of a quantity; `sizes` has n, p and o too, of robots, pairs and objects."""
+    """Shape of the array of a quantity; `sizes` has n, p, o and h too, see `Quantity.rows`."""
     return {"one": 1, **sizes}[QUANTITIES[name].rows], columns(name, sizes)
 
 

@@ -1,0 +1,35 @@
+"""Faults of the compiled engine's driver, and of the lists before it, which its check has to find."""
+
+from __future__ import annotations
+
+import pytest
+from refusals import refused
+
+from synctrl.compiled import build, compiler, program
+from synctrl.compiled.kind import classify
+from synctrl.compiled.program import Program
+from synctrl.errors import CompilationError
+from synctrl.simulation.closed_loop import ClosedLoop
+
+
+def sources_of(loop: ClosedLoop) -> list[str]:
+    """The C sources that are made for a closed loop, the driver last."""
+    return list(program.generate(classify(loop).kinds))
+
+
+def empty_cache(monkeypatch: pytest.MonkeyPatch, folder) -> None:
+    """Let a test compile its own code in a folder: without optimization, to be quick."""
+    monkeypatch.setenv("SYNCTRL_CACHE", str(folder))
+    monkeypatch.setattr(build, "_CHECKED", {})
+    monkeypatch.setattr(compiler, "FLAGS", ("-O0", "-fPIC", "-ffp-contract=off"))
+
+
+def check_fault(loop: ClosedLoop, sources: list[str], fault: tuple[str, str], monkeypatch) -> None:
+    """See to it that a driver with another text in the place of one is not taken for the loop."""
+    *functions, driver = sources
+    text, other = fault
+    assert text in driver
+    monkeypatch.setattr(program, "generate", lambda kinds: iter([*functions, driver.replace(text, other)]))
+    with refused(CompilationError, "generated code") as caught:
+        Program(loop)
+    assert not caught.value.found <= program.AGREEMENT
