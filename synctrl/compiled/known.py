@@ -196,8 +196,9 @@ def _moved_as(plant: Any, tells: frozenset[str]) -> type:
 
 @cache
 def _names_of(plant: type) -> frozenset[str]:
-    """What a plant of the package is made of."""
-    return frozenset(name for kind in plant.__mro__ for name in vars(kind) if not name.startswith("__"))
+    """What a plant of the package is made of, without what Python puts into every class."""
+    inner = "__", "_abc_"
+    return frozenset(name for kind in plant.__mro__ for name in vars(kind) if not name.startswith(inner))
 
 
 def _check_own_methods(part: Part) -> None:
