@@ -2,5 +2,14 @@
 
 from .certify import Certificate, certify
 from .comparison import Comparison, compare, side_by_side
+from .delay_margin import DelayMargin, delay_margin
 
-__all__ = ["Certificate", "Comparison", "certify", "compare", "side_by_side"]
+__all__ = [
+    "Certificate",
+    "Comparison",
+    "DelayMargin",
+    "certify",
+    "compare",
+    "delay_margin",
+    "side_by_side",
+]
