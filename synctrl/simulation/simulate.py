@@ -29,7 +29,7 @@ from ..control.controller import Controller
 from ..control.discrete import DiscreteController
 from ..control.gains import Gains
 from ..control.laws import Law
-from ..control.network import Network
+from ..control.network import Communication
 from ..coupling.cell import Cell
 from ..coupling.member_checks import warn_of_unasked_friction
 from ..errors import InputError
@@ -83,7 +83,7 @@ class Experiment:
     plant_type: Callable[..., Plant] = Plant
     adaptation: Adaptation | None = None
     law: Law | None = None
-    network: Network | None = None
+    network: Communication | None = None
     admittance: Admittance | None = None
 
     def __post_init__(self) -> None:
@@ -231,7 +231,7 @@ def simulate(
     plant_type: Callable[..., Plant] = Plant,
     adaptation: Adaptation | None = None,
     law: Law | None = None,
-    network: Network | None = None,
+    network: Communication | None = None,
     admittance: Admittance | None = None,
     engine: str | Engine = "pinocchio",
     plant: str = "pinocchio",
