@@ -96,7 +96,7 @@ class Recorder:
         return {name: array[: self.count] for name, array in self._arrays.items()}
 
     def account(self, info: Mapping[str, Any]) -> Account:
-        """What plant and network say of their own states until now, under names that neither `info` nor the run has.
+        """What plant and network say of their states until now, under names that nobody else has.
 
         Raises:
             InputError: something else than entries by name, a name that is taken, or an output that is no

@@ -26,8 +26,8 @@ OF_MESSAGES = {"jitter": 0.0, "loss": 0.0, "burst": None, "event": None, "heartb
 class Network:
     """Robots that tell each other what they know of their own errors, in the W form, see `Links`.
 
-    Numbers may be one for all links or (n, n), where entry [i, j] is of what robot i hears from robot j; times
-    are in s.
+    Delay, jitter and loss may be numbers or (n, n), where entry [i, j] is of what robot i hears from robot j;
+    times are in s.
 
     Args:
         period: between two messages of a robot; None for exchange in continuous time, with exact delays.
@@ -38,8 +38,8 @@ class Network:
             all its messages are lost.
         offset: how much the clock of every robot is ahead, a number or (n,): it follows what is desired at
             t + offset.
-        event: threshold, in the unit of c e, a number or (m,): a robot sends only if its w is farther than that
-            from what its last message predicts.
+        event: threshold, in the unit of c e, a number or (m,): a robot sends only if its w is farther than
+            that from what its last message predicts.
         heartbeat: longest silence with an event; by default none is too long.
         receiver: what is believed between messages, "filter", "hold" or "extrapolate", see `receivers.py`.
         omega: rate of the filter, rad/s.
@@ -160,8 +160,8 @@ class Network:
             )  # fmt: skip
         if self.horizon is None and oldest > limit:
             raise InputError.expected(
-                f"messages that are at most 1/(beta a) = {limit:.3g} s old when the next one comes: a shorter "
-                "period and delay, a horizon that says how far to extrapolate, or receiver='filter'",
+                f"messages that are at most 1/(beta a) = {limit:.3g} s old when the next one comes: a "
+                "shorter period and delay, a horizon that says how far to extrapolate, or receiver='filter'",
                 oldest, "receiver='extrapolate'",
             )  # fmt: skip
         return Extrapolate(horizon)

@@ -33,7 +33,7 @@ class Receiver(Protocol):
         """Shapes of what it remembers beside the messages of l links, by name."""
 
     def believed(self, t: float, now: Any, leak: np.ndarray) -> np.ndarray:
-        """W, w and w', (3, l, m); `now` has the parts of the memory, `stamp`, (l,), and `held`, (l, rows, m)."""
+        """W, w and w', (3, l, m); `now` has the parts of the memory, `stamp`, (l,), `held`, (l, rows, m)."""
 
     def rates(self, now: Any) -> dict[str, np.ndarray]:
         """Rates of what it remembers, by name."""
