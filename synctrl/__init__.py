@@ -3,6 +3,7 @@
 from .control.controller import Controller
 from .control.discrete import DiscreteController
 from .control.gains import Gains
+from .control.network import Network
 from .coupling.cell import Cell, Member
 from .coupling.coupling import Coupling
 from .coupling.synchronization import SynchronizationFunction
@@ -50,6 +51,7 @@ __all__ = [
     "JointSpace",
     "LinearParameters",
     "Member",
+    "Network",
     "Payload",
     "PoseSpace",
     "PoseTrajectory",

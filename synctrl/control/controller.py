@@ -28,7 +28,7 @@ from .adaptation import Adaptation, Seen, chosen, pace_of, shift_of
 from .admittance import Admittance, BoundAdmittance
 from .gains import Gains, spread, spread_rows
 from .laws import Asked, Errors, Law, completed
-from .network import Ideal, Network, Received, check_leak
+from .network import Communication, Ideal, Received, check_leak, connected
 from .parts import check_parts, settings_of
 
 
@@ -125,7 +125,7 @@ class Controller:
         *,
         adaptation: Adaptation | None = None,
         law: Law | None = None,
-        network: Network | None = None,
+        network: Communication | None = None,
         torque_limits: ArrayLike | None = None,
         admittance: Admittance | None = None,
         reference_acceleration: str | None = None,
@@ -148,7 +148,7 @@ class Controller:
         self.leak = spread("leak", gains.leak, (m,))
         connection = Ideal(self.leak) if network is None else network
         offers("network", connection, ("bind",), "a network, for example Ideal()")
-        self.network, self.network_settings = connection.bind(cell), settings_of(connection)
+        self.network, self.network_settings = connected(connection, cell, gains), settings_of(connection)
         self._shift = shift_of(self.adaptation, self.network)
         self._pace = pace_of(self.adaptation, self.network)
         self._give_way(admittance)

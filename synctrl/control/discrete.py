@@ -72,6 +72,7 @@ class DiscreteController:
     ):
         instance("controller", controller, Controller, "a Controller")
         measured.check_adaptation(controller)
+        measured.check_network(controller.network)
         self.controller, self.cell = controller, controller.cell
         self.period = positive_number("period", period)
         self.include_gravity = boolean("include_gravity", include_gravity)

@@ -118,6 +118,21 @@ def _undefined(cell: Cell, t: float, what: str, robot: int) -> NonFiniteError:
     )
 
 
+def check_network(network: Any) -> None:
+    """Refuse a network without messages that has delays: what acts at samples knows nothing in between.
+
+    Raises:
+        InputError: it is one.
+    """
+    if getattr(network, "continuous", False):
+        raise InputError(
+            "expected one of messages with sampled control, for example Network(period=control_period, delay="
+            "...), found one of exchange in continuous time, period=None",
+            subject="network",
+            found=None,
+        )
+
+
 def check_adaptation(controller: Controller) -> None:
     """Refuse an adaptation whose arrays do not fit; a rate that fails is left to the run, which says so.
 

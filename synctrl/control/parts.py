@@ -12,10 +12,10 @@ from ..checks import instance, shaped
 from ..errors import InputError, SynctrlError
 from .adaptation import Adaptation
 from .laws import Asked, BoundLaw, Law, no_errors
-from .network import BoundNetwork, Network, Received
+from .network import BoundNetwork, Communication, Received
 
 
-def settings_of(part: Adaptation | Law | Network) -> dict[str, Any]:
+def settings_of(part: Adaptation | Law | Communication) -> dict[str, Any]:
     """Name and settings of a part, by default the name of its type.
 
     Raises:

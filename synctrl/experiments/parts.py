@@ -13,7 +13,7 @@ from ..control.adaptation import Adaptation
 from ..control.admittance import Admittance
 from ..control.gains import Gains
 from ..control.laws import Law
-from ..control.network import Network
+from ..control.network import Communication
 from ..coupling.cell import Cell
 from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
@@ -27,7 +27,7 @@ class Parts(TypedDict, total=False):
 
     adaptation: Adaptation | None
     law: Law | None
-    network: Network | None
+    network: Communication | None
 
 
 class ControllerParts(Parts, total=False):

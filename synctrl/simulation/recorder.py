@@ -96,7 +96,7 @@ class Recorder:
         return {name: array[: self.count] for name, array in self._arrays.items()}
 
     def account(self, info: Mapping[str, Any]) -> Account:
-        """What the plant says of its own state until now, under names that neither `info` nor the run has.
+        """What plant and network say of their states until now, under names that nobody else has.
 
         Raises:
             InputError: something else than entries by name, a name that is taken, or an output that is no
@@ -108,6 +108,9 @@ class Recorder:
         taken = {*info, *describe_run(loop), *LAYOUT, *_STATE_AXES, *OF_EVERY_RUN}
         told = {name: array for name, (array, _, _) in self._learned(logged).items()}
         found = Account(*loop.plant.account({PLANT_STATE: np.zeros((self.count, 0)), **logged, **told}))
+        network = loop.controller.network
+        if hasattr(network, "account"):
+            found = Account(found.report, {**network.account(logged), **found.outputs})
         for what, entries in found._asdict().items():
             _check_names(f"plant {type(loop.plant).__qualname__}, {what}", entries, taken)
         for name, output in found.outputs.items():

@@ -1,7 +1,7 @@
 """The paper's law: coupled errors, and a force on synchronization errors, eqs. (7)-(13) and (28)-(32).
 
-What comes before this law, (7) and (28), is in `control/network.py`; what comes after it, the torque (13) and
-(32) in joint space, in `control/law.py` and `control/controller.py`; the adaptation (14) is
+What comes before this law, (7) and (28), is in `control/network/ideal.py`; what comes after it, the torque
+(13) and (32) in joint space, in `control/law.py` and `control/controller.py`; the adaptation (14) is
 `control/adaptation/gradient.py`. The theory page in `docs` has the way through all of the paper's equations.
 """
 

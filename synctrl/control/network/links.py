@@ -1,0 +1,94 @@
+"""Who hears whom, and what a robot makes of it: the W form of the paper's integrals.
+
+With w_i = c_i e_i, W_i' = w_i - leak W_i and the entries L_ii and A_ij of S^T S, a robot's shares are
+
+    E_i      = L_ii W_i  + sum_j A_ij W_j,
+    sigma_i  = L_ii w_i  + sum_j A_ij w_j,
+    sigma_i' = L_ii w_i' + sum_j A_ij w_j'.
+
+These are S^T times the integrals of epsilon, epsilon and its rate: W = int w gives I = S W, so nothing is new
+where everybody knows everything. But every robot integrates its own error alone, and tells the result. After
+any message was lost the next one restores all of E. Two robots that each integrate the epsilon of their pair
+from what they hear would disagree for ever.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import prod
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ...coupling.coupling import Coupling
+
+
+class Links:
+    """The links i <- j of a coupling, where A_ij is not 0, sorted by who hears, then by who is heard.
+
+    Args:
+        coupling: which robots are compared.
+
+    Attributes:
+        own: L_ii, (n, 1).
+        hearer, sender: i and j of every link, (l,).
+        weight: A_ij, (l,).
+    """
+
+    def __init__(self, coupling: Coupling):
+        from scipy.sparse import csr_array
+
+        starts, columns, entries = coupling.incidence
+        S_T = csr_array((entries, columns, starts), (coupling.robots, coupling.pairs))
+        L = (S_T @ S_T.T).tocoo()
+        order = np.lexsort((L.col, L.row))
+        i, j, A = L.row[order], L.col[order], L.data[order]
+        apart = (i != j) & (A != 0)
+        self.own = np.asarray(L.diagonal())[:, None]
+        self.hearer, self.sender, self.weight = i[apart], j[apart], A[apart]
+        places = np.arange(self.count)
+        self._A = csr_array((self.weight, (self.hearer, places)), (coupling.robots, self.count))
+
+    @property
+    def count(self) -> int:
+        """Number of links, l."""
+        return len(self.hearer)
+
+    def shares(self, own: np.ndarray, heard: np.ndarray) -> np.ndarray:
+        """E, sigma and sigma', (3, n, m).
+
+        Args:
+            own: W, w and w' of every robot, as it knows them, (3, n, m).
+            heard: the same of who is heard, as the one who hears believes it, (3, l, m).
+        """
+        told = self._A @ heard.transpose(1, 0, 2).reshape(self.count, -1)
+        return self.own * own + told.reshape(own.shape[1], *own.shape[::2]).transpose(1, 0, 2)
+
+    def of(self, matrix: np.ndarray) -> np.ndarray:
+        """The entries of a setting, a number or (n, n), for every link, (l,)."""
+        return np.broadcast_to(matrix, (len(self.own),) * 2)[self.hearer, self.sender]
+
+
+class Parts:
+    """Where the parts of a memory are in one flat vector.
+
+    Args:
+        shapes: of the parts, by name.
+    """
+
+    def __init__(self, shapes: Mapping[str, tuple[int, ...]]):
+        sizes = [prod(shape) for shape in shapes.values()]
+        ends = np.cumsum(sizes).tolist()
+        self.size = ends[-1]
+        self._parts = [
+            (name, slice(end - size, end), shape)
+            for (name, shape), size, end in zip(shapes.items(), sizes, ends, strict=True)
+        ]
+
+    def __call__(self, flat: np.ndarray) -> Any:
+        """Views of the parts, as attributes under their names; flat may have a leading axis of time."""
+        lead = flat.shape[:-1]
+        return SimpleNamespace(
+            **{name: flat[..., part].reshape(*lead, *shape) for name, part, shape in self._parts}
+        )
