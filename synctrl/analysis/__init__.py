@@ -3,6 +3,7 @@
 from .certify import Certificate, certify
 from .comparison import Comparison, compare, side_by_side
 from .delay_margin import DelayMargin, delay_margin
+from .period_margin import period_margin
 
 __all__ = [
     "Certificate",
@@ -11,5 +12,6 @@ __all__ = [
     "certify",
     "compare",
     "delay_margin",
+    "period_margin",
     "side_by_side",
 ]

@@ -142,9 +142,8 @@ def growth(frozen: Frozen, delay: float) -> float:
     What is under way is a state of its own, kept at Chebyshev points, whose eigenvalues are near the roots;
     Newton's method makes them exact.
     """
-    still = len(frozen.own) - int(np.linalg.matrix_rank(frozen.own + frozen.delayed))
     roots = np.linalg.eigvals(frozen.own + frozen.delayed if delay == 0 else _generator(frozen, delay))
-    moving = roots[np.argsort(np.abs(roots))[still:]]
+    moving = roots[np.argsort(np.abs(roots))[frozen.still :]]
     rightmost = moving[np.argsort(-moving.real)[:8]]
     return max(float(_refined(frozen, complex(root), delay).real) for root in rightmost if root.imag >= 0)
 

@@ -36,6 +36,7 @@ class Frozen:
     Attributes:
         own, heard, sent: (X, X), (X, 3 N) and (3 N, X).
         leak: (N,), 1/s.
+        horizon: 1/(beta a), beyond which nobody should extrapolate, s.
         joints: number of joints of every robot, (n,).
         least_eigenvalue: of K_r - a/(4 Lambda) J^T c^T K_eps c J of every robot, (n,), where K_r acts.
         proved: whether the theorem tolerates every constant delay here.
@@ -45,6 +46,7 @@ class Frozen:
     heard: np.ndarray
     sent: np.ndarray
     leak: np.ndarray
+    horizon: float
     joints: tuple[int, ...]
     least_eigenvalue: np.ndarray
     proved: bool
@@ -53,6 +55,11 @@ class Frozen:
     def delayed(self) -> np.ndarray:
         """A_1 of x' = A_0 x + A_1 x(t - d), in which A_0 is `own`, (X, X)."""
         return self.heard @ self.sent
+
+    @property
+    def still(self) -> int:
+        """How many roots stay at 0, whatever the delay is: what nobody sees."""
+        return len(self.own) - int(np.linalg.matrix_rank(self.own + self.delayed))
 
     def place(self, x: np.ndarray) -> tuple[int, int]:
         """Robot and joint, counted from 0, that move most in a mode x, (X,)."""
@@ -106,7 +113,9 @@ def freeze(
     least = np.array([arm.least_eigenvalue for arm in arms])
     joints = tuple(robot.nv for robot in cell.robots)
     leak = np.tile(controller.leak, cell.n)
-    return Frozen(own, heard, sent, leak, joints, least, _proved(controller, least, L))
+    fastest = float(controller.beta.max() * L.diagonal().max())
+    horizon = 1 / fastest if fastest else np.inf
+    return Frozen(own, heard, sent, leak, horizon, joints, least, _proved(controller, least, L))
 
 
 def _proved(controller: Controller, least: np.ndarray, L: np.ndarray) -> bool:
