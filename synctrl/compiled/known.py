@@ -85,6 +85,8 @@ def check_known(loop: ClosedLoop) -> None:
         _check_own_methods(part)
     _check_controller(loop.controller)
     _check_plant(loop)
+    for role in loop.devices.settings:
+        raise _refusal(role, role, role)
 
 
 def check_untouched(loop: ClosedLoop) -> None:
