@@ -14,8 +14,8 @@ from synctrl import Experiment, Result
 from synctrl.analysis.certify import certify
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.control.adaptation import Natural
-from synctrl.errors import InputError
-from synctrl.experiments import carry_planar
+from synctrl.errors import InputError, SimulationError
+from synctrl.experiments import a460_pair, carry_planar, carry_ur5, mixed_four
 from synctrl.simulation.devices import (
     Bias,
     DeadTime,
@@ -118,8 +118,6 @@ def test_sensors_measure_in_their_order():
 
 
 def test_joints_that_a_robot_does_not_have_stay_zero():
-    from synctrl.experiments import mixed_four
-
     cell = mixed_four().cell
     for sensor in (Bias(1.0, 1.0), Noise(1.0, 1.0)):
         found = sensor.bind(cell, T)(0, np.zeros((2, cell.n, cell.nv)))
@@ -251,12 +249,47 @@ def test_devices_have_units_of_sliding_and_turning_joints_and_axes():
 def test_a_carried_object_and_another_adaptation_go_along_with_devices():
     held = carry_planar(**ALL).simulate(0.02, dt=5e-4, control_period=1e-3)
     assert held.status == "completed" and "internal_force" in held.outputs
-    from synctrl.experiments import a460_pair
-
     learned = a460_pair(adaptation=Natural(0.1), **ALL).simulate(0.02, dt=5e-4, control_period=1e-3)
     assert learned.status == "completed" and "adaptation_state" in learned.outputs
     for result in (held, learned):
         assert certify(result).verdict == "outside the theorem"
+
+
+@pytest.mark.parametrize("roles", [("sensors",), ("actuators",), ("sensors", "actuators")])
+def test_engines_agree_on_runs_with_devices(roles):
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    experiment = small(**{role: ALL[role] for role in roles})
+    one, two = (
+        experiment.simulate(0.05, dt=1e-3, control_period=T, engine=engine)
+        for engine in ("pinocchio", "compiled")
+    )
+    for name in ("q", "v", "tau", "x", "v_error", "theta_hat", "sync_integral", "sync_error"):
+        np.testing.assert_allclose(getattr(two, name), getattr(one, name), rtol=1e-9, atol=1e-12)
+    assert {*one.outputs} == {*two.outputs} and len(one.outputs) == len(roles) + ("sensors" in roles)
+    for name, array in one.outputs.items():
+        np.testing.assert_allclose(two.outputs[name], array, rtol=1e-9, atol=1e-12)
+
+
+def test_engines_agree_on_a_carried_object_another_adaptation_and_torque_that_is_cut_off():
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    smooth = {"sensors": [Noise(1e-6, 1e-4), DifferencedVelocity(400.0)], "actuators": ALL["actuators"][2:]}
+    held = carry_ur5(geometric_error=True, tare=True, admittance=True, **smooth)
+    for experiment in (held, replace(a460_pair(adaptation=Natural(0.1), **smooth), saturate=True)):
+        one, two = (
+            experiment.simulate(0.02, dt=5e-4, control_period=1e-3, engine=engine)
+            for engine in ("pinocchio", "compiled")
+        )
+        for name in ("q", "v", "tau", "theta_hat"):
+            scale = np.abs(getattr(one, name)).max()
+            np.testing.assert_allclose(getattr(two, name), getattr(one, name), rtol=1e-9, atol=1e-9 * scale)
+
+
+@pytest.mark.parametrize("engine", ["pinocchio", "compiled"])
+def test_what_fails_in_a_device_ends_the_run_and_hands_over_what_it_has(engine):
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    with refused(SimulationError) as caught:
+        small(sensors=[Dying()]).simulate(0.02, dt=1e-3, control_period=T, engine=engine)
+    assert "the wire broke" in str(caught.value) and len(caught.value.result.t) == 5 * 2
 
 
 # -- refusals ----------------------------------------------------------------------------------------------
@@ -295,6 +328,21 @@ def test_devices_are_refused_by_name_where_there_are_no_samples(role, integrator
 def test_what_is_no_device_of_this_cell_is_refused_and_named(make, subject):
     with refused(InputError, subject):
         make()
+
+
+class Dying:
+    """A sensor that works five times."""
+
+    def bind(self, cell, period):
+        def measure(k, motion):
+            if k == 5:
+                raise RuntimeError("the wire broke")
+            return motion
+
+        return measure
+
+    def as_dict(self):
+        return {}
 
 
 class Broken:
