@@ -25,6 +25,7 @@ import numpy as np
 from ..checks import boolean, choice, instance, label, positive_number
 from ..control.adaptation import Adaptation, bounded
 from ..control.admittance import Admittance
+from ..control.agent import Agent, agents_of
 from ..control.controller import Controller
 from ..control.discrete import DiscreteController
 from ..control.gains import Gains
@@ -181,6 +182,10 @@ class Experiment:
         return DiscreteController(
             loop.controller, period, torque_limits=limits, include_gravity=include_gravity, faults=faults
         )
+
+    def agents(self, period: float, **options: Any) -> tuple[Agent, ...]:
+        """The same as one agent per robot, see `agents_of`; arguments and errors as of `controller`."""
+        return agents_of(self.controller(period, **options))
 
     def plan(
         self,
