@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import pickle
+import re
 import struct
+import subprocess
+import sys
+import zlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -215,6 +219,15 @@ def test_robots_of_different_sizes_differ_by_rounding_at_most() -> None:
     np.testing.assert_allclose(apart, together, rtol=1e-9, atol=1e-9 * np.abs(together).max())
 
 
+def test_two_processes_that_share_a_pipe_do_what_one_does_bit_for_bit() -> None:
+    script = Path(__file__).parent.parent / "scripts" / "agents_over_a_pipe.py"
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    torque, difference = re.findall(r"([\d.e-]+) N", done.stdout)
+    assert float(torque) > 1.0
+    assert float(difference) == 0.0
+
+
 # -- what an agent knows ----------------------------------------------------------------------------------
 
 
@@ -331,8 +344,6 @@ def test_numbers_that_mean_nothing_are_no_message(subject: str, message: Callabl
 
 
 def test_a_message_with_numbers_that_are_not_finite_is_refused_on_reading() -> None:
-    import zlib
-
     body = struct.pack("<4sBBHId2d", b"sync", 1, 1, 2, 0, 0.0, np.nan, 1.0)
     with refused(InputError, "message, rows"):
         Message.from_bytes(body + struct.pack("<I", zlib.crc32(body)))

@@ -207,10 +207,8 @@ class Experiment:
         every = None if control_period is None else multiple("control_period", control_period, dt)
         info: dict[str, Any] = {"integrator": "rk4", "dt": float(dt), "duration": float(duration)}
         info["log_dt"] = float(dt if log_dt is None else log_dt)
-        info["engine"] = "pinocchio"
-        info["plant"], info["saturate"] = plant, bool(self.saturate)
-        info["title"] = self.title or self.cell.name
-        info["control_period"] = control_period
+        info["engine"], info["plant"], info["saturate"] = "pinocchio", plant, bool(self.saturate)
+        info["title"], info["control_period"] = self.title or self.cell.name, control_period
         info["start"] = list(self.cell.starts)
         info["friction"] = [member.friction_from for member in self.cell.members]
         info["disturbances"] = [disturbance.as_dict() for disturbance in self.disturbances]
@@ -269,12 +267,11 @@ def _carry_out(
     if progress is not None and not callable(progress):
         raise InputError.expected("a function of the time reached", progress, "progress")
     rtol, atol = (positive_number(*each) for each in zip(("rtol", "atol"), tolerances, strict=True))
-    adaptive = integrator != "rk4"
-    if adaptive:
+    if adaptive := integrator != "rk4":
         _needs_rk4(integrator, engine, run.info["control_period"])
     elif (reason := by.refuses(run)) is not None:
         raise InputError(reason, subject="engine")
-    if not adaptive:
+    else:
         run.check_step()
     run.check()
     warn_of_unasked_friction(run.experiment.cell)
