@@ -25,6 +25,7 @@ import numpy as np
 from ..checks import boolean, choice, instance, label, positive_number
 from ..control.adaptation import Adaptation, bounded
 from ..control.admittance import Admittance
+from ..control.agent import Agent, agents_of
 from ..control.controller import Controller
 from ..control.discrete import DiscreteController
 from ..control.gains import Gains
@@ -196,6 +197,10 @@ class Experiment:
             loop.controller, period, torque_limits=limits, include_gravity=include_gravity, faults=faults
         )
 
+    def agents(self, period: float, **options: Any) -> tuple[Agent, ...]:
+        """The same as one agent per robot, see `agents_of`; arguments and errors as of `controller`."""
+        return agents_of(self.controller(period, **options))
+
     def plan(
         self,
         duration: float | None,
@@ -219,10 +224,8 @@ class Experiment:
         every = None if control_period is None else multiple("control_period", control_period, dt)
         info: dict[str, Any] = {"integrator": "rk4", "dt": float(dt), "duration": float(duration)}
         info["log_dt"] = float(dt if log_dt is None else log_dt)
-        info["engine"] = "pinocchio"
-        info["plant"], info["saturate"] = plant, bool(self.saturate)
-        info["title"] = self.title or self.cell.name
-        info["control_period"] = control_period
+        info["engine"], info["plant"], info["saturate"] = "pinocchio", plant, bool(self.saturate)
+        info["title"], info["control_period"] = self.title or self.cell.name, control_period
         info["start"] = list(self.cell.starts)
         info["friction"] = [member.friction_from for member in self.cell.members]
         info["disturbances"] = [disturbance.as_dict() for disturbance in self.disturbances]
@@ -284,12 +287,11 @@ def _carry_out(
     if progress is not None and not callable(progress):
         raise InputError.expected("a function of the time reached", progress, "progress")
     rtol, atol = (positive_number(*each) for each in zip(("rtol", "atol"), tolerances, strict=True))
-    adaptive = integrator != "rk4"
-    if adaptive:
+    if adaptive := integrator != "rk4":
         check_method(integrator, engine, run.info["control_period"])
     elif (reason := by.refuses(run)) is not None:
         raise InputError(reason, subject="engine")
-    if not adaptive:
+    else:
         run.check_step()
     run.check()
     warn_of_unasked_friction(run.experiment.cell)
