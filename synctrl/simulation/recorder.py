@@ -107,15 +107,14 @@ class Recorder:
         lengths = {"time": self.count, **sizes(loop)}
         taken = {*info, *describe_run(loop), *LAYOUT, *_STATE_AXES, *OF_EVERY_RUN}
         told = {name: array for name, (array, _, _) in self._learned(logged).items()}
-        found = Account(*loop.plant.account({PLANT_STATE: np.zeros((self.count, 0)), **logged, **told}))
-        network = loop.controller.network
-        if hasattr(network, "account"):
-            found = Account(found.report, {**network.account(logged), **found.outputs})
-        for what, entries in found._asdict().items():
-            _check_names(f"plant {type(loop.plant).__qualname__}, {what}", entries, taken)
-        for name, output in found.outputs.items():
-            _check_output(f"plant {type(loop.plant).__qualname__}, outputs, {name}", output, lengths)
-        return found
+        network, plant = loop.controller.network, loop.plant
+        heard = network.account(logged) if hasattr(network, "account") else {}
+        _check_outputs(f"network {type(network).__qualname__}, outputs", heard, taken, lengths)
+        found = Account(*plant.account({PLANT_STATE: np.zeros((self.count, 0)), **logged, **told}))
+        where, taken = f"plant {type(plant).__qualname__}", {*taken, *heard}
+        _check_names(f"{where}, report", found.report, taken)
+        _check_outputs(f"{where}, outputs", found.outputs, taken, lengths)
+        return Account(found.report, {**heard, **found.outputs})
 
     def result(
         self, status: str, info: Mapping[str, Any], experiment: Any, account: Account = NOTHING
@@ -270,6 +269,13 @@ def _check_names(where: str, entries: Any, taken: Collection[str]) -> None:
         if not isinstance(name, str) or not name.isidentifier() or name in taken:
             text = f"expected names that are not taken, found {name!r:.80}"
             raise InputError(text, subject=where, found=name)
+
+
+def _check_outputs(where: str, outputs: Any, taken: Collection[str], lengths: Mapping[str, int]) -> None:
+    """Outputs by name, of a plant or of a network."""
+    _check_names(where, outputs, taken)
+    for name, output in outputs.items():
+        _check_output(f"{where}, {name}", output, lengths)
 
 
 def _check_output(where: str, output: Any, lengths: Mapping[str, int]) -> None:
