@@ -205,6 +205,10 @@ WHOLES: dict[str, Callable[[], Experiment]] = {
     "Chung and Slotine": lambda: independent(ChungSlotine(0.5)),
     "Slotine and Li": lambda: independent(SlotineLi()),
     "postures, and weights that move": wide,
+    "clocks that differ": lambda: small_pair(network=Network(4e-3, offset=[0.0, 0.02])),
+    "clocks that differ, and weights that move": lambda: replace(
+        wide(), network=Network(4e-3, offset=[0.01, 0.0])
+    ),
 }
 
 

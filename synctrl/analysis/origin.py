@@ -10,7 +10,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..simulation.closed_loop import ClosedLoop
-from ..simulation.recorder import describe_run, own_states
+from ..simulation.description import describe_run
+from ..simulation.recorder import own_states
 from ..simulation.result import LAYOUT, Result
 
 #: parts that a result's info may describe

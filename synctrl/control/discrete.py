@@ -72,13 +72,13 @@ class DiscreteController:
     ):
         instance("controller", controller, Controller, "a Controller")
         measured.check_adaptation(controller)
-        measured.check_network(controller.network)
         self.controller, self.cell = controller, controller.cell
         self.period = positive_number("period", period)
         self.include_gravity = boolean("include_gravity", include_gravity)
         self.faults = choice("faults", faults, FAULTS)
         self._shape = self.cell.n, self.cell.nv
         self._messages = Messages(self.cell, controller.network)
+        measured.check_network(controller.network, self._messages, self.period)
         self.torque_limits = limits("torque_limits", torque_limits, self._shape)
         self.held: int
         self.signals: Signals | None

@@ -21,7 +21,7 @@ import numpy as np
 from ...coupling.cell import Cell
 from .links import Links
 from .receivers import Receiver
-from .w_form import WForm
+from .w_form import WForm, check_number
 
 #: stands for an instant that does not come, in a memory of finite numbers, s
 NEVER = 1e300
@@ -110,6 +110,7 @@ class BoundPosted(WForm):
     def messages(self, start: float, end: float) -> np.ndarray:
         """Instants at which messages are sent or may arrive, with start <= t < end, s."""
         period, longest = self.traffic.period, self.traffic.on_the_way
+        check_number(start, end, period, "period")
         first = max(0, int(np.floor(start / period)) - longest)
         numbers = np.arange(first, int(np.ceil(end / period)) + 1)
         sent = numbers * period

@@ -7,8 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...coupling.cell import Cell
+from ...errors import InputError
 from .links import Links, Parts
 from .protocol import Received
+
+#: how many instants of messages are made at once: an hour of one in a millisecond
+MOST = 3_600_000
 
 
 class WForm:
@@ -63,3 +67,14 @@ class WForm:
 
     def outside(self) -> str | None:
         return None
+
+
+def check_number(start: float, end: float, step: float, setting: str) -> None:
+    """Refuse a setting, s, with which a stretch of time, s, has more messages than can be made.
+
+    Raises:
+        InputError: it has.
+    """
+    if end - start > MOST * step:
+        words = f"at least {(end - start) / MOST:.3g} s, with {MOST} messages in {end - start:g} s"
+        raise InputError.expected(words, float(step), setting)
