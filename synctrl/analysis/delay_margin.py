@@ -159,10 +159,14 @@ def growth(frozen: Frozen, delay: float) -> float:
 
 
 def _frequencies(frozen: Frozen) -> np.ndarray:
-    """Every |s| on the imaginary axis is among these, rad/s: no larger one solves the equation."""
+    """Frequencies to look at, rad/s, up to |A_0| + |A_1|: no larger one solves the equation."""
+    from scipy.linalg import matrix_balance
+
     rates = np.abs(np.linalg.eigvals(frozen.own + frozen.delayed))
     low = SLOWEST * rates[rates > 1e-6 * rates.max()].min()
-    high = np.linalg.norm(frozen.own, 2) + np.linalg.norm(frozen.delayed, 2)
+    own, delayed = frozen.own, frozen.delayed
+    _, (scale, _) = matrix_balance(np.abs(own) + np.abs(delayed), permute=False, separate=True)
+    high = sum(np.linalg.norm(part * scale / scale[:, None], 2) for part in (own, delayed))
     return np.geomspace(low, high, int(PER_DECADE * np.log10(high / low)))
 
 
