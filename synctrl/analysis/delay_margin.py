@@ -32,7 +32,7 @@ from .frozen import Frozen, freeze
 #: delay beyond the margin at which `rate` is told, as a share of it
 BEYOND = 1.1
 #: frequencies looked at per decade, and from which share of the slowest rate on
-PER_DECADE, SLOWEST = 300, 1e-3
+PER_DECADE, SLOWEST = 150, 1e-3
 #: how near to 1 absolute values of eigenvalues are that cross it together
 SAME = 1e-7
 #: matrices solved together

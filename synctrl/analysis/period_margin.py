@@ -136,7 +136,9 @@ def _flow(frozen: Frozen, receiver: Receiver, duration: float, moves: float) -> 
 
 def multiplier(frozen: Frozen, exchange: Exchange) -> float:
     """Size of the largest eigenvalue of `monodromy`, those at 1 left out that are there for every period."""
-    values = np.linalg.eigvals(monodromy(frozen, exchange))
+    whole = monodromy(frozen, exchange)
+    counts = whole.any(axis=0)  # what is nowhere remembered has eigenvalues 0
+    values = np.linalg.eigvals(whole[np.ix_(counts, counts)])
     moving = values[np.argsort(np.abs(values - 1))[frozen.still :]]
     return float(np.abs(moving).max())
 
