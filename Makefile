@@ -52,7 +52,7 @@ clean:
 	rm -rf out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -path "./$(VENV)*" -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +
 
-$(VENV)/.installed-core: WHAT := .[mujoco]
+$(VENV)/.installed-core: WHAT := .[compiled,mujoco]
 $(VENV)/.installed-test: WHAT := .[test,notebooks,compiled,mujoco,sweep,xacro]
 $(VENV)/.installed-dev:  WHAT := .[dev]
 $(LOWEST)/.installed-lowest: WHAT := .[test,compiled,mujoco,sweep]

@@ -1,9 +1,10 @@
 """Adaptive synchronized control of multi-robot cells, after Sun and Mills (2002)."""
 
+from .control.agent import Agent
 from .control.controller import Controller
 from .control.discrete import DiscreteController
 from .control.gains import Gains
-from .control.network import Network
+from .control.network import Message, Network
 from .coupling.cell import Cell, Member
 from .coupling.coupling import Coupling
 from .coupling.synchronization import SynchronizationFunction
@@ -27,6 +28,7 @@ from .tasks.spaces import CartesianSpace, JointSpace
 from .tasks.trajectories import Circle, Cubic, ExponentialApproach, FunctionTrajectory, Hold, SmoothTrajectory
 
 __all__ = [
+    "Agent",
     "Attached",
     "AxisRotation",
     "BaseParameters",
@@ -51,6 +53,7 @@ __all__ = [
     "JointSpace",
     "LinearParameters",
     "Member",
+    "Message",
     "Network",
     "Payload",
     "PoseSpace",

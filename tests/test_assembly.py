@@ -27,6 +27,7 @@ from synctrl.robots.payload import Payload, carrying, holding
 from synctrl.tasks.measurement import Tips
 from synctrl.tasks.rotations import exp, skew
 
+UR5 = load_robot("ur5")
 BODY = CarriedObject(4.0, (0.03, 0.01, -0.02), (0.02, 0.06, 0.05))
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -67,11 +68,11 @@ def test_the_rate_of_a_pose_turns_it_with_the_angular_velocity(seed):
 @given(SEEDS)
 def test_a_share_weighs_like_a_load_welded_on(seed):
     rng = np.random.default_rng(seed)
-    robot, d, G = load_robot("ur5"), 0.3 * rng.normal(size=3), turned(rng)
-    shared = with_share(robot, BODY.parameters, d, G)
+    d, G = 0.3 * rng.normal(size=3), turned(rng)
+    shared = with_share(UR5, BODY.parameters, d, G)
     at_tip = Payload(0, BODY.mass, d + G @ BODY.com, G @ BODY.inertia @ G.T)
     q, v, a = rng.normal(size=(3, 6))
-    torque = carrying(robot, at_tip).inverse_dynamics(q, v, a)
+    torque = carrying(UR5, at_tip).inverse_dynamics(q, v, a)
     np.testing.assert_allclose(shared.inverse_dynamics(q, v, a), torque, atol=1e-9 * np.abs(torque).max())
 
 
@@ -255,7 +256,7 @@ def test_runs_with_fixtures_keep_the_order_of_the_method():
 
 def squeezed(**options) -> np.ndarray:
     """Force inside at hand 1 over .8 s, N."""
-    run = carry_ur5(**options).simulate(0.8, dt=2e-3, log_dt=0.02)
+    run = carry_ur5(**options).simulate(0.8, dt=2e-3, log_dt=0.02, engine="compiled")
     return np.linalg.norm(run.outputs["internal_force"][:, 0, :3], axis=1)
 
 

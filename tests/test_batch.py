@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import sys
 from functools import partial
 
+import pytest
 from refusals import refused
 
 from synctrl.errors import ResultError, SimulationError
@@ -55,3 +57,22 @@ def test_a_shortened_run_is_never_longer_than_it_was():
     assert PlannedRun(planar_four).shortened(1.0).duration == 1.0
     assert PlannedRun(planar_four, 0.4).shortened(1.0).duration == 0.4
     assert PlannedRun(planar_four).shortened(100.0).duration == planar_four().duration
+
+
+def test_a_run_is_made_by_the_engine_that_is_planned(tmp_path):
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    planned = {name: PlannedRun(planar_four, 0.01, engine=name) for name in ("pinocchio", "compiled")}
+    for name, run in run_all(tmp_path, 1, planned).items():
+        assert run.info["engine"] == name
+
+
+@pytest.mark.parametrize("missing", ["compiler", "casadi"])
+def test_runs_that_cannot_be_compiled_here_are_made_by_the_reference_engine(missing, monkeypatch):
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    planned = PlannedRun(planar_four, engine="compiled")
+    assert planned.possible() == planned
+    if missing == "compiler":
+        monkeypatch.setenv("CC", "no-such-compiler")
+    else:
+        monkeypatch.setitem(sys.modules, "casadi", None)
+    assert planned.possible() == PlannedRun(planar_four)

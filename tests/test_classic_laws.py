@@ -40,6 +40,10 @@ def knowing(experiment: Experiment, share: float = 1.0) -> Experiment:
     return replace(experiment, cell=Cell(members, cell.coupling, cell.space, cell.name))
 
 
+#: cells that every example of a test has in common
+KNOWN, FOUR = knowing(a460_pair(friction=False)), panda_four()
+
+
 # -- Slotine and Li -----------------------------------------------------------------------------------------
 
 
@@ -93,10 +97,8 @@ def test_computed_torque_learns_nothing_and_damps_nothing_on_an_arm_without_spar
 @given(SEEDS)
 def test_the_torque_is_spring_damper_and_gravity(seed):
     rng = np.random.default_rng(seed)
-    experiment = knowing(a460_pair(friction=False))
-    cell, Lambda = experiment.cell, 7.0
-    K_r = 30.0
-    gains = experiment.gains.independent().replace(K_r=K_r, Lambda=Lambda)
+    cell, Lambda, K_r = KNOWN.cell, 7.0, 30.0
+    gains = KNOWN.gains.independent().replace(K_r=K_r, Lambda=Lambda)
     controller = Controller(cell, gains, law=PDGravity(K_r * Lambda))
     motion = np.stack((cell.q0, np.zeros_like(cell.q0))) + 0.1 * rng.standard_normal((2, 2, 3))
     reference = cell.references(np.array([0.4]))[0]
@@ -128,8 +130,8 @@ def test_exact_gravity_that_is_adapted_leaves_an_arm_at_rest_beside_its_target()
 def test_slaves_that_are_where_the_coupling_wants_them_are_asked_for_no_other_velocity(seed):
     """S w = 0 and S w' = 0: then r = 0 for all but the master."""
     rng = np.random.default_rng(seed)
-    cell = panda_four().cell
-    controller = Controller(cell, panda_four().gains.independent(), law=MasterSlave(1))
+    cell = FOUR.cell
+    controller = Controller(cell, FOUR.gains.independent(), law=MasterSlave(1))
     from synctrl.control.laws import Errors
 
     n, m = cell.n, cell.m

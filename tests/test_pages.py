@@ -6,6 +6,7 @@ import re
 import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from synctrl.errors import StepWarning
@@ -41,6 +42,13 @@ def test_the_examples_about_sweeps_run(tmp_path, monkeypatch):
     names = run("sweeps.md")
     assert len(names["table"]) == 2 and (tmp_path / "out" / "second" / "table.csv").is_file()
     assert names["best"].measures["peak_torque"] <= 1.0
+
+
+def test_the_examples_about_sensors_and_actuators_run():
+    names = run("devices.md")
+    assert names["lost"].any() and names["skipping"].status == "completed"
+    changes = np.diff(names["skipping"].outputs["measured_q"][:, 0, 1]) != 0
+    assert (~changes).nonzero()[0].tolist() == [k - 1 for k in range(1, 51) if k % 5 == 4]
 
 
 @pytest.mark.parametrize(

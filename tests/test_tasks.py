@@ -232,3 +232,13 @@ def test_the_table_has_what_was_measured_of_each_run(run, tmp_path):
     section, _ = section_of(CARRY, runs, tmp_path)
     (table,) = (block for block in section.blocks if isinstance(block, Table))
     assert [row[1] for row in table.rows] == [number(force(runs[name])[0]) for name in CARRY.planned]
+
+
+def test_the_table_says_which_engine_made_each_run(run, tmp_path):
+    compiled = replace(run, info={**run.info, "engine": "compiled"})
+    runs = {**forces(run), "leak": pulling(compiled, *SEEN["leak"])}
+    section, _ = section_of(CARRY, runs, tmp_path)
+    (table,) = (block for block in section.blocks if isinstance(block, Table))
+    engines = {row[0]: row[-1] for row in table.rows}
+    assert engines.pop(CARRY.labels["leak"]) == "compiled"
+    assert set(engines.values()) == {"pinocchio"}

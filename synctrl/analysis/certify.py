@@ -165,7 +165,7 @@ def _outside(run: Replay, record: Lyapunov, condition: GainCondition) -> list[st
     period = run.result.info.get("control_period")
     if period is not None:
         found.append(f"torque and adaptation are held for {period:g} s at a time")
-    found += [*_events(run), *getattr(run.loop.chain, "outside", ())]
+    found += [*_devices(run), *_events(run), *getattr(run.loop.chain, "outside", ())]
     for name in (name for name in record.power if name not in record.inside):
         power = record.power[name]
         only_takes = power.max() <= record.rounding.max()  # at rest nothing that cancels shows in the bound
@@ -177,6 +177,14 @@ def _outside(run: Replay, record: Lyapunov, condition: GainCondition) -> list[st
     if condition.needed and not condition.holds:
         found.append(f"the gain condition fails: {_condition_in_words(run, condition)}")
     return found
+
+
+def _devices(run: Replay) -> list[str]:
+    """Sensors and actuators between robots and controller, in words."""
+    settings = run.loop.devices.settings
+    named = {role: ", ".join(part["name"] for part in parts) for role, parts in settings.items()}
+    words = {"sensors": "the controller knows the motion by", "actuators": "its torque acts through"}
+    return [f"{words[role]} {role}: {names}" for role, names in named.items()]
 
 
 def _events(run: Replay) -> list[str]:

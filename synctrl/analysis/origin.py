@@ -15,6 +15,8 @@ from ..simulation.result import LAYOUT, Result
 
 #: parts that a result's info may describe
 PARTS = ("adaptation", "law", "network")
+#: and those that it has if there are any
+OPTIONAL = ("admittance", "sensors", "actuators")
 #: relative difference between two settings that may be rounding
 ROUNDING = 1e-9
 #: numbers beyond it are those of a run that went astray, and have no squares
@@ -42,7 +44,7 @@ def check_settings(result: Result, loop: ClosedLoop) -> None:
     """Compare gains and parts by what they say of themselves.
 
     Raises:
-        InputError: gains, law, adaptation or network are others.
+        InputError: gains, parts, sensors or actuators are others.
     """
     ours, its = (_settings(info) for info in (describe_run(loop), result.info))
     for name in its:
@@ -55,7 +57,8 @@ def _settings(info: Mapping[str, Any]) -> dict[str, Any]:
     gains = dict(info["gains"])
     learning = {"name": "Gradient", "Gamma": gains.pop("Gamma", None)}
     parts = {name: info[name] for name in PARTS if name in info}
-    return {"adaptation": learning, "gains": gains, "admittance": info.get("admittance"), **parts}
+    optional = {name: info.get(name) for name in OPTIONAL}
+    return {"adaptation": learning, "gains": gains, **optional, **parts}
 
 
 def _alike(a: Any, b: Any) -> bool:

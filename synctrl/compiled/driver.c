@@ -30,6 +30,12 @@ static void look_up(Quantities *a, const Steps *s, int stage, int step) {
     INSTANT(LOOK_UP)
 }
 
+/* The instant of a stage, s; what is asked for at the end of a step is asked just before it. */
+static double instant(const Steps *s, int stage, int step) {
+    double t = s->t[step], t_next = s->t[step + 1];
+    return stage == 0 ? t : stage == 1 ? 0.5 * (t + t_next) : nextafter(t_next, -INFINITY);
+}
+
 /* Let the robots carry, and feel from outside, what they do in a step. */
 static void take(Quantities *a, const Steps *s, int step) {
     long row = s->disturbed[step];
@@ -107,6 +113,15 @@ static void hold(const Cell *c, Quantities *a, Work *k) {
     call_object(c, a, c->n, k);
 }
 
+/* What motors with a lag and a ripple give at time t, of the goal that they have, as `Drive.torque`. */
+static void drive(const Cell *c, Quantities *a, double t) {
+    double order = a->ripple_wave[0], phase = a->ripple_wave[1];
+    for (int j = 0; j < c->n * nv; j++) {
+        double smooth = a->goal[j] + a->owed[j] * exp((a->switched[0] - t) * a->lag[j]);
+        a->driven[j] = smooth * (1 + a->ripple[j] * sin(order * a->q[j] + phase));
+    }
+}
+
 /* v' under a torque that is asked for, where sine and cosine are known, and q' = v */
 static void move(const Cell *c, Quantities *a, const double *tau, Work *k) {
     int joints = c->n * nv;
@@ -124,16 +139,21 @@ static void move(const Cell *c, Quantities *a, const double *tau, Work *k) {
 typedef void Rate(const Cell *c, Quantities *a, Work *k, const Steps *s, int stage, int step, const double *y,
                   double *y_dot);
 
+/* What the controller makes of motion, of what hands feel, and of what is desired. */
+static void command(const Cell *c, Quantities *a, Work *k) {
+    for (int i = 0; i < c->n; i++) call_measure(c, a, i, k);
+    couple(c, a);
+    for (int i = 0; i < c->n; i++) call_control(c, a, i, k);
+    for (int j = 0; j < c->p * m; j++) a->integral_dot[j] = a->epsilon[j] - a->leak[j % m] * a->integral[j];
+}
+
 /* of the whole loop */
 static void evaluate(const Cell *c, Quantities *a, Work *k, const Steps *s, int stage, int step, const double *y,
                      double *y_dot) {
     place(c, a, y, y_dot);
     look_up(a, s, stage, step);
     if (c->o) { turn(c, a); feel(c, a, k); }
-    for (int i = 0; i < c->n; i++) call_measure(c, a, i, k);
-    couple(c, a);
-    for (int i = 0; i < c->n; i++) call_control(c, a, i, k);
-    for (int j = 0; j < c->p * m; j++) a->integral_dot[j] = a->epsilon[j] - a->leak[j % m] * a->integral[j];
+    command(c, a, k);
     move(c, a, a->tau, k);
 }
 
@@ -144,7 +164,8 @@ static void coast(const Cell *c, Quantities *a, Work *k, const Steps *s, int sta
     turn(c, a);
     if (c->o) feel(c, a, k);
     memcpy(y_dot + controlled(c), k->held + controlled(c), sizeof(double) * (state_size(c) - controlled(c)));
-    move(c, a, a->acting, k);
+    if (s->act) drive(c, a, instant(s, stage, step));
+    move(c, a, s->act ? a->driven : a->acting, k);
 }
 
 /* From here on acts what the controller asks for here. */
@@ -155,6 +176,29 @@ static void sample(const Cell *c, Quantities *a, Work *k, const Steps *s) {
     memcpy(a->z_sampled, a->z, sizeof(double) * c->n * Z);
     memcpy(a->z_dot_sampled, a->z_dot, sizeof(double) * c->n * Z);
     a->since[0] = s->period;
+}
+
+/* A sample of what sensors measure, while hands feel what they do; whether that failed. */
+static int perceive(const Cell *c, Quantities *a, Work *k, const Steps *s, int step, const double *y) {
+    size_t joints = sizeof(double) * c->n * nv;
+    if (s->sense(s->t[step], s->t[step], 1)) return 1;
+    place(c, a, y, k->k[0]);
+    look_up(a, s, 0, step);
+    if (c->o) { turn(c, a); feel(c, a, k); }
+    memcpy(k->stage, y, sizeof(double) * state_size(c));
+    place(c, a, k->stage, k->k[0]);
+    memcpy(a->q, a->measured_q, joints);
+    memcpy(a->v, a->measured_v, joints);
+    command(c, a, k);
+    sample(c, a, k, s);
+    return 0;
+}
+
+/* Let actuators act on what is asked for; whether that failed. */
+static int actuate(const Cell *c, Quantities *a, const Steps *s, int step) {
+    if (s->act(s->t[step], instant(s, 1, step), (s->marks[step] & SAMPLED) != 0)) return 1;
+    drive(c, a, s->t[step]);
+    return 0;
 }
 
 /* One row of the log, of an instant at which the loop was evaluated. */
@@ -276,15 +320,18 @@ static void settle(const Cell *c, Quantities *a, Work *k, double *y) {
  * every step begins with a sample. */
 static int begin(const Cell *c, Quantities *a, Work *k, const Steps *s, int step, double *y, const Log *log,
                  Report *report) {
-    int marks = s->marks[step];
+    int marks = s->marks[step], senses = marks & SAMPLED && s->sense;
     report->step = step;
     take(a, s, step);
     if (marks & SAMPLED) settle(c, a, k, y);
+    if (senses && perceive(c, a, k, s, step, y)) return 1;
     if (marks & (CHECKED | SAMPLED)) evaluate(c, a, k, s, 0, step, y, k->k[0]);
+    if (senses) memcpy(a->tau, a->acting, sizeof(double) * c->n * nv);
     if (!s->holds)
         look_back(c, s->t[step], marks & JOINED ? k->step_error.h : 0, y, k->k[3], k->k[0], &k->step_error);
     if (marks & CHECKED && check(c, a, k, y, report)) return 1;
-    if (marks & SAMPLED) sample(c, a, k, s);
+    if (marks & SAMPLED && !senses) sample(c, a, k, s);
+    if (s->act && actuate(c, a, s, step)) return 1;
     if (marks & LOGGED) record(c, a, k, report->rows++, log);
     return 0;
 }

@@ -21,6 +21,7 @@ from ..simulation.guard import Alarm, Progress, checks, limits_of, report_time, 
 from ..simulation.recorder import Recorder
 from ..simulation.result import Result
 from . import structs
+from .hooks import Hooks
 from .known import check_known
 from .program import Program, one_after_another
 from .quantities import DESIRED, LOGS, SLIDE
@@ -143,7 +144,7 @@ class Compiled:
     def run(self, run: Run, progress: Progress | None = None) -> Result:
         """Make a run; see `Engine`."""
         run.info["engine"] = "compiled"
-        recorder = Recorder(run.loop, run.clock)
+        recorder = Recorder(run.loop, run.clock, run.devices)
         with before_the_start(run):
             program = self.load(run)
 
@@ -174,7 +175,9 @@ class _Steps:
         self._block: DesiredStretch | None = None
         program.tell(self._steps, {"disturbance": run.schedule.torques, "pi": program.carried})
         ctypes.memset(work.side, 0, 8 * run.loop.cell.n)
-        program.quantities.hidden = run.loop.state(recorder.state).hidden.ctypes.data
+        state = run.loop.state(recorder.state)
+        program.quantities.hidden = state.hidden.ctypes.data
+        self._hooks = Hooks(run, program.quantities, self._steps, state)
         self._events = deque(sorted(t for t in run.loop.events.tolist() if t >= 0))
 
     def advance(self, block: DesiredStretch, first: int, last: int) -> None:
@@ -242,6 +245,7 @@ class _Steps:
             recorder.advance(times[:-1][marks & Mark.LOGGED > 0][: report.rows])
             worst = program.work.step_error
             self._run.step_error.note(worst.largest, worst.speed, worst.at, worst.time)
+        self._hooks.fail()
         if report.status:
             check = checks(limits_of(program.loop.cell.task))[report.status - 1]
             found = Alarm(check, report.robot, report.value)

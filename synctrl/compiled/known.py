@@ -85,6 +85,8 @@ def check_known(loop: ClosedLoop) -> None:
         _check_own_methods(part)
     _check_controller(loop.controller)
     _check_plant(loop)
+    if "sensors" in loop.devices.settings and type(loop.controller.network) is not BoundIdeal:
+        raise _refusal("sensors", "sensors", "sensors together with a network that is not ideal")
 
 
 def check_untouched(loop: ClosedLoop) -> None:

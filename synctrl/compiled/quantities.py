@@ -126,6 +126,15 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "sigma_dot": Quantity("work", "n", "m", "its share of the rates of epsilon"),
         "tau": Quantity("work", "n", "nv", "torque that the controller asks for"),
         "acting": Quantity("work", "n", "nv", "torque that it asked for when it was last sampled"),
+        "goal": Quantity("work", "n", "nv", "torque that motors are to give, as their actuators pass it on"),
+        "owed": Quantity("work", "n", "nv", "what they were short of when they got it"),
+        "switched": Quantity("work", "one", "1", "when they got it, s"),
+        "lag": Quantity("work", "n", "nv", "rate at which they make up for it"),
+        "ripple": Quantity("work", "n", "nv", "share of torque that changes with the joint"),
+        "ripple_wave": Quantity("work", "one", "2", "order and phase of that"),
+        "driven": Quantity("work", "n", "nv", "torque that motors with actuators give"),
+        "measured_q": Quantity("work", "n", "nv", "what sensors said of positions at the last sample"),
+        "measured_v": Quantity("work", "n", "nv", "and of velocities"),
         "moving": Quantity("work", "n", "nv", "torque that moves the rigid bodies"),
         "pull": Quantity("work", "n", "hand*nv", "torque of the fixture on the joints"),
         "wrench": Quantity("work", "n", "hand*6", "what the fixture does to the object, about its origin"),
@@ -210,6 +219,9 @@ LOGS: Mapping[str, str] = MappingProxyType(
         "damping": "damping",
         "velocity_lost": "velocity_lost",
         "plant_state": "hidden",
+        "measured_q": "measured_q",
+        "measured_v": "measured_v",
+        "actuator_torque": "driven",
     }
 )
 

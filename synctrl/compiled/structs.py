@@ -46,6 +46,9 @@ def _address(written: str) -> type[Address]:
 
 
 Doubles, Ints, Chars, Longs = map(_address, ("double *", "int *", "char *", "long long *"))
+#: a function in Python that the driver calls: time, the middle of the step, whether a sample falls on it -> 0
+Callback = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.c_double, ctypes.c_int)
+Callbacks = _address("Callback *")
 #: what generated functions read, and what they write
 Arguments, Results = map(_address, ("const double **", "double **"))
 
@@ -93,6 +96,7 @@ class Steps(ctypes.Structure):
         t: instants of those to be made, (count + 1), s.
         marks: what happens at the start of each, see `Mark`.
         disturbed, loaded: which disturbance and which load acts in each.
+        sense, act: what sensors and actuators do, see `hooks.py`; 0 where there are none.
         kept: what has these addresses.
     """
 
@@ -107,6 +111,7 @@ class Steps(ctypes.Structure):
         ("marks", Chars),
         ("disturbed", Ints),
         ("loaded", Ints),
+        *((name, Callbacks) for name in ("sense", "act")),
         *((name, Arrays) for name in owned_by("instant", "disturbance", "load")),
     ]
 
@@ -218,11 +223,12 @@ def _member(name: str, kind: Any) -> str:
 
 
 def _constants(kinds: list[Kind]) -> Iterable[str]:
-    """Sizes, how many kinds there are, marks, and what the guard may find."""
+    """Sizes, how many kinds there are, marks, what the guard may find, and what is called back."""
     yield _enumeration({**largest(kinds), "KINDS": len(kinds) + 1})
     yield _enumeration({name: mark.value for name, mark in Mark.__members__.items()})
     found = enumerate(checks(kinds[0].watches), start=1)
     yield _enumeration({f"FOUND_{check.upper()}": k for k, check in found})
+    yield "typedef int Callback(double, double, int);\n"
 
 
 def _enumeration(constants: Mapping[str, int]) -> str:

@@ -112,6 +112,9 @@ class Controller:
         reference_acceleration, k_r_space: shorthand for the options of `SunMills`. Where the damping acts,
             "joint" or "task", may be said beside any law.
 
+    Attributes:
+        unbound: adaptation and law as they were before they knew the cell.
+
     Raises:
         InputError: gains or limits of the wrong size, an unknown option or one that the law contradicts,
             Gamma and an adaptation, or neither, or parts that give something of another shape than they
@@ -145,6 +148,7 @@ class Controller:
         learning = chosen(gains.Gamma, adaptation)
         self.adaptation, self.adaptation_settings = learning.bind(cell), settings_of(learning)
         self.law, self.law_settings = options.law.bind(cell, gains), settings_of(options.law)
+        self.unbound = learning, options.law
         self.leak = spread("leak", gains.leak, (m,))
         connection = Ideal(self.leak) if network is None else network
         offers("network", connection, ("bind",), "a network, for example Ideal()")

@@ -51,8 +51,8 @@ class DiscreteController:
 
     Attributes:
         z: state of the adaptation for the next sample, (n, Z).
-        memory: of the network for the next sample, before its messages; with `Ideal` it is `sync_integral`,
-            (p, m).
+        torque_limits: as given, infinite where there are none.
+        memory: of the network for the next sample, before its messages; `sync_integral` with `Ideal`.
         held: how many calls and periods were held until now.
         signals: what the last sample computed, or None before the first.
 
@@ -79,7 +79,7 @@ class DiscreteController:
         self.faults = choice("faults", faults, FAULTS)
         self._shape = self.cell.n, self.cell.nv
         self._messages = Messages(self.cell, controller.network)
-        self._limits = limits("torque_limits", torque_limits, self._shape)
+        self.torque_limits = limits("torque_limits", torque_limits, self._shape)
         self.held: int
         self.signals: Signals | None
         self._samples: int
@@ -292,7 +292,7 @@ class DiscreteController:
 
     def _advance(self, q: np.ndarray, memory: np.ndarray, signals: Signals, missed: int = 0) -> None:
         """Keep what is commanded, and what will be known at the next sample; or nothing, if a part fails."""
-        tau = np.clip(signals.tau, -self._limits, self._limits)
+        tau = np.clip(signals.tau, -self.torque_limits, self.torque_limits)
         tau = tau if self.include_gravity else tau - measured.gravity_torque(self.cell, q)
         z = after_sample(self.controller.adaptation, self.z, signals.z_dot, self.period)
         self._tau, self.z, self.signals = tau, z, signals

@@ -61,7 +61,7 @@ def a460_pair(
         gains: by default the paper's.
         reference_acceleration, k_r_space: options of the law, see `Experiment`.
         adapt_friction: whether the controller's model has friction too, see `FrictionParameters`.
-        parts: `adaptation`, `law`, `network`, see `Experiment`.
+        parts: `adaptation`, `law`, `network`, `sensors`, `actuators`, see `Experiment`.
     """
     boolean("friction", friction)
     boolean("adapt_friction", adapt_friction)
@@ -81,7 +81,7 @@ def a460_full_pair(wrist: Pid = WRIST, **options: Any) -> Experiment:
 
     Args:
         wrist: the controllers of joints 4 to 6.
-        options: of `a460_pair`, its `adaptation`, `law` and `network` too.
+        options: of `a460_pair`, its parts of the controller, sensors and actuators too.
     """
     known = a460_pair(**options)
     robot = load_robot("a460_full")

@@ -15,6 +15,7 @@ from ..control.gains import Gains
 from ..control.laws import Law
 from ..control.network import Communication
 from ..coupling.cell import Cell
+from ..simulation.devices import Actuator, Sensor
 from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
 
@@ -23,11 +24,13 @@ BOOLS = bool, np.bool_
 
 
 class Parts(TypedDict, total=False):
-    """Parts of the controller, as `Experiment` takes them."""
+    """Parts of the controller, and what stands between it and the robots, as `Experiment` takes them."""
 
     adaptation: Adaptation | None
     law: Law | None
     network: Communication | None
+    sensors: Sequence[Sensor]
+    actuators: Sequence[Actuator]
 
 
 class ControllerParts(Parts, total=False):

@@ -60,7 +60,7 @@ def planar_four(
             Table II.
         gains: by default the paper's.
         reference_acceleration, k_r_space: options of the law, see `Experiment`.
-        parts: `adaptation`, `law`, `network`, see `Experiment`.
+        parts: `adaptation`, `law`, `network`, `sensors`, `actuators`, see `Experiment`.
 
     Raises:
         InputError: an unknown word, or a number that is not finite.

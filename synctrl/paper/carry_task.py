@@ -18,7 +18,7 @@ from .tasks import Drawing, Task, root_mean_square
 #: K_eps of a synchronization that is to be stiff, N/m and N·m/rad
 STIFF = GAINS.replace(K_eps=[2e4] * 3 + [200.0] * 3)
 #: steps of 4 ms are below the limit of the fixtures
-_run = partial(PlannedRun, dt=4e-3, log_dt=8e-3)
+_run = partial(PlannedRun, dt=4e-3, log_dt=8e-3, engine="compiled")
 _wrong = partial(carry_ur5, geometric_error=True)
 _rough = partial(_wrong, friction=True, push=True)
 _whole = {"tare": True, "admittance": True, "gains": STIFF}

@@ -24,7 +24,7 @@ CARRIER, NOZZLE = 0, 1
 #: the end of a run, when the push is over, s
 END = 2.0
 #: without friction steps may be long
-_run = partial(PlannedRun, dt=5e-3, log_dt=1e-2)
+_run = partial(PlannedRun, dt=5e-3, log_dt=1e-2, engine="compiled")
 
 
 def missed(run: Result) -> np.ndarray:

@@ -20,7 +20,7 @@ from .tasks import COMPARED, OURS, Drawing, Task, more_than_gain, since_push
 #: Lambda + beta: what an independent controller could be given instead, 1/s
 STIFF = GAINS.replace(Lambda=26.0)
 #: until after they have met, s
-_run = partial(PlannedRun, duration=4.0, dt=2.5e-3, log_dt=1e-2)
+_run = partial(PlannedRun, duration=4.0, dt=2.5e-3, log_dt=1e-2, engine="compiled")
 
 
 def when_they_meet(run: Result, values: np.ndarray) -> float:
@@ -167,7 +167,7 @@ PATH = Task(
         "gap": _run(partial(bead_on_path, "gap")),
         "weighted": _run(partial(bead_on_path, "gap_weighted")),
         "phase": _run(partial(bead_on_path, "phase")),
-        "waiting": _run(partial(bead_on_path, "gap_weighted", True), duration=4.2),
+        "waiting": _run(partial(bead_on_path, "gap_weighted", True), duration=4.2, engine="pinocchio"),
     },
     labels={
         "alone": "independent",

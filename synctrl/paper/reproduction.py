@@ -16,7 +16,9 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any, Self
 
-from ..errors import GainWarning, SimulationError, StepWarning
+from ..compiled.build import require_casadi
+from ..compiled.compiler import compiler
+from ..errors import GainWarning, MissingDependencyError, SimulationError, StepWarning
 from ..experiments.a460_pair import a460_full_pair, a460_pair
 from ..experiments.planar_four import GAINS, planar_four
 from ..files import reported
@@ -36,7 +38,7 @@ _report: Any = None
 class PlannedRun:
     """A run to be made: how its experiment is built, how long it takes, and what computes the plant.
 
-    `dt` and `log_dt`, s, are those of `Experiment.simulate`.
+    `dt`, `log_dt`, s, and `engine` are those of `Experiment.simulate`.
     """
 
     make: Callable[[], Experiment]
@@ -44,10 +46,25 @@ class PlannedRun:
     plant: str = "pinocchio"
     dt: float = 1e-3
     log_dt: float | None = None
+    engine: str = "pinocchio"
 
     def shortened(self, duration: float) -> Self:
         """This run, cut off where it would take longer than `duration`, s."""
         return replace(self, duration=min(duration, self.duration or self.make().duration))
+
+    def possible(self) -> Self:
+        """This run, by the reference engine where there is no CasADi or no compiler for the compiled one."""
+        return self if self.engine != "compiled" or _compiles() else replace(self, engine="pinocchio")
+
+
+def _compiles() -> bool:
+    """Whether this machine has what the compiled engine needs."""
+    try:
+        require_casadi()
+        compiler()
+    except MissingDependencyError:
+        return False
+    return True
 
 
 def run_all(folder: Path, workers: int, planned: Mapping[str, PlannedRun]) -> dict[str, Result]:
@@ -137,7 +154,7 @@ def _work(name: str, run: PlannedRun, folder: Path) -> Path:
             for known in (StepWarning, GainWarning):  # what the page has sections on
                 warnings.simplefilter("ignore", known)
             made = experiment.simulate(
-                duration, run.dt, plant=run.plant, log_dt=run.log_dt, progress=progress
+                duration, run.dt, plant=run.plant, engine=run.engine, log_dt=run.log_dt, progress=progress
             )
             return made.save(path)
     except SimulationError as error:

@@ -70,8 +70,8 @@ class Task:
 
 
 def planned_runs(tasks: Sequence[Task]) -> dict[str, PlannedRun]:
-    """The runs of all tasks, under names that begin with those of the tasks."""
-    return {f"{task.name}_{name}": run for task in tasks for name, run in task.planned.items()}
+    """The runs of all tasks as this machine can make them, under names that begin with those of the tasks."""
+    return {f"{task.name}_{name}": run.possible() for task in tasks for name, run in task.planned.items()}
 
 
 def runs_of(task: Task, every: Mapping[str, Result]) -> dict[str, Result]:
@@ -113,10 +113,17 @@ def _animation(task: Task, runs: Mapping[str, Result], out: Path) -> Links:
 
 def _table(task: Task, runs: Mapping[str, Result]) -> Table:
     rows = [
-        (task.labels[name], *(number(measure(runs[name])) for measure in task.columns.values()))
+        (
+            task.labels[name],
+            *(number(measure(runs[name])) for measure in task.columns.values()),
+            str(runs[name].info["engine"]),
+        )
         for name in task.planned
     ]
-    return Table(("", *task.columns), tuple(rows))
+    return Table(("", *task.columns, "engine"), tuple(rows), _ENGINES)
+
+
+_ENGINES = "Engine: “compiled” is the closed loop of the reference engine, “pinocchio”, as generated C."
 
 
 def more_than_gain(peaks: Sequence[float], seen: Sequence[Finding], remark: str = "") -> Claim:

@@ -14,6 +14,7 @@ from ..control.network import Messages
 from ..coupling.cell import Cell, Reference
 from ..errors import GainWarning, InputError, NonFiniteError, warn
 from .clock import before
+from .devices import Devices
 from .plant import Plant
 
 
@@ -73,6 +74,7 @@ class ClosedLoop:
     Args:
         controller: the controller of a cell.
         plant: the true cell.
+        devices: sensors and actuators, which act under sampled control alone; by default there are none.
 
     Attributes:
         events: instants at which the plant moves its state, s.
@@ -85,8 +87,9 @@ class ClosedLoop:
             cannot hold what they do.
     """
 
-    def __init__(self, controller: Controller, plant: Plant):
+    def __init__(self, controller: Controller, plant: Plant, devices: Devices | None = None):
         self.controller, self.plant = controller, plant
+        self.devices = Devices(controller.cell) if devices is None else devices
         self.cell, self._law = controller.cell, controller.unchecked
         if not _is_ours(type(controller.adaptation)):
             check_adaptation(controller)
@@ -148,7 +151,7 @@ class ClosedLoop:
         if plant is self.plant:
             return self
         if plant is not last.plant:
-            self._last = last = ClosedLoop(self.controller, plant)
+            self._last = last = ClosedLoop(self.controller, plant, self.devices)
         return last
 
     def split(self, y: np.ndarray) -> list[np.ndarray]:

@@ -21,6 +21,7 @@ from ..coupling.cell import Reference
 from .advance import Step, due
 from .clock import Clock
 from .closed_loop import ClosedLoop, State
+from .devices import LiveDevices
 from .step_error import StepError
 
 
@@ -68,9 +69,19 @@ class Sampled:
         every: how many multiples of dt a sample lasts.
         period: the same in s, as the controller integrates it.
         step_error: told what the worst step was.
+        devices: sensors and actuators between robots and controller.
     """
 
-    def __init__(self, loop: ClosedLoop, clock: Clock, every: int, period: float, step_error: StepError):
+    def __init__(
+        self,
+        loop: ClosedLoop,
+        clock: Clock,
+        every: int,
+        period: float,
+        step_error: StepError,
+        devices: LiveDevices,
+    ):
+        self._devices = devices
         self._loop, self._every, self._step_error = loop, every, step_error
         self._controller = DiscreteController(loop.controller, period)
         self._acts_at_end = clock.sampled_at_end(every)
@@ -79,13 +90,14 @@ class Sampled:
 
     def begin(self, step: Step, y: State, rate: State) -> Signals:
         samples = step.checked and step.number % self._every == 0
-        signals = self._sample(step.t, y) if samples else self._look(step.stages[0], y)
+        signals = self._sample(step.t, y, step.stages[0]) if samples else self._look(step.stages[0], y)
+        self._devices.reach(step.t, step.middle, y.q)
         self.rate(step, step.stages[0], y, rate)
         step.loop.watch(y, signals, rate.v)
         return signals
 
     def rate(self, step: Step, reference: Reference, y: State, rate: State) -> None:
-        step.loop.respond(y, self._tau, step.push, rate)
+        step.loop.respond(y, self._devices.torque(reference.t, y.q, self._tau), step.push, rate)
 
     def arrive(self, step: Step, y: State, expected: Any = np.nan) -> None:
         self.rate(step, step.stages[2], y, self._after)
@@ -95,20 +107,23 @@ class Sampled:
         y.memory[...] = self._memory + since * self._memory_dot
 
     def finish(self, t: float, y: State) -> Signals:
-        if self._acts_at_end:
-            return self._sample(t, y)
-        return self._look(self._loop.cell.references(np.array([t]))[0], y)
-
-    def _sample(self, t: float, y: State) -> Signals:
-        """Let the controller act on the state, which gets its estimates and memory."""
-        controller = self._controller
-        self._t, self._z, self._memory = t, controller.z, controller.heard(t, y.motion)
-        y.z[...], y.memory[...] = self._z, self._memory
-        signals = controller.sample(t, y.motion, **self._loop.felt(y))
-        self._z_dot, self._memory_dot = np.array(signals.z_dot), np.array(signals.memory_dot)
-        self._tau = np.array(signals.tau)
+        reference = self._loop.cell.references(np.array([t]))[0]
+        signals = self._sample(t, y, reference) if self._acts_at_end else self._look(reference, y)
+        self._devices.reach(t, t, y.q)
         return signals
 
+    def _sample(self, t: float, y: State, reference: Reference) -> Signals:
+        """Let the controller act on what is measured of the state, which gets its estimates and memory."""
+        controller, devices = self._controller, self._devices
+        motion = devices.measure(y.motion)
+        self._t, self._z, self._memory = t, controller.z, controller.heard(t, motion)
+        y.z[...], y.memory[...] = self._z, self._memory
+        signals = controller.sample(t, motion, **self._loop.felt(y))
+        self._z_dot, self._memory_dot = np.array(signals.z_dot), np.array(signals.memory_dot)
+        self._tau = np.array(signals.tau)
+        devices.command(t, self._loop.plant.applied(self._tau))
+        return self._look(reference, y) if devices.senses else signals
+
     def _look(self, reference: Reference, y: State) -> Signals:
-        """What the law would compute between two samples, with the torque that is held."""
+        """What the law would compute of the true state, with the torque that is held."""
         return replace(self._loop.look(reference, y), tau=self._tau)

@@ -22,6 +22,7 @@ from .advance import Sample, Solver, advance
 from .clock import Clock
 from .closed_loop import ClosedLoop
 from .controls import Continuous, Sampled
+from .devices import LiveDevices
 from .diagnosis import diagnosed
 from .guard import Guard, Progress, date, report_time, user_failure
 from .integrators import RungeKutta, Scipy
@@ -38,7 +39,8 @@ class Run(NamedTuple):
     """A run that is about to start.
 
     `every` is how many steps of dt a sample of sampled control lasts, or None; `experiment` is what the
-    result will know as its own; `step_error` learns what the worst step was.
+    result will know as its own; `step_error` learns what the worst step was; `devices` are sensors and
+    actuators at the beginning of the run.
     """
 
     experiment: Any
@@ -48,6 +50,7 @@ class Run(NamedTuple):
     every: int | None
     info: dict[str, Any]
     step_error: StepError
+    devices: LiveDevices
 
     def check(self) -> None:
         """Look ahead, before anything runs.
@@ -91,7 +94,7 @@ class Run(NamedTuple):
         if self.every is None:
             return advance(loop, clock, self.schedule, Continuous(loop, clock, self.step_error), solver)
         period = float(self.info["control_period"])
-        control = Sampled(loop, clock, self.every, period, self.step_error)
+        control = Sampled(loop, clock, self.every, period, self.step_error, self.devices)
         return advance(loop, clock, self.schedule, control, solver)
 
 
@@ -117,7 +120,7 @@ def collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> R
     Raises:
         SimulationError: the run had to stop; it carries what was logged.
     """
-    recorder, guard = Recorder(run.loop, run.clock), Guard(run.loop)
+    recorder, guard = Recorder(run.loop, run.clock, run.devices), Guard(run.loop)
 
     def log() -> None:
         for sample in samples:
@@ -146,7 +149,7 @@ def before_the_start(run: Run) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        raise _interrupted(run, Recorder(run.loop, run.clock)) from None
+        raise _interrupted(run, Recorder(run.loop, run.clock, run.devices)) from None
 
 
 def _made(run: Run, recorder: Recorder, log: Callable[[], None]) -> Result:

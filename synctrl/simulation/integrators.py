@@ -104,6 +104,20 @@ class Scipy:
         return self._output(t)
 
 
+def check_method(integrator: str, engine: object, control_period: float | None) -> None:
+    """Refuse one of SciPy's methods where only "rk4" goes.
+
+    Raises:
+        InputError: another engine than the reference, or sampled control.
+    """
+    if engine != "pinocchio":
+        expected = f"engine={engine!r} has 'rk4' only"
+        raise InputError(f"{expected}, found {integrator!r}", subject="integrator", found=integrator)
+    if control_period is not None:
+        expected = "sampled control needs the integrator 'rk4'"
+        raise InputError(f"{expected}, found {integrator!r}", subject="control_period", found=integrator)
+
+
 def _check_thread(method: str, version: str) -> None:
     """Before version 1.17 SciPy's LSODA kept its state in one place, where runs would spoil each other."""
     old = tuple(map(int, version.split(".")[:2])) < (1, 17)

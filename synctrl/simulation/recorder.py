@@ -23,6 +23,7 @@ from ..robots.written import write_robot
 from .advance import Sample
 from .clock import Clock
 from .closed_loop import ClosedLoop, State
+from .devices.fitted import DRIVEN, MEASURED, ROLES, LiveDevices
 from .limits import APPLIED, DampingLog, applied_output, limit_report, saturation_report
 from .memory import check_fits
 from .plant import Output
@@ -46,6 +47,7 @@ class Recorder:
     Args:
         loop: the closed loop.
         clock: its instants.
+        devices: sensors and actuators, which tell what they read.
 
     Attributes:
         count: how many instants are logged.
@@ -56,11 +58,12 @@ class Recorder:
         InputError: the log does not fit into memory.
     """
 
-    def __init__(self, loop: ClosedLoop, clock: Clock):
-        self._loop, instants = loop, clock.rows
+    def __init__(self, loop: ClosedLoop, clock: Clock, devices: LiveDevices):
+        self._loop, self._devices, instants = loop, devices, clock.rows
         lengths = {"time": instants, **sizes(loop)}
         shapes = {name: [lengths[d] for d in dimensions] for name, (dimensions, _) in LAYOUT.items()}
         shapes |= {name: [instants, *shape] for name, shape in own_states(loop).items()}
+        shapes |= {name: [instants, *reading.shape] for name, reading in devices.readings.items()}
         numbers = sum(int(np.prod(shape[1:])) for shape in shapes.values())
         check_fits(clock, 8 * numbers)
         self._arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
@@ -71,8 +74,10 @@ class Recorder:
         """Log one instant."""
         state = self._loop.state(sample.y)
         integral = self._loop.controller.network.integral(state.memory)
+        readings = self._devices.readings
         for name, array in self._arrays.items():
-            array[self.count] = ROW[name](sample, state, integral)
+            read = readings[name] if name in readings else ROW[name](sample, state, integral)
+            array[self.count] = read
         self._damping.add(self.count, sample.signals)
         self.count += 1
 
@@ -123,6 +128,7 @@ class Recorder:
         """What was logged until now, with what the plant says of it."""
         arrays = {name: _taken(array, self.count) for name, array in self._arrays.items()}
         states = {name: arrays.pop(name) for name in own_states(self._loop)}
+        read = {name: arrays.pop(name) for name in self._devices.readings}
         described = {"status": printable(status), **describe_run(self._loop), **info}
         described["damping"] = self._damping.report(arrays["t"])
         seen = (arrays[name] for name in ("t", "q", "v", "tau"))
@@ -131,7 +137,7 @@ class Recorder:
         described.update(account.report)
         described["saturation"] = saturation_report(plant, arrays)
         found = {name: (array, "SI", _STATE_AXES[name]) for name, array in states.items()}
-        found |= self._learned(states)
+        found |= {**self._learned(states), **self._devices.outputs(self._loop.cell, read)}
         found |= {**applied_output(plant, arrays["tau"]), **account.outputs}
         outputs = {name: array for name, (array, _, _) in found.items()}
         described["outputs"] = {n: {"unit": unit, "axes": list(axes)} for n, (_, unit, axes) in found.items()}
@@ -148,7 +154,7 @@ ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE = "adaptation_state", "network_stat
 #: further names of entries and outputs that a result gets from elsewhere
 OF_EVERY_RUN = (
     *("status", "outputs", "damping", "limits", "saturation", "step_error", "run", "format"),
-    *(APPLIED, "hedge", "admittance", "phase", "feed"),
+    *(APPLIED, "hedge", "admittance", "phase", "feed", *ROLES, *MEASURED, *DRIVEN),
 )
 #: how every array is read from a sample and the parts of its state; the last one from int epsilon
 ROW: dict[str, Callable[[Sample, State, np.ndarray], Any]] = {
@@ -231,6 +237,7 @@ def describe_run(loop: ClosedLoop) -> dict[str, Any]:
     }
     if controller.admittance_settings is not None:
         about["admittance"] = controller.admittance_settings
+    about |= loop.devices.settings
     return {**about, "units": {name: array_unit(about, name) for name in LAYOUT}}
 
 

@@ -249,6 +249,7 @@ INFO = entries(
         "saturation": rows(_CUT_OFF),
         "step_error": optional(_step_error),
         **dict.fromkeys(("adaptation", "law", "network"), _PART),
+        **dict.fromkeys(("sensors", "actuators"), rows(_PART)),
         "admittance": entries(dict.fromkeys(("mass", "damping"), rows(number))),
         "held_joints": rows(_HELD, "robot"),
     },

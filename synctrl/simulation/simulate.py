@@ -25,6 +25,7 @@ import numpy as np
 from ..checks import boolean, choice, instance, label, positive_number
 from ..control.adaptation import Adaptation, bounded
 from ..control.admittance import Admittance
+from ..control.agent import Agent, agents_of
 from ..control.controller import Controller
 from ..control.discrete import DiscreteController
 from ..control.gains import Gains
@@ -36,9 +37,10 @@ from ..errors import InputError
 from ..renamed import names_elsewhere
 from .clock import TIE, make_clock, multiple
 from .closed_loop import ClosedLoop
+from .devices import Actuator, Devices, Sensor
 from .engines import Engine, Run, find_engine, run_adaptive
 from .guard import Progress
-from .integrators import ADAPTIVE
+from .integrators import ADAPTIVE, check_method
 from .limits import warn_of_saturation
 from .plant import PHYSICS, Plant, torque_limits
 from .result import Result
@@ -66,6 +68,10 @@ class Experiment:
         law: from errors to reference motion and force; by default `SunMills`.
         network: what the robots know of each other; by default `Ideal`.
         admittance: how they give way to the forces inside what they hold; by default they do not.
+        sensors: what stands between the motion of the joints and a controller that samples it, in the order
+            in which they measure; by default it knows all exactly.
+        actuators: what stands between the torque that it asks for and the joints, in the order in which
+            they act; by default nothing.
 
     Raises:
         InputError: a part that is none, does not fit the others, or gives arrays that do not fit the cell.
@@ -85,6 +91,8 @@ class Experiment:
     law: Law | None = None
     network: Communication | None = None
     admittance: Admittance | None = None
+    sensors: Sequence[Sensor] = ()
+    actuators: Sequence[Actuator] = ()
 
     def __post_init__(self) -> None:
         instance("cell", self.cell, Cell, "a Cell")
@@ -112,7 +120,7 @@ class Experiment:
             reference_acceleration=self.reference_acceleration,
             k_r_space=self.k_r_space,
         )
-        return ClosedLoop(controller, body)
+        return ClosedLoop(controller, body, Devices(self.cell, self.sensors, self.actuators))
 
     @property
     def told_cell(self) -> Cell:
@@ -189,6 +197,10 @@ class Experiment:
             loop.controller, period, torque_limits=limits, include_gravity=include_gravity, faults=faults
         )
 
+    def agents(self, period: float, **options: Any) -> tuple[Agent, ...]:
+        """The same as one agent per robot, see `agents_of`; arguments and errors as of `controller`."""
+        return agents_of(self.controller(period, **options))
+
     def plan(
         self,
         duration: float | None,
@@ -203,23 +215,25 @@ class Experiment:
         loop = self.closed_loop(plant)
         schedule = DisturbanceSchedule(self.cell, self.disturbances)
         edges = [*schedule.edges, *loop.plant.schedule.edges, *loop.events]
+        devices = loop.devices.start(control_period)
         if control_period is None:
             edges += loop.messages.between(0.0, positive_number("duration", duration))
+        else:
+            edges += loop.devices.switches(control_period, duration)
         clock = make_clock(duration, dt, edges, loop.cell.breaks, log_dt)
         every = None if control_period is None else multiple("control_period", control_period, dt)
         info: dict[str, Any] = {"integrator": "rk4", "dt": float(dt), "duration": float(duration)}
         info["log_dt"] = float(dt if log_dt is None else log_dt)
-        info["engine"] = "pinocchio"
-        info["plant"], info["saturate"] = plant, bool(self.saturate)
-        info["title"] = self.title or self.cell.name
-        info["control_period"] = control_period
+        info["engine"], info["plant"], info["saturate"] = "pinocchio", plant, bool(self.saturate)
+        info["title"], info["control_period"] = self.title or self.cell.name, control_period
         info["start"] = list(self.cell.starts)
         info["friction"] = [member.friction_from for member in self.cell.members]
         info["disturbances"] = [disturbance.as_dict() for disturbance in self.disturbances]
         info["payloads"] = [payload.as_dict() for payload in self.payloads]
         events = [float(t) for t in np.sort(loop.events) if 0 <= t < clock.end - TIE * dt]
         info["events"] = [{"t": t, "part": type(loop.plant).__qualname__} for t in events]
-        return Run(self, loop, clock, schedule, every, info, StepError(self.cell.n, self.cell.nv))
+        step_error = StepError(self.cell.n, self.cell.nv)
+        return Run(self, loop, clock, schedule, every, info, step_error, devices)
 
 
 def simulate(
@@ -240,6 +254,8 @@ def simulate(
     law: Law | None = None,
     network: Communication | None = None,
     admittance: Admittance | None = None,
+    sensors: Sequence[Sensor] = (),
+    actuators: Sequence[Actuator] = (),
     engine: str | Engine = "pinocchio",
     plant: str = "pinocchio",
     control_period: float | None = None,
@@ -271,12 +287,11 @@ def _carry_out(
     if progress is not None and not callable(progress):
         raise InputError.expected("a function of the time reached", progress, "progress")
     rtol, atol = (positive_number(*each) for each in zip(("rtol", "atol"), tolerances, strict=True))
-    adaptive = integrator != "rk4"
-    if adaptive:
-        _needs_rk4(integrator, engine, run.info["control_period"])
+    if adaptive := integrator != "rk4":
+        check_method(integrator, engine, run.info["control_period"])
     elif (reason := by.refuses(run)) is not None:
         raise InputError(reason, subject="engine")
-    if not adaptive:
+    else:
         run.check_step()
     run.check()
     warn_of_unasked_friction(run.experiment.cell)
@@ -285,15 +300,6 @@ def _carry_out(
     warn_of_step(result.info["step_error"], result.names, run.info["dt"])
     warn_of_saturation(result)
     return result
-
-
-def _needs_rk4(integrator: str, engine: str | Engine, control_period: float | None) -> None:
-    if engine != "pinocchio":
-        expected = f"engine={engine!r} has 'rk4' only"
-        raise InputError(f"{expected}, found {integrator!r}", subject="integrator", found=integrator)
-    if control_period is not None:
-        expected = "sampled control needs the integrator 'rk4'"
-        raise InputError(f"{expected}, found {integrator!r}", subject="control_period", found=integrator)
 
 
 __getattr__ = names_elsewhere(__name__, ".engines", "run_reference")

@@ -1,5 +1,18 @@
 """Many runs of one experiment: factors and their values, here or on a cluster, resumed where they stopped."""
 
+from .devices import (
+    dead_time,
+    encoder_bias,
+    encoder_resolution,
+    noise,
+    noise_seed,
+    torque_lag,
+    torque_rate,
+    torque_resolution,
+    torque_ripple,
+    velocity_filter,
+    velocity_noise,
+)
 from .distributions import Choice, Grid, LogUniform, Normal, Uniform
 from .factors import (
     Factor,
@@ -31,8 +44,11 @@ __all__ = [
     "Uniform",
     "adaptation",
     "control_period",
+    "dead_time",
     "disturbance_scale",
     "disturbance_start",
+    "encoder_bias",
+    "encoder_resolution",
     "gain",
     "gain_scale",
     "initial_estimates",
@@ -42,7 +58,15 @@ __all__ = [
     "load",
     "model_error",
     "network",
+    "noise",
+    "noise_seed",
+    "torque_lag",
+    "torque_rate",
+    "torque_resolution",
+    "torque_ripple",
     "trajectories",
     "true_parameters",
+    "velocity_filter",
+    "velocity_noise",
     "weights",
 ]

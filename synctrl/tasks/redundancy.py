@@ -12,7 +12,7 @@ what its numbers are: with an `Algebra` of symbols the same lines are traced for
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,6 +59,11 @@ class Redundancy:
     def of(self, robots: Sequence[Robot], i: int) -> np.ndarray | None:
         """The posture of one of the robots, (nv,), or None if there is none."""
         return None if self.posture is None else _rows("posture", self.posture, robots, 0.0)[i]
+
+    def own(self, robots: Sequence[Robot], i: int) -> Redundancy:
+        """The same for one of the robots alone."""
+        weights = None if self.weights is None else _rows("weights", self.weights, robots, 1.0)[i]
+        return replace(self, posture=self.of(robots, i), weights=weights)
 
     def spread(self, robots: Sequence[Robot]) -> Posture:
         """W^-1, posture and its gain, each (n, nv): rows padded with zeros for joints a robot does not have.

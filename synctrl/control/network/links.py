@@ -15,6 +15,7 @@ from what they hear would disagree for ever.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from math import prod
 from types import SimpleNamespace
 from typing import Any
@@ -45,10 +46,19 @@ class Links:
         order = np.lexsort((L.col, L.row))
         i, j, A = L.row[order], L.col[order], L.data[order]
         apart = (i != j) & (A != 0)
-        self.own = np.asarray(L.diagonal())[:, None]
-        self.hearer, self.sender, self.weight = i[apart], j[apart], A[apart]
-        places = np.arange(self.count)
-        self._A = csr_array((self.weight, (self.hearer, places)), (coupling.robots, self.count))
+        self._set(np.asarray(L.diagonal())[:, None], i[apart], j[apart], A[apart])
+
+    def _set(self, own: np.ndarray, hearer: np.ndarray, sender: np.ndarray, weight: np.ndarray) -> None:
+        from scipy.sparse import csr_array
+
+        self.own, self.hearer, self.sender, self.weight = own, hearer, sender, weight
+        self._A = csr_array((weight, (hearer, np.arange(self.count))), (len(own), self.count))
+
+    def of_robot(self, i: int) -> Links:
+        """The links on which robot i hears, as it knows them: `own` is (1, 1), and `hearer` is 0."""
+        mine, alone = self.hearer == i, copy(self)
+        alone._set(self.own[i : i + 1].copy(), 0 * self.hearer[mine], self.sender[mine], self.weight[mine])
+        return alone
 
     @property
     def count(self) -> int:

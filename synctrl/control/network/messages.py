@@ -69,10 +69,14 @@ class Messages:
         """
         if not times:
             return memory
-        w = compute_weighted_errors(reference.weights, self._measure(motion, reference.desired).error)
+        w = self.weighted(reference, motion)
         for t in times:
             memory = self._after(t, w, memory)
         return memory
+
+    def weighted(self, reference: Reference, motion: np.ndarray) -> np.ndarray:
+        """Weighted errors and their rates, (2, n, m), of which robots tell; arguments as of `received`."""
+        return compute_weighted_errors(reference.weights, self._measure(motion, reference.desired).error)
 
     def _after(self, t: float, w: np.ndarray, memory: np.ndarray) -> np.ndarray:
         """Memory after one message, looked at."""

@@ -12,13 +12,14 @@ beginning.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...coupling.cell import Cell
+from .links import Links
 from .receivers import Receiver
 from .w_form import WForm
 
@@ -69,21 +70,29 @@ class BoundPosted(WForm):
         leak: rate at which integrals are forgotten, (m,), 1/s.
         receiver: what is believed between messages.
         traffic: makes what happens to messages of the links.
+        links: who hears whom, by default as the coupling says.
 
     Attributes:
         receiver, traffic: as given.
     """
 
-    def __init__(self, cell: Cell, leak: np.ndarray, receiver: Receiver, traffic: Traffic):
+    def __init__(
+        self,
+        cell: Cell,
+        leak: np.ndarray,
+        receiver: Receiver,
+        traffic: Traffic,
+        links: Links | None = None,
+    ):
         n, m, l, rows = cell.n, cell.m, len(traffic.delay), receiver.rows
         places, tells = traffic.on_the_way, traffic.event is not None
         super().__init__(
-            cell, leak, **receiver.shapes(l, m), begun=(1,), stamp=(l,), held=(l, rows, m),
+            cell, leak, links, **receiver.shapes(l, m), begun=(1,), stamp=(l,), held=(l, rows, m),
             stamps=(places,), letters=(places, n, rows, m), arrivals=(places, l), bad=(l,), sent=(n,),
             come=(l,), told=(n * tells, 1 + 2 * m),
         )  # fmt: skip
         self.receiver, self.traffic = receiver, traffic
-        self._chances = lru_cache(4 * places + 16)(self._draw)
+        self._chances: Callable[[int], np.ndarray] = lru_cache(4 * places + 16)(self._draw)
 
     def start(self) -> np.ndarray:
         memory = np.zeros(self.parts.size)

@@ -17,6 +17,7 @@ class WForm:
     Args:
         cell: the cell.
         leak: rate at which integrals are forgotten, (m,), 1/s.
+        links: who hears whom, by default as the coupling says.
         further: shapes of what its memory has beside W, (n, m), by name.
 
     Attributes:
@@ -25,8 +26,8 @@ class WForm:
         parts: names for the parts of the memory, a flat vector.
     """
 
-    def __init__(self, cell: Cell, leak: np.ndarray, **further: tuple[int, ...]):
-        self.links, self.leak = Links(cell.coupling), leak
+    def __init__(self, cell: Cell, leak: np.ndarray, links: Links | None = None, **further: tuple[int, ...]):
+        self.links, self.leak = Links(cell.coupling) if links is None else links, leak
         self.parts = Parts({"W": (cell.n, cell.m), **further})
         self._compare, _ = cell.coupling.products
 
