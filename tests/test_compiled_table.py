@@ -144,7 +144,7 @@ def test_structures_have_the_same_layout_in_c_and_in_python(tmp_path):
         for field in (name for name, *_ in structure._fields_):
             places += [f"offsetof({title}, {field})", f"sizeof((({title} *)0)->{field})"]
             expected += [getattr(structure, field).offset, getattr(structure, field).size]
-    declarations = "".join(map(structs.declared, structs.STRUCTURES))
+    declarations = structs.CALLBACK + "".join(map(structs.declared, structs.STRUCTURES))
     lines = "".join(f'    printf("%zu\\n", {place});\n' for place in places)
     source = f"#include <stddef.h>\n#include <stdio.h>\n{declarations}int main(void) {{\n{lines}}}\n"
     assert [int(line) for line in printed(source, tmp_path).split()] == expected

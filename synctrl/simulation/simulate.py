@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from ..checks import boolean, choice, instance, label, positive_number
-from ..control.adaptation import Adaptation, bounded
+from ..control.adaptation import Adaptation
 from ..control.admittance import Admittance
 from ..control.controller import Controller
 from ..control.discrete import DiscreteController
@@ -40,7 +40,7 @@ from .devices import Actuator, Devices, Sensor
 from .engines import Engine, Run, find_engine, run_adaptive
 from .guard import Progress
 from .integrators import ADAPTIVE, check_method
-from .limits import warn_of_saturation
+from .limits import learning_within, warn_of_saturation
 from .plant import PHYSICS, Plant, torque_limits
 from .result import Result
 from .schedules import Disturbance, DisturbanceSchedule, Payload
@@ -106,7 +106,7 @@ class Experiment:
     def closed_loop(self, plant: str = "pinocchio") -> ClosedLoop:
         """The differential equation of this experiment; `plant` as in `simulate`."""
         body = self.plant_type(self.cell, physics=plant, payloads=self.payloads, saturate=self.saturate)
-        gains, adaptation = self._learning(body)
+        gains, adaptation = learning_within(body, self.gains, self.adaptation)
         controller = Controller(
             self.cell,
             gains,
@@ -119,13 +119,6 @@ class Experiment:
             k_r_space=self.k_r_space,
         )
         return ClosedLoop(controller, body, Devices(self.cell, self.sensors, self.actuators))
-
-    def _learning(self, plant: Plant) -> tuple[Gains, Adaptation | None]:
-        """Gains and adaptation of the controller: (14) is bounded where its torque may be cut off."""
-        Gamma = self.gains.Gamma
-        if self.adaptation is not None or Gamma is None or not np.isfinite(plant.torque_limits).any():
-            return self.gains, self.adaptation
-        return self.gains.replace(Gamma=None), bounded(self.cell, Gamma, plant.schedule.carried)
 
     def simulate(
         self,
