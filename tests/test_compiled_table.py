@@ -115,10 +115,13 @@ def test_a_rate_has_the_shape_of_its_state_and_the_place():
 
 def test_every_array_of_a_result_is_logged_from_a_quantity_of_its_dimensions():
     dimension = {"robot": "n", "pair": "p", "axis": "m", "joint": "nv", "parameter": "P"}
-    assert [*LOGS] == [*[*LAYOUT][1:], "adaptation_state", "damping", "velocity_lost", "plant_state"]
+    states = "adaptation_state", "damping", "velocity_lost", "plant_state"
+    devices = "measured_q", "measured_v", "actuator_torque"
+    assert [*LOGS] == [*[*LAYOUT][1:], *states, *devices]
     for name, (dimensions, _) in [*LAYOUT.items()][1:]:
         rows, length = (dimension[each] for each in dimensions[1:])
         assert QUANTITIES[LOGS[name]][1:3] == (rows, length), name
+    assert all(QUANTITIES[LOGS[name]][1:3] == ("n", "nv") for name in devices)
 
 
 # -- the table and the driver -----------------------------------------------------------------------------
@@ -141,7 +144,7 @@ def test_structures_have_the_same_layout_in_c_and_in_python(tmp_path):
         for field in (name for name, *_ in structure._fields_):
             places += [f"offsetof({title}, {field})", f"sizeof((({title} *)0)->{field})"]
             expected += [getattr(structure, field).offset, getattr(structure, field).size]
-    declarations = "".join(map(structs.declared, structs.STRUCTURES))
+    declarations = structs.CALLBACK + "".join(map(structs.declared, structs.STRUCTURES))
     lines = "".join(f'    printf("%zu\\n", {place});\n' for place in places)
     source = f"#include <stddef.h>\n#include <stdio.h>\n{declarations}int main(void) {{\n{lines}}}\n"
     assert [int(line) for line in printed(source, tmp_path).split()] == expected

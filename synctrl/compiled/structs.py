@@ -48,7 +48,7 @@ def _address(written: str) -> type[Address]:
 Doubles, Ints, Chars, Longs = map(_address, ("double *", "int *", "char *", "long long *"))
 #: a function in Python that the driver calls: time, the middle of the step, whether a sample falls on it -> 0
 Callback = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.c_double, ctypes.c_int)
-Callbacks = _address("Callback *")
+Callbacks, CALLBACK = _address("Callback *"), "typedef int Callback(double, double, int);\n"
 #: what generated functions read, and what they write
 Arguments, Results = map(_address, ("const double **", "double **"))
 
@@ -228,7 +228,7 @@ def _constants(kinds: list[Kind]) -> Iterable[str]:
     yield _enumeration({name: mark.value for name, mark in Mark.__members__.items()})
     found = enumerate(checks(kinds[0].watches), start=1)
     yield _enumeration({f"FOUND_{check.upper()}": k for k, check in found})
-    yield "typedef int Callback(double, double, int);\n"
+    yield CALLBACK
 
 
 def _enumeration(constants: Mapping[str, int]) -> str:

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from ..checks import boolean, choice, instance, label, positive_number
-from ..control.adaptation import Adaptation, bounded
+from ..control.adaptation import Adaptation
 from ..control.admittance import Admittance
 from ..control.agent import Agent, agents_of
 from ..control.controller import Controller
@@ -38,6 +38,7 @@ from .closed_loop import ClosedLoop
 from .devices import Actuator, Devices, Sensor
 from .engines import Engine, Run, carry_out
 from .guard import Progress
+from .limits import learning_within
 from .plant import PHYSICS, Plant, torque_limits
 from .result import Result
 from .schedules import Disturbance, DisturbanceSchedule, Payload
@@ -104,7 +105,7 @@ class Experiment:
         """The differential equation of this experiment; `plant` as in `simulate`."""
         cell = self.told_cell
         body = self.plant_type(cell, physics=plant, payloads=self.payloads, saturate=self.saturate)
-        gains, adaptation = self._learning(body)
+        gains, adaptation = learning_within(body, self.gains, self.adaptation)
         controller = Controller(
             cell,
             gains,
@@ -124,13 +125,6 @@ class Experiment:
         if not isinstance(self.network, Network):
             return self.cell
         return self.cell.with_clocks(self.cell.clocks + self.network.clocks(self.cell.n))
-
-    def _learning(self, plant: Plant) -> tuple[Gains, Adaptation | None]:
-        """Gains and adaptation of the controller: (14) is bounded where its torque may be cut off."""
-        Gamma = self.gains.Gamma
-        if self.adaptation is not None or Gamma is None or not np.isfinite(plant.torque_limits).any():
-            return self.gains, self.adaptation
-        return self.gains.replace(Gamma=None), bounded(self.cell, Gamma, plant.schedule.carried)
 
     def simulate(
         self,
