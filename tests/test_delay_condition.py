@@ -1,0 +1,148 @@
+"""Which theorem covers robots that hear each other late, in certificates, and the balance of V with them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from theory_cells import GAINS, coupling, experiment
+
+from synctrl import Coupling, Experiment, Network, Result
+from synctrl.analysis.certify import Certificate, certify
+from synctrl.analysis.delay_condition import delay_condition
+from synctrl.analysis.lyapunov import lyapunov
+from synctrl.control.laws import ChungSlotine
+from synctrl.control.network import Ideal
+
+FREE = GAINS.replace(K_eps=0.0)
+UNEQUAL = Network(delay=[[0.0, 0.010], [0.0173, 0.0]])
+FILTER = Network(period=4e-3, delay=5e-3, jitter=3e-3, loss=0.5)
+
+
+def pair(network, gains=GAINS, weight: str = "moving", **options) -> Experiment:
+    return replace(experiment(coupling("pair", 2, 2, weight), gains, **options), network=network)
+
+
+def certificate(network, gains=GAINS, **options) -> Certificate:
+    return certify(pair(network, gains, **options).simulate(0.05, 1e-3))
+
+
+# -- theorems ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("network", "gains", "theorem"),
+    [
+        (UNEQUAL, FREE, "constant delays"),
+        (UNEQUAL, GAINS, "constant delays"),
+        (FILTER, FREE, "a filter under any loss"),
+    ],
+    ids=["delays", "delays and K_eps", "filter"],
+)
+def test_a_run_that_a_theorem_covers_is_certified_and_says_which(network, gains, theorem):
+    found = certificate(network, gains)
+    assert found.certified and found.delay_condition.theorem == theorem
+    assert found.delay_condition.needed == bool(gains.K_eps.any())
+    assert theorem in str(found)
+    data = json.loads(json.dumps(found.as_dict(), allow_nan=False))["delay_condition"]
+    assert data["margin"] == found.delay_condition.margin and data["holds"]
+
+
+@pytest.mark.parametrize(
+    ("network", "gains", "options", "reason"),
+    [
+        (FILTER, GAINS, {}, "K_eps = 0"),
+        (UNEQUAL, GAINS.replace(K_r=1e-3), {}, "margin"),
+        (Network(period=0.01, receiver="hold"), FREE, {}, "jumps at messages"),
+        (Network(period=0.01, receiver="extrapolate"), FREE, {}, "jumps at messages"),
+        (UNEQUAL, FREE, {"reference_acceleration": "paper"}, "exact reference acceleration"),
+    ],
+    ids=["filter and K_eps", "margin", "hold", "extrapolate", "paper"],
+)
+def test_a_run_that_no_theorem_covers_is_outside_and_says_why(network, gains, options, reason):
+    found = certificate(network, gains, **options)
+    assert found.verdict == "outside the theorem" and found.delay_condition.theorem is None
+    assert reason in found.delay_condition.reason
+    assert any(found.delay_condition.reason in words for words in found.outside)
+
+
+def test_sampled_control_and_other_laws_are_outside():
+    run = pair(FILTER, FREE).simulate(0.02, 1e-3, control_period=2e-3)
+    assert "continuous control" in certify(run).delay_condition.reason
+    other = replace(pair(UNEQUAL, FREE.replace(beta=0.0)), law=ChungSlotine(0.3)).simulate(0.02, 1e-3)
+    assert "ChungSlotine" in certify(other).delay_condition.reason
+
+
+def test_a_coupling_of_all_robots_in_one_row_is_outside_for_a_robot_hears_more_of_others_than_of_itself():
+    crowd = experiment(Coupling.sum(4), FREE)
+    found = certify(replace(crowd, network=Network(delay=0.01)).simulate(0.01, 1e-3)).delay_condition
+    assert found.theorem is None and "3 times" in found.reason
+
+
+@pytest.mark.parametrize("network", [None, Ideal(), Network()])
+def test_robots_that_hear_everything_at_once_need_no_theorem_of_delays(network):
+    found = certificate(network)
+    assert found.certified and found.delay_condition is None and "network" not in found.lyapunov.power
+
+
+# -- the margin -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("cartesian", [False, True])
+@pytest.mark.parametrize("k_r_space", ["joint", "task"])
+def test_the_margin_is_the_least_that_damping_has_beyond_what_delays_may_take(cartesian, k_r_space):
+    link, gains = coupling("ring", 4, 2, "moving"), GAINS.replace(Lambda=[4.0, 7.0], K_eps=[1.5, 0.4])
+    made = replace(
+        experiment(link, gains, cartesian=cartesian, k_r_space=k_r_space), network=Network(delay=0.01)
+    )
+    run = made.simulate(0.02, 1e-3)
+    found, cell = delay_condition(run), run.experiment.cell
+    least = []
+    for q, reference in zip(run.q, cell.references(run.t), strict=True):
+        for robot, q_i, c in zip(cell.robots, q, reference.c, strict=True):
+            T = c @ robot.jacobian(q_i)[:2] if cartesian and k_r_space == "joint" else c
+            taken = 2 / 4 * T.T @ np.diag(np.array([1.5, 0.4]) / [4.0, 7.0]) @ T  # a = 2 on a ring
+            least.append(np.linalg.eigvalsh(2.0 * np.eye(2) - taken)[0])
+    assert found.margin == pytest.approx(min(least), rel=1e-9)
+    assert found.robot == int(np.argmin(least)) % 4 and found.time == run.t[int(np.argmin(least)) // 4]
+
+
+# -- the balance ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("receiver", ["hold", "extrapolate"])
+def test_the_balance_closes_between_messages_that_make_v_jump(receiver):
+    run = pair(Network(period=0.01, receiver=receiver)).simulate(0.05, 1e-3)
+    record = lyapunov(run)
+    assert record.events == (9, 19, 29, 39) and record.closes and record.drift_bound < 1e-6
+    assert (np.abs(record.power["other"]) <= record.rounding).all()
+    assert np.abs(record.power["network"]).max() > 1e3 * record.rounding.max()
+    jumps = np.diff(record.V)[list(record.events)]
+    assert np.abs(jumps).max() > 1e-6
+
+
+@pytest.mark.parametrize(
+    "network",
+    [Network(delay=[[0.0, 0.010], [0.016, 0.0]]), Network(period=4e-3, delay=8e-3, loss=0.5)],
+    ids=["delays", "filter"],
+)
+def test_v_does_not_jump_at_messages_of_the_filter_and_of_delays(network):
+    experiment = pair(network, FREE)
+    records = [lyapunov(experiment.simulate(0.06, dt)) for dt in (2e-3, 1e-3, 5e-4)]
+    for record in records:
+        assert record.events == ()
+        assert (np.abs(record.power["other"]) <= record.rounding).all()
+        np.testing.assert_array_less(np.abs(record.power["network"]), record.rounding + 1e-300)
+        np.testing.assert_array_less(record.V_dot - record.power["damping"], record.rounding)
+    drifts = [record.largest_drift for record in records]
+    # rates of what is heard jump on the log, so V' has kinks there: the quadrature is of second order
+    assert drifts[0] > 3.5 * drifts[1] > 12 * drifts[2], drifts
+
+
+def test_a_loaded_run_is_certified_again(tmp_path):
+    made = pair(FILTER, FREE)
+    run = made.simulate(0.02, 1e-3)
+    loaded = Result.load(run.save(tmp_path / "run.npz"))
+    assert certify(loaded, made).as_dict() == certify(run).as_dict()
