@@ -77,19 +77,20 @@ class Tables:
         parts = [cell.coupling, type(cell.space), *(member.trajectory for member in cell.members)]
         known, instants, kept = self._kept
         same = len(parts) == len(known) and all(map(operator.is_, parts, known))
-        if same and instants == (clock, clock.every):
+        asked = clock, clock.every, tuple(cell.clocks.tolist())
+        if same and instants == asked:
             return kept
-        return self._keep(parts, clock, blocks(program, clock))
+        return self._keep(parts, asked, blocks(program, clock))
 
     def _keep(
-        self, parts: list[Any], clock: Clock, fresh: Iterable[DesiredStretch]
+        self, parts: list[Any], asked: tuple, fresh: Iterable[DesiredStretch]
     ) -> Iterator[DesiredStretch]:
         """Fresh blocks, which are known from when the last of them has been made."""
         found = []
         for block in fresh:
             found.append(block)
             yield block
-        self._kept = parts, (clock, clock.every), found
+        self._kept = parts, asked, found
 
 
 class Pace:

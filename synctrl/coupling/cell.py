@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from math import nan
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, instance, offers
+from ..checks import finite_array, instance, offers, per_joint
 from ..errors import InputError, UnreachableError
 from ..robots.friction import Friction
 from ..robots.model import joined
@@ -21,7 +20,7 @@ from ..tasks.inverse_kinematics import start_in
 from ..tasks.spaces import JointSpace, Space, units_of
 from ..tasks.trajectories import Motion, Trajectory
 from .coupling import Coupling
-from .desired import desired_motion, desired_weights, further_rows
+from .desired import desired_motion, further_rows, weights_by_clocks
 from .member_checks import (
     check_friction,
     check_labels,
@@ -31,6 +30,7 @@ from .member_checks import (
     member_parameters,
     with_urdf_friction,
 )
+from .reference import Reference as Reference
 from .weights import StillWeights, Weights
 
 
@@ -92,39 +92,6 @@ class Member:
         return member_parameters(self.name or "robot", self.robot, self.friction, self.parameters).theta
 
 
-@dataclass(slots=True)
-class Reference:
-    """What is desired at one instant, or with a leading axis of time at several.
-
-    Attributes:
-        desired: xd, xd' and xd'', (3, n, m); then what else the space asks for, see `further` of `Space`.
-        weights: c, c', c'' and c^-1, each (n, m, m).
-        t: the instant, s, or all of them, (T,); NaN where nobody asks.
-    """
-
-    desired: np.ndarray
-    weights: Weights
-    t: Any = nan
-
-    xd = property(lambda self: self.desired[..., 0, :, :])
-    xd_dot = property(lambda self: self.desired[..., 1, :, :])
-    xd_ddot = property(lambda self: self.desired[..., 2, :, :])
-    c = property(lambda self: self.weights.c)
-    c_dot = property(lambda self: self.weights.c_dot)
-    c_ddot = property(lambda self: self.weights.c_ddot)
-    c_inv = property(lambda self: self.weights.c_inv)
-
-    def check(self, n: int, m: int, rows: int = 3) -> None:
-        """Refuse what is no desired motion, of so many rows, and weights of n robots at one instant.
-
-        Raises:
-            InputError: another size, or numbers that are not finite.
-        """
-        finite_array("reference: xd, xd' and xd''", self.desired, (rows, n, m))
-        for name, weight in zip(("c", "c'", "c''", "c^-1"), self.weights, strict=True):
-            finite_array(f"reference: {name}", weight, (n, m, m))
-
-
 class Cell:
     """n robots that perform one task.
 
@@ -135,9 +102,11 @@ class Cell:
         coupling: which of them are compared.
         space: where the task is given; joint space by default.
         name: for titles.
+        clocks: how much the clock of every robot is ahead, a number or (n,), s: at t it is told what is
+            desired at t + clock, and has the weights of that time.
 
     Attributes:
-        members, coupling, space, name: as given.
+        members, coupling, space, name, clocks: as given, the clocks as (n,).
         robots, names: those of the members.
         labels, units: names and units of the m task coordinates, as the space has them.
         task: the space bound to these robots, see `BoundSpace`; it is asked at every instant of a run.
@@ -156,8 +125,9 @@ class Cell:
     """
 
     def __init__(
-        self, members: Sequence[Member], coupling: Coupling, space: Space | None = None, name: str = "cell"
-    ):
+        self, members: Sequence[Member], coupling: Coupling, space: Space | None = None,
+        name: str = "cell", clocks: ArrayLike = 0.0,
+    ):  # fmt: skip
         instance("members", members, Iterable, "Member objects")
         self.members = tuple(members)
         self.coupling = coupling
@@ -171,6 +141,7 @@ class Cell:
             raise InputError(
                 f"made for {coupling.robots} robots, but the cell has {len(self.members)}", subject="coupling"
             )
+        self.clocks = per_joint("clocks", clocks, len(self.members))
         self.robots = tuple(member.robot for member in self.members)
         self.names = tuple(m.name or f"robot {i}" for i, m in enumerate(self.members, start=1))
         check_names(name, self.names)
@@ -217,7 +188,17 @@ class Cell:
     @property
     def breaks(self) -> tuple[float, ...]:
         """Instants at which a desired motion is not smooth, s."""
-        return tuple(sorted({b for m in self.members for b in m.trajectory.breaks}))
+        told = zip(self.members, self.clocks.tolist(), strict=True)
+        return tuple(sorted({b - ahead for member, ahead in told for b in member.trajectory.breaks}))
+
+    def with_clocks(self, clocks: ArrayLike) -> Cell:
+        """This cell with clocks that are ahead by so much; itself if that is what they are.
+
+        Raises:
+            InputError: not numbers, or for another number of robots.
+        """
+        same = np.array_equal(per_joint("clocks", clocks, self.n), self.clocks)
+        return self if same else type(self)(self.members, self.coupling, self.space, self.name, clocks)
 
     # -- desired motion -----------------------------------------------------------------------------------
 
@@ -229,19 +210,20 @@ class Cell:
 
     def motion(self, robot: int, times: np.ndarray) -> Motion:
         """What is desired of one robot at the times, (T,); see `desired_motion`."""
-        return desired_motion(self.names[robot], robot, self.members[robot].trajectory, times)
+        ahead = times + self.clocks[robot]
+        return desired_motion(self.names[robot], robot, self.members[robot].trajectory, ahead)
 
     def told(self, robot: int, times: np.ndarray) -> np.ndarray:
         """All that is told of one robot, (3, T, m), and more of it; see `further` of `Space`."""
         name, trajectory = self.names[robot], self.members[robot].trajectory
-        further = further_rows(name, robot, self.space, trajectory, times)
+        further = further_rows(name, robot, self.space, trajectory, times + self.clocks[robot])
         return np.concatenate((self.motion(robot, times), further))
 
     def weights(self, times: np.ndarray) -> Weights:
         """Weights of the coupling at the times, (T,); see `desired_weights`."""
         if self.coupling.is_constant:
             return self.coupling.weights(times, self.m)
-        return desired_weights(self.coupling.weights, times, self.m)
+        return weights_by_clocks(self.coupling.weights, times, self.m, self.clocks)
 
     def references(self, times: np.ndarray) -> list[Reference]:
         """What is desired at each of the times, (T,)."""
@@ -293,7 +275,7 @@ class Cell:
 
     def __reduce__(self) -> tuple:
         """Copies and other processes bind the space anew: arrays that share memory would come apart."""
-        return type(self), (self.members, self.coupling, self.space, self.name)
+        return type(self), (self.members, self.coupling, self.space, self.name, self.clocks)
 
     def __repr__(self) -> str:
         return f"Cell('{self.name}', {self.n} robots, {self.space!r}, {self.coupling!r})"

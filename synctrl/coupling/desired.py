@@ -84,6 +84,15 @@ def desired_weights(weights: WeightsAt, times: np.ndarray, m: int) -> Weights:
     return found
 
 
+def weights_by_clocks(weights: WeightsAt, times: np.ndarray, m: int, clocks: np.ndarray) -> Weights:
+    """`desired_weights` for robots whose clocks are ahead by so much, (n,), s: each has those of its time."""
+    if not clocks.any():
+        return desired_weights(weights, times, m)
+    each = [desired_weights(weights, times + ahead, m) for ahead in clocks.tolist()]
+    rows = zip(*each, strict=True)  # c of all robots at the time of each of them, then c', c'' and c^-1
+    return Weights(*(np.stack([x[:, i] for i, x in enumerate(row)], axis=1) for row in rows))
+
+
 def _asked(call: Callable[[np.ndarray], Found], times: np.ndarray, what: str, robot: int | None) -> Found:
     """What a function of the user's gives at some times, (T,), s; `what` names it in messages."""
     try:

@@ -98,20 +98,27 @@ class Experiment:
 
     def closed_loop(self, plant: str = "pinocchio") -> ClosedLoop:
         """The differential equation of this experiment; `plant` as in `simulate`."""
-        body = self.plant_type(self.cell, physics=plant, payloads=self.payloads, saturate=self.saturate)
+        cell = self.told_cell
+        body = self.plant_type(cell, physics=plant, payloads=self.payloads, saturate=self.saturate)
         gains, adaptation = self._learning(body)
         controller = Controller(
-            self.cell,
+            cell,
             gains,
             adaptation=adaptation,
             law=self.law,
             network=self.network,
             admittance=self.admittance,
-            torque_limits=torque_limits(self.cell) if self.saturate else None,
+            torque_limits=torque_limits(cell) if self.saturate else None,
             reference_acceleration=self.reference_acceleration,
             k_r_space=self.k_r_space,
         )
         return ClosedLoop(controller, body)
+
+    @property
+    def told_cell(self) -> Cell:
+        """The cell as its robots are told of it, whose clocks the network may have put ahead."""
+        clocks = getattr(self.network, "clocks", None)
+        return self.cell if clocks is None else self.cell.with_clocks(self.cell.clocks + clocks(self.cell.n))
 
     def _learning(self, plant: Plant) -> tuple[Gains, Adaptation | None]:
         """Gains and adaptation of the controller: (14) is bounded where its torque may be cut off."""
@@ -198,7 +205,7 @@ class Experiment:
         edges = [*schedule.edges, *loop.plant.schedule.edges, *loop.events]
         if control_period is None:
             edges += loop.messages.between(0.0, positive_number("duration", duration))
-        clock = make_clock(duration, dt, edges, self.cell.breaks, log_dt)
+        clock = make_clock(duration, dt, edges, loop.cell.breaks, log_dt)
         every = None if control_period is None else multiple("control_period", control_period, dt)
         info: dict[str, Any] = {"integrator": "rk4", "dt": float(dt), "duration": float(duration)}
         info["log_dt"] = float(dt if log_dt is None else log_dt)
