@@ -7,14 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from refusals import refused
 from theory_cells import GAINS, coupling, experiment
 
 from synctrl import Coupling, Experiment, Network, Result
 from synctrl.analysis.certify import Certificate, certify
 from synctrl.analysis.delay_condition import delay_condition
 from synctrl.analysis.lyapunov import lyapunov
-from synctrl.control.laws import ChungSlotine
+from synctrl.analysis.replay import replay
+from synctrl.control.laws import ChungSlotine, SunMills
 from synctrl.control.network import Ideal
+from synctrl.errors import InputError
 
 FREE = GAINS.replace(K_eps=0.0)
 UNEQUAL = Network(delay=[[0.0, 0.010], [0.0173, 0.0]])
@@ -146,3 +149,48 @@ def test_a_loaded_run_is_certified_again(tmp_path):
     run = made.simulate(0.02, 1e-3)
     loaded = Result.load(run.save(tmp_path / "run.npz"))
     assert certify(loaded, made).as_dict() == certify(run).as_dict()
+
+
+# -- injection --------------------------------------------------------------------------------------------
+
+WEAK = GAINS.replace(K_r=0.05)
+INJECTION = SunMills(injection=True)
+
+
+@pytest.mark.parametrize("cartesian", [False, True])
+@pytest.mark.parametrize("coupled", ["pair", "ring"])
+def test_injection_damps_r_by_what_delays_may_take_and_is_inside_the_theorem_without_them(coupled, cartesian):
+    link = coupling(coupled, 2 if coupled == "pair" else 4, 2, "moving")
+    run = replace(experiment(link, cartesian=cartesian), law=INJECTION).simulate(0.02, 1e-3)
+    found, run = certify(run), replay(run)
+    a = 1 if coupled == "pair" else 2
+    r = run.rows.r
+    expected = -(a / (4 * 4.0) * 1.5 * r**2).sum(axis=(1, 2))  # Lambda = 4, K_eps = 1.5
+    assert found.certified
+    np.testing.assert_allclose(found.lyapunov.power["injection"], expected, rtol=1e-12)
+    assert (np.abs(found.lyapunov.power["other"]) <= found.lyapunov.rounding).all()
+
+
+def test_injection_makes_the_condition_hold_by_itself():
+    without, made = (
+        replace(pair(UNEQUAL, WEAK), law=law).simulate(0.03, 1e-3) for law in (SunMills(), INJECTION)
+    )
+    assert not delay_condition(without).holds and certify(without).verdict == "outside the theorem"
+    assert delay_condition(made).margin == pytest.approx(0.05) and certify(made).certified
+
+
+def test_injection_is_a_setting_of_the_law_that_stands_in_results():
+    made = replace(pair(UNEQUAL), law=INJECTION)
+    assert made.simulate(2e-3, 1e-3).info["law"]["injection"] is True
+    assert "injection" not in SunMills().as_dict()
+    with refused(InputError, "injection"):
+        SunMills(injection="yes")  # type: ignore[arg-type]
+
+
+def test_the_compiled_engine_injects_the_same():
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    made = replace(experiment(coupling("pair", 2, 2), cartesian=True), law=INJECTION)
+    ours, theirs = (made.simulate(0.02, 1e-3, engine=engine) for engine in ("compiled", "pinocchio"))
+    for name in ("q", "v", "tau", "theta_hat"):
+        expected = getattr(theirs, name)
+        np.testing.assert_allclose(getattr(ours, name), expected, atol=1e-9 * np.abs(expected).max())

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..control.controller import Controller
-from ..control.laws.sun_mills import BoundSunMills
+from ..control.laws.sun_mills import BoundInjection, BoundSunMills
 from ..control.network import BoundPosted, Links, WForm
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
@@ -121,7 +121,7 @@ def _reason(run: Replay, network: WForm, margin: float | None) -> str | None:
     controller = run.loop.controller
     if (words := network.outside()) is not None:
         return words
-    if not isinstance(controller.law, BoundSunMills):
+    if not isinstance(controller.law, (BoundSunMills, BoundInjection)):
         return f"its theorem is of SunMills, not of {controller.law_settings['name']}"
     if run.result.info.get("control_period") is not None:
         return "its theorem is of continuous control"
