@@ -123,6 +123,8 @@ def _reason(run: Replay, network: WForm, margin: float | None) -> str | None:
         return words
     if not isinstance(controller.law, (BoundSunMills, BoundInjection)):
         return f"its theorem is of SunMills, not of {controller.law_settings['name']}"
+    if run.loop.chain is not None:
+        return "its theorem is of robots that nothing connects"
     if run.result.info.get("control_period") is not None:
         return "its theorem is of continuous control"
     if controller.reference_acceleration != "exact" and not controller.cell.coupling.is_constant:
