@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +21,7 @@ from synctrl.analysis.replay import replay
 from synctrl.control.laws import ChungSlotine, SunMills
 from synctrl.control.network import Ideal
 from synctrl.errors import InputError
+from synctrl.experiments import a460_pair, planar_four
 
 FREE = GAINS.replace(K_eps=0.0)
 UNEQUAL = Network(delay=[[0.0, 0.010], [0.0173, 0.0]])
@@ -144,6 +148,22 @@ def test_v_does_not_jump_at_messages_of_the_filter_and_of_delays(network):
     assert drifts[0] > 3.5 * drifts[1] > 12 * drifts[2], drifts
 
 
+@pytest.mark.parametrize(
+    ("network", "bound"),  # kinks of V' on the log cost two orders with the filter
+    [
+        (UNEQUAL, 1e-8),
+        (Network(period=4e-3, delay=4e-3), 2e-6),
+        (Network(period=0.01, receiver="hold"), 1e-9),
+        (Network(period=0.01, receiver="extrapolate"), 1e-9),
+    ],
+    ids=["delays", "filter", "hold", "extrapolate"],
+)
+def test_with_integrals_that_leak_v_changes_by_its_powers_too(network, bound):
+    record = lyapunov(pair(network, GAINS.replace(leak=2.0)).simulate(0.05, 5e-4))
+    assert (np.abs(record.power["other"]) <= record.rounding).all()
+    assert record.largest_drift < bound
+
+
 def test_a_loaded_run_is_certified_again(tmp_path):
     made = pair(FILTER, FREE)
     run = made.simulate(0.02, 1e-3)
@@ -194,3 +214,26 @@ def test_the_compiled_engine_injects_the_same():
     for name in ("q", "v", "tau", "theta_hat"):
         expected = getattr(theirs, name)
         np.testing.assert_allclose(getattr(ours, name), expected, atol=1e-9 * np.abs(expected).max())
+
+
+# -- the page ---------------------------------------------------------------------------------------------
+
+PAGE = (Path(__file__).parents[1] / "docs" / "network.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("make", [planar_four, partial(a460_pair, friction=False)], ids=["planar", "A460"])
+def test_both_cells_of_the_paper_are_inside_the_theorem_with_the_margin_that_the_page_names(make):
+    found = delay_condition(make(network=Network(delay=0.05)).simulate(2e-3, 1e-3))
+    assert found.theorem and found.needed and f"{found.margin:.3g}" in PAGE
+
+
+def test_the_example_of_the_page_runs():
+    for block in re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL):
+        exec(compile(block.replace("simulate(0.5", "simulate(0.01"), "docs/network.md", "exec"), {})
+
+
+def test_the_page_names_tests_that_exist():
+    for file, names in re.findall(r"\[`(test_\w+\.py)`: ([^\]]+)\]", PAGE):
+        text = (Path(__file__).parent / file).read_text("utf-8")
+        for name in re.findall(r"`(\w+)`", names):
+            assert f"def {name}(" in text, name
