@@ -2,8 +2,8 @@
 
 What was said is kept at instants of a grid, and Hermite's polynomial of degree five is laid through W and its
 first two derivatives. What is believed of w is the derivative of what is believed of W, exactly, and so
-on: nothing jumps, and the proof for constant delays holds as it stands. Before the beginning w was what it is
-then, and W = t w.
+on: nothing jumps, and the proof for constant delays holds as it stands. Before the beginning W = t w with the
+w of then.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from ...coupling.cell import Cell
 from ...errors import InputError
 from .w_form import WForm, check_number
 
+#: the theorem that covers it
+DELAYS = "constant delays"
 #: longest step of the grid, s
 GRID = 2e-3
 #: shortest one, s
@@ -46,6 +48,7 @@ class BoundDelayed(WForm):
     """
 
     continuous = True
+    theorem = DELAYS
 
     def __init__(self, cell: Cell, leak: np.ndarray, delay: np.ndarray):
         late = delay[delay > 0]
@@ -78,7 +81,8 @@ class BoundDelayed(WForm):
         W, W_dot, W_ddot = self._interpolated(u, rows)
         found = np.array((W, W_dot + self.leak * W, W_ddot + self.leak * W_dot))
         w, early = now.first[sender], t < now.since[0] + self.delay
-        found[:, early] = np.array(((then - now.since[0])[:, None] * w, w, 0 * w))[:, early]
+        W = (then - now.since[0])[:, None] * w
+        found[:, early] = np.array((W, w + self.leak * W, self.leak * w))[:, early]
         found[:, self._at_once] = own[:, sender[self._at_once]]
         return found
 

@@ -28,7 +28,13 @@ class WForm:
         links: who hears whom, see `Links`.
         leak: as given.
         parts: names for the parts of the memory, a flat vector.
+        jumps: whether what robots know of each other jumps at messages.
+        theorem: for networks of what kind the proof covers this one, in words; None if it needs none, or
+            there is none.
     """
+
+    jumps = False
+    theorem: str | None = None
 
     def __init__(self, cell: Cell, leak: np.ndarray, links: Links | None = None, **further: tuple[int, ...]):
         self.links, self.leak = Links(cell.coupling) if links is None else links, leak
@@ -61,6 +67,10 @@ class WForm:
     def memory_rates(self, t: float, memory: np.ndarray) -> Mapping[str, np.ndarray]:
         """Rates of what the memory has beside W, by name; what is not named does not change."""
         return {}
+
+    def gap(self, t: float, memory: np.ndarray) -> np.ndarray:
+        """What the rates of E and sigma have beyond sigma - leak E and sigma', (2, n, m)."""
+        return np.zeros((2, *self.parts(memory).W.shape))
 
     def integral(self, memory: np.ndarray) -> np.ndarray:
         return self._compare(self.parts(memory).W)
