@@ -28,7 +28,7 @@ from ..control.admittance import BoundAdmittance
 from ..control.controller import Controller
 from ..control.gains import Gains
 from ..control.laws.sun_mills import BoundSunMills
-from ..control.network import BoundIdeal
+from ..control.network import Messages
 from ..coupling.cell import Cell
 from ..coupling.coupling import Coupling
 from ..errors import InputError
@@ -44,6 +44,7 @@ from ..tasks.pose import BoundPoseSpace, PoseSpace
 from ..tasks.redundancy import DampedInverse, Inverse, Pseudoinverse, Redundancy
 from ..tasks.sliding import BoundSlidingSpace, SlidingSpace
 from ..tasks.spaces import BoundCartesianSpace, BoundJointSpace, CartesianSpace, JointSpace
+from .hearing import parts_of
 from .plugged import learner
 
 SPACES = (JointSpace, CartesianSpace, PoseSpace, SlidingSpace)
@@ -115,7 +116,8 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     yield Part("controller", controller, (Controller,))
     if isinstance(controller.law, BoundSunMills):  # others are traced
         yield Part("law", controller.law, (BoundSunMills,))
-    yield Part("network", controller.network, (BoundIdeal,))
+    yield from (Part(*part) for part in parts_of(controller.network))
+    yield Part("messages", loop.messages, (Messages,))
     learns = learner(controller)
     if isinstance(learns, BoundGradient):  # others are traced
         yield Part("adaptation", learns, (BoundGradient,))
