@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..control.discrete import GRID
+from ..control.network.messages import GRID
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.schedules import DisturbanceSchedule
 

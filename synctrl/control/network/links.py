@@ -14,9 +14,9 @@ from what they hear would disagree for ever.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from copy import copy
-from math import prod
 from types import SimpleNamespace
 from typing import Any
 
@@ -97,12 +97,17 @@ class Parts:
 
     Args:
         shapes: of the parts, by name.
+
+    Attributes:
+        size: of the vector.
+        starts: where each part begins, by name.
     """
 
     def __init__(self, shapes: Mapping[str, tuple[int, ...]]):
-        sizes = [prod(shape) for shape in shapes.values()]
+        sizes = [math.prod(shape) for shape in shapes.values()]
         ends = np.cumsum(sizes).tolist()
         self.size = ends[-1]
+        self.starts = {name: end - size for name, size, end in zip(shapes, sizes, ends, strict=True)}
         self._parts = [
             (name, slice(end - size, end), shape)
             for (name, shape), size, end in zip(shapes.items(), sizes, ends, strict=True)
