@@ -16,7 +16,9 @@ errors that all pairs leave free.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,12 +26,13 @@ from numpy.typing import ArrayLike
 from ..checks import non_negative_number
 from ..control.gains import Gains
 from ..coupling.cell import Cell
+from .equipped import Equipment, equipment, equipped
 from .frozen import Frozen, freeze
 
 #: delay beyond the margin at which `rate` is told, as a share of it
 BEYOND = 1.1
 #: frequencies looked at per decade, and from which share of the slowest rate on
-PER_DECADE, SLOWEST = 300, 1e-3
+PER_DECADE, SLOWEST = 150, 1e-3
 #: how near to 1 absolute values of eigenvalues are that cross it together
 SAME = 1e-7
 #: matrices solved together
@@ -90,6 +93,9 @@ def delay_margin(
     q: ArrayLike | None = None,
     t: float = 0.0,
     k_r_space: str | None = None,
+    sensors: Sequence[Any] = (),
+    actuators: Sequence[Any] = (),
+    control_period: float | None = None,
 ) -> DelayMargin:
     """How much constant delay between its robots a cell tolerates, frozen at one place.
 
@@ -99,11 +105,15 @@ def delay_margin(
         q: joint positions, (n, nv), rad; by default those at which the cell starts.
         t: instant whose weights count, s.
         k_r_space: where the damping acts, see `Controller`.
+        sensors, actuators, control_period: what else lags, see `equipment`.
 
     Raises:
-        InputError: gains or positions of the wrong size, or an unknown word.
+        InputError: gains or positions of the wrong size, an unknown word, or devices that need a period.
     """
     frozen = freeze(cell, gains, q=q, t=t, k_r_space=k_r_space)
+    parts = equipment(sensors, actuators, control_period)
+    if parts != Equipment():
+        frozen = equipped(frozen, parts)
     least = tuple(frozen.least_eigenvalue.tolist())
     if frozen.proved:
         return DelayMargin(np.inf, None, None, None, 0.0, "theorem", least, frozen)
@@ -149,10 +159,14 @@ def growth(frozen: Frozen, delay: float) -> float:
 
 
 def _frequencies(frozen: Frozen) -> np.ndarray:
-    """Every |s| on the imaginary axis is among these, rad/s: no larger one solves the equation."""
+    """Frequencies to look at, rad/s, up to |A_0| + |A_1|: no larger one solves the equation."""
+    from scipy.linalg import matrix_balance
+
     rates = np.abs(np.linalg.eigvals(frozen.own + frozen.delayed))
     low = SLOWEST * rates[rates > 1e-6 * rates.max()].min()
-    high = np.linalg.norm(frozen.own, 2) + np.linalg.norm(frozen.delayed, 2)
+    own, delayed = frozen.own, frozen.delayed
+    _, (scale, _) = matrix_balance(np.abs(own) + np.abs(delayed), permute=False, separate=True)
+    high = sum(np.linalg.norm(part * scale / scale[:, None], 2) for part in (own, delayed))
     return np.geomspace(low, high, int(PER_DECADE * np.log10(high / low)))
 
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,7 +57,7 @@ class Frozen:
         """A_1 of x' = A_0 x + A_1 x(t - d), in which A_0 is `own`, (X, X)."""
         return self.heard @ self.sent
 
-    @property
+    @cached_property
     def still(self) -> int:
         """How many roots stay at 0, whatever the delay is: what nobody sees."""
         return len(self.own) - int(np.linalg.matrix_rank(self.own + self.delayed))

@@ -72,14 +72,19 @@ class Receiver:
 
 
 def receiver_of(exchange: Exchange, leak: np.ndarray) -> Receiver:
-    """What a receiver does with what it hears of N coordinates that leak at some rates, (N,), 1/s."""
+    """What a receiver does with what it hears of N coordinates that leak at some rates, (N,), 1/s.
+
+    Integrals that leak are extrapolated exactly here, and by the network itself to the second order.
+    """
+    from scipy.linalg import expm
+
     ahead, one, each = np.eye(3, k=1), np.eye(3), np.eye(leak.size)
     if exchange.receiver == "hold":
         return Receiver(*(np.kron(part, each) for part in (0 * one, one, 0 * one, one)))
     if exchange.receiver == "extrapolate":
-        age = min(exchange.delay, exchange.horizon)
-        aged = one + age * ahead + 0.5 * age**2 * ahead @ ahead
-        return Receiver(*(np.kron(part, each) for part in (ahead, one, 0 * one, aged)))
+        moves = np.kron(ahead, each) - np.kron(np.diag([1.0, 0.0, 0.0]), np.diag(leak))
+        aged = expm(min(exchange.delay, exchange.horizon) * moves)
+        return Receiver(moves, np.kron(one, each), 0 * moves, aged)
     omega, sent = exchange.omega, np.diag([1.0, 0.0, 0.0])
     pull = np.array([omega**2, -(omega**2), -2 * omega])
     flow, read = np.vstack((0 * pull, ahead[1], pull)), np.vstack((ahead[0], ahead[1], pull))
@@ -131,7 +136,9 @@ def _flow(frozen: Frozen, receiver: Receiver, duration: float, moves: float) -> 
 
 def multiplier(frozen: Frozen, exchange: Exchange) -> float:
     """Size of the largest eigenvalue of `monodromy`, those at 1 left out that are there for every period."""
-    values = np.linalg.eigvals(monodromy(frozen, exchange))
+    whole = monodromy(frozen, exchange)
+    counts = whole.any(axis=0)  # what is nowhere remembered has eigenvalues 0
+    values = np.linalg.eigvals(whole[np.ix_(counts, counts)])
     moving = values[np.argsort(np.abs(values - 1))[frozen.still :]]
     return float(np.abs(moving).max())
 

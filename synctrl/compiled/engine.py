@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import ctypes
 import operator
-from collections import deque
 from collections.abc import Iterable, Iterator
 from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..control.measured import check_network
 from ..coupling.cell import Cell
 from ..coupling.desired import rows_of
 from ..renamed import names_elsewhere
-from ..simulation.advance import due, up_to_a_failure
+from ..simulation.advance import up_to_a_failure
 from ..simulation.clock import Clock, Stretch
 from ..simulation.engines import Run, before_the_start, finish
 from ..simulation.guard import Alarm, Progress, checks, limits_of, report_time, stopped
 from ..simulation.recorder import Recorder
 from ..simulation.result import Result
 from . import structs
+from .agenda import Agenda
 from .hooks import Hooks
 from .known import check_known
 from .program import Program, one_after_another
@@ -129,9 +130,12 @@ class Compiled:
         """See `Engine`.
 
         Raises:
-            InputError: the closed loop cannot be generated; it has what and why.
+            InputError: the closed loop cannot be generated; it has what and why. Or sampled control with a
+                network in continuous time.
         """
         check_known(run.loop)
+        if run.every is not None:
+            check_network(run.loop.controller.network, run.loop.messages, run.info["control_period"])
 
     def load(self, run: Run) -> Program:
         """The program of a run, found or built.
@@ -175,27 +179,18 @@ class _Steps:
         self._block: DesiredStretch | None = None
         program.tell(self._steps, {"disturbance": run.schedule.torques, "pi": program.carried})
         ctypes.memset(work.side, 0, 8 * run.loop.cell.n)
-        state = run.loop.state(recorder.state)
-        program.quantities.hidden = state.hidden.ctypes.data
-        self._hooks = Hooks(run, program.quantities, self._steps, state)
-        self._events = deque(sorted(t for t in run.loop.events.tolist() if t >= 0))
+        self._state, self._agenda = run.loop.state(recorder.state), Agenda(program, run)
+        program.quantities.hidden = self._state.hidden.ctypes.data
+        self._hooks = Hooks(run, program.quantities, self._steps, self._state, self._agenda)
 
     def advance(self, block: DesiredStretch, first: int, last: int) -> None:
-        """Make some steps of a block; events of the plant come between two calls of the library."""
-        middles = block.steps.middles
+        """Make some steps of a block; what is on the agenda comes between two calls of the library."""
+        starts, middles = block.steps.starts, block.steps.middles
         while first < last:
-            self._meet(middles[first])
-            ahead = self._events[0] if self._events else np.inf
-            end = first + max(1, int(np.searchsorted(middles[first:last], ahead)))
+            self._agenda.meet(starts[first], middles[first], self._state)
+            end = first + max(1, int(np.searchsorted(middles[first:last], self._agenda.ahead)))
             self._part(block, first, end)
             first = end
-
-    def _meet(self, middle: float) -> None:
-        """Let events move the state that are due in a step with this middle, s."""
-        state = self._run.loop.state(self._recorder.state)
-        for event in due(self._events, middle):
-            self._run.loop.at(middle).meet(event, state)
-            self._program.hold(state.hidden)
 
     def _part(self, block: DesiredStretch, first: int, last: int) -> None:
         """Make some steps of a block in one go."""
@@ -211,6 +206,8 @@ class _Steps:
         nothing = Stretch(clock.steps, np.repeat(end, 2), yes, yes, np.array([clock.count]))
         block = DesiredStretch(nothing, _tables(self._run.loop.cell, np.array([end] * 3)))
         due = np.array([every is None or clock.sampled_at_end(every)])
+        if due[0]:
+            self._agenda.tell(clock.end, clock.end, self._state)
         before = clock.stretch(clock.steps - 1, clock.steps).middles
         self._call(block, 0, nothing.times, _marks(yes, yes, due, no), before)
 
