@@ -2,15 +2,18 @@
 
 from .certify import Certificate, certify
 from .comparison import Comparison, compare, side_by_side
+from .delay_map import DelayMap, delay_map
 from .delay_margin import DelayMargin, delay_margin
 from .period_margin import period_margin
 
 __all__ = [
     "Certificate",
     "Comparison",
+    "DelayMap",
     "DelayMargin",
     "certify",
     "compare",
+    "delay_map",
     "delay_margin",
     "period_margin",
     "side_by_side",
