@@ -4,6 +4,7 @@ from .certify import Certificate, certify
 from .comparison import Comparison, compare, side_by_side
 from .delay_margin import DelayMargin, delay_margin
 from .period_margin import period_margin
+from .resolution import resolution_error
 
 __all__ = [
     "Certificate",
@@ -13,5 +14,6 @@ __all__ = [
     "compare",
     "delay_margin",
     "period_margin",
+    "resolution_error",
     "side_by_side",
 ]
