@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -26,6 +27,12 @@ ADAPTATIONS = {
     "gradient of some entries": Gradient(np.where(np.arange(30) % 3, 0.4, 0.0)),
     "natural": Natural(0.1),
 }
+
+
+@cache
+def pair_of(name: str) -> Cell:
+    """Two robots of the catalogue, made once for all examples."""
+    return joint_pair(name).cell
 
 
 def seen(rng: np.random.Generator, P: int = 30) -> Seen:
@@ -160,7 +167,7 @@ def test_no_sample_of_natural_adaptation_leaves_the_cone(seed, h):
 @pytest.mark.parametrize("name", ["planar2r", "a460", "ur5", "panda"])
 @given(seed=SEEDS, gamma=st.floats(1e-3, 1e3), h=st.floats(1e-4, 1.0))
 def test_no_step_leaves_the_cone_whatever_the_robot_the_gain_and_the_step(name, seed, gamma, h):
-    cell, rng = joint_pair(name).cell, np.random.default_rng(seed)
+    cell, rng = pair_of(name), np.random.default_rng(seed)
     bound, now = Natural(gamma).bind(cell), seen(rng)
     z = bound.start()
     rate = bound.rate(z, replace(now, gradient=rng.standard_normal(cell.theta.shape)))

@@ -37,7 +37,7 @@ from synctrl import (
     load_robot,
 )
 from synctrl.control.adaptation import Ball, Box, Composite, Gradient, Leakage, Natural
-from synctrl.control.laws import ChungSlotine, MasterSlave, SlotineLi
+from synctrl.control.laws import ChungSlotine, MasterSlave, ShapeKeeping, SlotineLi
 from synctrl.errors import InputError, ResultError
 from synctrl.experiments import a460_pair, mixed_four, planar_four
 
@@ -205,6 +205,10 @@ WHOLES: dict[str, Callable[[], Experiment]] = {
     "Chung and Slotine": lambda: independent(ChungSlotine(0.5)),
     "Slotine and Li": lambda: independent(SlotineLi()),
     "postures, and weights that move": wide,
+    "clocks that differ": lambda: small_pair(network=Network(4e-3, offset=[0.0, 0.02])),
+    "clocks that differ, and weights that move": lambda: replace(
+        wide(), network=Network(4e-3, offset=[0.01, 0.0])
+    ),
 }
 
 
@@ -479,6 +483,15 @@ def test_a_law_that_needs_more_of_the_others_is_refused_by_name(law: MasterSlave
     with refused(InputError, "law") as caught:
         independent(law).agents(PERIOD)
     assert "MasterSlave" in caught.value.found
+
+
+def test_a_law_that_compares_all_places_is_refused_by_name() -> None:
+    four = planar_four()
+    gains = four.gains.replace(K_eps=0.0)
+    experiment = replace(four, gains=gains, law=ShapeKeeping(), network=Network(4e-3))
+    with refused(InputError, "law") as caught:
+        experiment.agents(PERIOD)
+    assert "ShapeKeeping" in caught.value.found
 
 
 def test_an_agent_is_made_of_a_controller_with_a_mailbox() -> None:

@@ -212,7 +212,7 @@ FAULTS = {
     "the disturbance": ("+ a->disturbance[j]", ""),
     "what adapts": (GAMMA, GAMMA.replace("Gamma, n", "Gamma, one")),
     "which kind a robot is": ("kinds[c->kind[i]].function(", "kinds[c->kind[0]].function("),
-    "the integral's rate": ("a->integral_dot[j] = a->epsilon[j]", "a->integral_dot[j] = a->epsilon_dot[j]"),
+    "the integral's rate": ("a->memory_dot[j] = a->epsilon[j]", "a->memory_dot[j] = a->epsilon_dot[j]"),
     "the leak of the integral": (" - a->leak[j % m] * a->integral[j]", ""),
     "the order of what is desired": ("X(desired_dot, n, m) X(desired_ddot, n, m) X(slide,",
                                      "X(desired_ddot, n, m) X(desired_dot, n, m) X(slide,"),

@@ -100,7 +100,8 @@ def test_a_function_is_given_only_what_is_there_before_it_is_called():
 def test_every_quantity_is_written_by_one_function_at_most_and_used():
     written = Counter(name for _, outputs in FUNCTIONS.values() for name in outputs)
     assert set(written.values()) == {1}
-    driver = (Path(structs.__file__).parent / "driver.c").read_text(encoding="utf-8")
+    files = Path(structs.__file__).parent.glob("*.c")
+    driver = "".join(file.read_text(encoding="utf-8") for file in files)
     used = {name for inputs, outputs in FUNCTIONS.values() for name in (*inputs, *outputs)} | set(
         LOGS.values()
     )
@@ -114,11 +115,15 @@ def test_a_rate_has_the_shape_of_its_state_and_the_place():
 
 
 def test_every_array_of_a_result_is_logged_from_a_quantity_of_its_dimensions():
+    own = "plant_state", "network_state"
     dimension = {"robot": "n", "pair": "p", "axis": "m", "joint": "nv", "parameter": "P"}
-    assert [*LOGS] == [*[*LAYOUT][1:], "adaptation_state", "damping", "velocity_lost", "plant_state"]
+    states = "adaptation_state", "damping", "velocity_lost", *own
+    devices = "measured_q", "measured_v", "actuator_torque"
+    assert [*LOGS] == [*[*LAYOUT][1:], *states, *devices]
     for name, (dimensions, _) in [*LAYOUT.items()][1:]:
         rows, length = (dimension[each] for each in dimensions[1:])
         assert QUANTITIES[LOGS[name]][1:3] == (rows, length), name
+    assert all(QUANTITIES[LOGS[name]][1:3] == ("n", "nv") for name in devices)
 
 
 # -- the table and the driver -----------------------------------------------------------------------------
@@ -141,7 +146,7 @@ def test_structures_have_the_same_layout_in_c_and_in_python(tmp_path):
         for field in (name for name, *_ in structure._fields_):
             places += [f"offsetof({title}, {field})", f"sizeof((({title} *)0)->{field})"]
             expected += [getattr(structure, field).offset, getattr(structure, field).size]
-    declarations = "".join(map(structs.declared, structs.STRUCTURES))
+    declarations = structs.CALLBACK + "".join(map(structs.declared, structs.STRUCTURES))
     lines = "".join(f'    printf("%zu\\n", {place});\n' for place in places)
     source = f"#include <stddef.h>\n#include <stdio.h>\n{declarations}int main(void) {{\n{lines}}}\n"
     assert [int(line) for line in printed(source, tmp_path).split()] == expected
@@ -162,7 +167,11 @@ def test_the_driver_counts_columns_as_python_does(name, tmp_path):
 # -- the table and the arrays -----------------------------------------------------------------------------
 
 SMALL = dict(
-    zip((*SIZES, "n", "p", "o", "h"), (2, 3, 5, 7, 3, 30, 1, 1, 1, 1, 2, 1, 1, 4, 6, 1, 14), strict=True)
+    zip(
+        (*SIZES, "n", "p", "o", "r", "h"),
+        (2, 3, 5, 7, 3, 30, 1, 1, 1, 1, 2, 1, 1, 4, 6, 1, 9, 14),
+        strict=True,
+    )
 )
 
 

@@ -2,6 +2,7 @@
 
 from .certify import Certificate, certify
 from .comparison import Comparison, compare, side_by_side
+from .delay_map import DelayMap, delay_map
 from .delay_margin import DelayMargin, delay_margin
 from .period_margin import period_margin
 from .resolution import resolution_error
@@ -9,9 +10,11 @@ from .resolution import resolution_error
 __all__ = [
     "Certificate",
     "Comparison",
+    "DelayMap",
     "DelayMargin",
     "certify",
     "compare",
+    "delay_map",
     "delay_margin",
     "period_margin",
     "resolution_error",

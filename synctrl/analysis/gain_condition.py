@@ -68,6 +68,13 @@ class GainCondition:
         """Whether (18) holds at the place of the smallest margin: lambda_min(K_r) >= lambda_max(B)."""
         return self.K_r_min >= self.printed
 
+    def in_words(self) -> str:
+        """What it compares, and where."""
+        return (
+            f"at t = {self.time:g} s has lambda_min(K_r) = {self.K_r_min:.4g} against "
+            f"lambda_max(sym(B)) = {self.corrected:.4g} ((18) as printed compares with {self.printed:.4g})"
+        )
+
 
 def rate_matrix(
     M: np.ndarray, c_inv: np.ndarray, c_dot: np.ndarray, J: np.ndarray, J_inv: np.ndarray

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..control.discrete import GRID
+from ..control.network.messages import GRID
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.schedules import DisturbanceSchedule
 
@@ -52,12 +52,18 @@ def jumps_in(
 
 
 def _events_in(t: np.ndarray, loop: ClosedLoop, period: float | None) -> list[int]:
-    """Logged instants between which and the next one the state jumps."""
-    events, messages = np.sort(loop.events), np.array(loop.messages.between(0.0, float(t[-1])))
+    """Logged instants between which and the next one the state jumps, and V with it."""
+    events, end = np.sort(loop.events), float(t[-1])
+    messages = np.array(loop.messages.between(0.0, end) if jumps_at_messages(loop) else [])
     if period is not None:
         messages = period * np.ceil(messages / period - GRID)
     after = np.searchsorted(t, np.concatenate((events, messages)) - tolerance(t))
     return sorted({int(k) - 1 for k in after if 0 < k < len(t)})
+
+
+def jumps_at_messages(loop: ClosedLoop) -> bool:
+    """Whether V jumps at messages: it does unless the network says that what robots believe does not."""
+    return loop.messages.sent and getattr(loop.controller.network, "jumps", True)
 
 
 def tolerance(t: np.ndarray) -> float:

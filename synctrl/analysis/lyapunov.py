@@ -22,7 +22,7 @@ the formula does not explain is the power called "other", and is rounding when t
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
@@ -59,7 +59,8 @@ class Lyapunov:
             those in `ENERGIES`.
         power: terms of V' by name, each (T,): with the paper's law those in `POWERS`, and those of the
             adaptation and of a closed chain, see `assembly/energies.py`. A law without a proof has the power
-            of its force here, as "law"; what a network does that is not ideal is "network".
+            of its force here, as "law"; what a network does that is not ideal is "network", where E and
+            sigma change otherwise than it told, too.
         rounding: bound of the rounding error of V', (T,).
         drift: V(t) - V(0) - integral of V', (T,), without jumps at events; 0 but for the error of the run and
             of the quadrature.
@@ -180,6 +181,11 @@ def outside(network: BoundNetwork) -> str | None:
     return "no proof is known" if ask is None else ask()
 
 
+def _is_ideal(network: BoundNetwork) -> bool:
+    """Whether the proof holds with a network as it stands, without a theorem of its own."""
+    return outside(network) is None and getattr(network, "theorem", None) is None
+
+
 def operations(loop: ClosedLoop) -> int:
     """Roundings behind one entry of V': ten chained sums over joints, axes and parameters."""
     return 10 * (loop.cell.nv + loop.cell.m + loop.cell.theta.shape[1])
@@ -192,7 +198,10 @@ def _proof(run: Replay) -> Proof:
     """The law's part in V and V'; nothing of a law that has no proof."""
     x, law = run.rows, cast(Any, run.loop.controller.law)
     along = Along(x.epsilon, x.epsilon_dot, x.E, x.sigma, x.sigma_dot, x.e_star, x.r, x.c)
-    return law.proof(along) if hasattr(law, "proof") else Proof({}, {}, {})
+    if not hasattr(law, "proof"):
+        return Proof({}, {}, {})
+    proof, moves = law.proof(along), replace(along, sigma=x.sigma + x.E_gap)  # in rates it stands for E'
+    return proof._replace(rates=law.proof(moves).rates)
 
 
 def _rates(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
@@ -203,7 +212,7 @@ def _rates(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
 def _summands(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
     """The same but for the adaptation's, before they are added up over robots and axes."""
     x = run.rows
-    s_q_dot = x.a_ref + _reference_gap(run) - x.v_dot
+    s_q_dot = x.a_ref + x.gap + _reference_gap(run) - x.v_dot
     return x.s_q * (np.matvec(x.M, s_q_dot) + x.C_s), *proof.rates.values()
 
 
@@ -227,9 +236,9 @@ def _power(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
     pushed = _sum(s * x.force)  # the rates of the proof less its powers, where it holds
     if not hasattr(controller.law, "proof"):
         power["law"] = -pushed
-    elif outside(controller.network) is not None:
+    elif not _is_ideal(controller.network):
         rates, powers = (sum(map(_sum, terms.values())) for terms in (proof.rates, proof.powers))
-        power["network"] = rates - powers - pushed
+        power["network"] = rates - powers - pushed + _sum(x.s_q * np.matvec(x.M, x.gap))
     power["other"] = np.sum(_rates(run, proof), axis=0) - np.sum(list(power.values()), axis=0)
     return power
 

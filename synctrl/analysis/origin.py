@@ -10,7 +10,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..simulation.closed_loop import ClosedLoop
-from ..simulation.recorder import describe_run, own_states
+from ..simulation.description import describe_run
+from ..simulation.recorder import own_states
 from ..simulation.result import LAYOUT, Result
 
 #: parts that a result's info may describe
@@ -21,6 +22,10 @@ OPTIONAL = ("admittance", "sensors", "actuators")
 ROUNDING = 1e-9
 #: numbers beyond it are those of a run that went astray, and have no squares
 LARGEST = 1e100
+#: relative difference between logged and re-evaluated velocity errors that means "another experiment"
+MISMATCH = 1e-6
+#: what rounding may amount to beside it: a share of the largest velocity of the run, and rad/s
+AGREEMENT, STILL = 1e-9, 1e-12
 
 
 def check_sizes(result: Result, loop: ClosedLoop) -> None:
@@ -88,6 +93,28 @@ def check_numbers(result: Result) -> None:
                 subject=f"result, {name}",
                 found=found,
             )
+
+
+def check_same(result: Result, s_q: np.ndarray, speed: np.ndarray) -> None:
+    """Compare velocity errors; where robots are at rest and on their path, these are nothing but rounding.
+
+    Args:
+        result: the run.
+        s_q, speed: what an experiment gives for it, velocity errors and size of velocities, (T, n, nv).
+
+    Raises:
+        InputError: it is another experiment.
+    """
+    difference, speed = (part.max(axis=(1, 2)) for part in (np.abs(s_q - result.v_error), speed))
+    rounding = max(STILL, AGREEMENT * speed.max())
+    wrong = ~(difference <= MISMATCH * speed + rounding)
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise another(
+            f"at t = {result.t[k]:g} s it gives a velocity error of {s_q[k].tolist()}, but the result "
+            f"has {result.v_error[k].tolist()}",
+            "v_error",
+        )
 
 
 def another(reason: str, part: str) -> InputError:

@@ -109,14 +109,14 @@ def monodromy(frozen: Frozen, exchange: Exchange) -> np.ndarray:
     whole[X + 2 * R :, X + R : -R] = np.eye(size - X - 2 * R)
     arrival[X : X + R, X : X + R], arrival[X : X + R, -R:] = receiver.keep, receiver.take
     old = exchange.delay - rest + exchange.period
-    whole[: X + R] = _between(frozen, receiver, old, rest, exchange.lasting) @ whole[: X + R]
+    whole[: X + R] = between(frozen, receiver, old, rest, exchange.lasting) @ whole[: X + R]
     whole = arrival @ whole
     left = exchange.period - rest
-    whole[: X + R] = _between(frozen, receiver, exchange.delay, left, exchange.lasting) @ whole[: X + R]
+    whole[: X + R] = between(frozen, receiver, exchange.delay, left, exchange.lasting) @ whole[: X + R]
     return whole
 
 
-def _between(frozen: Frozen, receiver: Receiver, age: float, duration: float, lasting: float) -> np.ndarray:
+def between(frozen: Frozen, receiver: Receiver, age: float, duration: float, lasting: float) -> np.ndarray:
     """Cell and receivers over a time without messages, s, after a message of an age, s."""
     moving = min(duration, max(0.0, lasting - age))
     return _flow(frozen, receiver, duration - moving, 0.0) @ _flow(frozen, receiver, moving, 1.0)

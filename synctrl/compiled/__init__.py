@@ -11,10 +11,11 @@ goes through these modules:
 3. `kind`: which robots are equal, and can share code;
 4. `trace`, with `plugged` for laws and adaptations of a user's own: the functions of a robot of a kind;
    `carrying`: that of an object in the hands of several;
-5. `structs`, made from the table in `quantities`: what stands in C before `driver.c`;
+5. `structs`, made from the table in `quantities`: what stands in C before `network.c` and `driver.c`;
+   `hearing`: what these are told of the network;
 6. `build`, with `compiler` and `cache`: from C to a library that is loaded;
 7. `program`: library and arrays together. Once in every process, before it is used, the library is compared
    with the reference engine, on the small closed loop of `specimen`;
-8. `engine` again: takes the run through time, some steps with every call of `advance` in `driver.c`. Events,
-   such as hands that close or open, come between two calls.
+8. `engine` again: takes the run through time, some steps with every call of `advance` in `driver.c`. What
+   is on its `agenda`, hands that close or open and messages of the network, comes between two calls.
 """

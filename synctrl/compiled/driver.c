@@ -1,6 +1,6 @@
 /* The closed loop of a cell, from step to step.
  *
- * Above this text stand the sizes of rows (m, nv, P, Z, K, bodies, tip, ...), marks of steps, lists of quantities,
+ * Above this text stands `network.c`, and above that the sizes of rows (m, nv, P, Z, K, bodies, tip, ...), marks of steps, lists of quantities,
  * the structures, and the generated functions of each kind of robot with the table `kinds`; see structs.py. What the
  * quantities are is said in quantities.py. Arrays are row-major and have one row per robot or pair; rows are padded to
  * the largest robot. The state y is made of the quantities in STATE, one after another; what stands behind them is
@@ -59,35 +59,6 @@ static void take(Quantities *a, const Steps *s, int step) {
     }
 FUNCTIONS(CALL)
 
-/* epsilon = S w and epsilon' = S w' per pair; E, sigma, sigma' = S^T (integral, epsilon, epsilon') per robot */
-static void couple(const Cell *c, Quantities *a) {
-    for (int pair = 0; pair < c->p; pair++) {
-        double *epsilon = a->epsilon + (size_t)pair * m, *epsilon_dot = a->epsilon_dot + (size_t)pair * m;
-        for (int j = 0; j < m; j++) epsilon[j] = epsilon_dot[j] = 0;
-        for (int t = pair * c->arity; t < (pair + 1) * c->arity; t++) {
-            const double *w = a->w + (size_t)c->edge[t] * m, *w_dot = a->w_dot + (size_t)c->edge[t] * m;
-            for (int j = 0; j < m; j++) {
-                epsilon[j] += c->sign[t] * w[j];
-                epsilon_dot[j] += c->sign[t] * w_dot[j];
-            }
-        }
-    }
-    for (int i = 0; i < c->n; i++) {
-        double *E = a->E + (size_t)i * m;
-        double *sigma = a->sigma + (size_t)i * m, *sigma_dot = a->sigma_dot + (size_t)i * m;
-        for (int j = 0; j < m; j++) E[j] = sigma[j] = sigma_dot[j] = 0;
-        for (int t = c->first[i]; t < c->first[i + 1]; t++) {
-            size_t pair = (size_t)c->incident[t] * m;
-            double sign = c->incident_sign[t];
-            for (int j = 0; j < m; j++) {
-                E[j] += sign * a->integral[pair + j];
-                sigma[j] += sign * a->epsilon[pair + j];
-                sigma_dot[j] += sign * a->epsilon_dot[pair + j];
-            }
-        }
-    }
-}
-
 /* What reaches a joint of the torque that is asked for, as `Plant.applied`; what is no number stays so. */
 static double applied(double tau, double limit) { return tau > limit ? limit : tau < -limit ? -limit : tau; }
 
@@ -140,11 +111,11 @@ typedef void Rate(const Cell *c, Quantities *a, Work *k, const Steps *s, int sta
                   double *y_dot);
 
 /* What the controller makes of motion, of what hands feel, and of what is desired. */
-static void command(const Cell *c, Quantities *a, Work *k) {
+static void command(const Cell *c, Quantities *a, Work *k, double t) {
     for (int i = 0; i < c->n; i++) call_measure(c, a, i, k);
-    couple(c, a);
+    exchange(c, a, t);
     for (int i = 0; i < c->n; i++) call_control(c, a, i, k);
-    for (int j = 0; j < c->p * m; j++) a->integral_dot[j] = a->epsilon[j] - a->leak[j % m] * a->integral[j];
+    remember(c, a);
 }
 
 /* of the whole loop */
@@ -153,7 +124,7 @@ static void evaluate(const Cell *c, Quantities *a, Work *k, const Steps *s, int 
     place(c, a, y, y_dot);
     look_up(a, s, stage, step);
     if (c->o) { turn(c, a); feel(c, a, k); }
-    command(c, a, k);
+    command(c, a, k, instant(s, stage, step));
     move(c, a, a->tau, k);
 }
 
@@ -189,7 +160,7 @@ static int perceive(const Cell *c, Quantities *a, Work *k, const Steps *s, int s
     place(c, a, k->stage, k->k[0]);
     memcpy(a->q, a->measured_q, joints);
     memcpy(a->v, a->measured_v, joints);
-    command(c, a, k);
+    command(c, a, k, s->t[step]);
     sample(c, a, k, s);
     return 0;
 }
@@ -206,6 +177,7 @@ static void record(const Cell *c, Quantities *a, Work *k, long row, const Log *l
     for (int i = 0; i < c->n; i++)
         if (kinds[c->kind[i]].estimate) call_estimate(c, a, i, k);
         else memcpy(a->theta_hat + (size_t)i * P, a->z + (size_t)i * Z, sizeof(double) * P);
+    if (c->exchange.hearing != IDEAL) compare(c, a->memory, a->integral); /* S W */
 #define COPY(log_name, name, rows, columns) \
     if (log->log_name) \
         memcpy(log->log_name + row * c->rows * (columns), a->name, sizeof(double) * c->rows * (columns));

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import ctypes
 import operator
-from collections import deque
 from collections.abc import Iterable, Iterator
 from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..control.measured import check_network
 from ..coupling.cell import Cell
 from ..coupling.desired import rows_of
 from ..renamed import names_elsewhere
-from ..simulation.advance import due, up_to_a_failure
+from ..simulation.advance import up_to_a_failure
 from ..simulation.clock import Clock, Stretch
 from ..simulation.engines import Run, before_the_start, finish
 from ..simulation.guard import Alarm, Progress, checks, limits_of, report_time, stopped
 from ..simulation.recorder import Recorder
 from ..simulation.result import Result
 from . import structs
+from .agenda import Agenda
 from .hooks import Hooks
 from .known import check_known
 from .program import Program, one_after_another
@@ -129,9 +130,12 @@ class Compiled:
         """See `Engine`.
 
         Raises:
-            InputError: the closed loop cannot be generated; it has what and why.
+            InputError: the closed loop cannot be generated; it has what and why. Or sampled control with a
+                network in continuous time.
         """
         check_known(run.loop)
+        if run.every is not None:
+            check_network(run.loop.controller.network, run.loop.messages, run.info["control_period"])
 
     def load(self, run: Run) -> Program:
         """The program of a run, found or built.
@@ -175,34 +179,25 @@ class _Steps:
         self._block: DesiredStretch | None = None
         program.tell(self._steps, {"disturbance": run.schedule.torques, "pi": program.carried})
         ctypes.memset(work.side, 0, 8 * run.loop.cell.n)
-        state = run.loop.state(recorder.state)
-        program.quantities.hidden = state.hidden.ctypes.data
-        self._hooks = Hooks(run, program.quantities, self._steps, state)
-        self._events = deque(sorted(t for t in run.loop.events.tolist() if t >= 0))
+        self._state, self._agenda = run.loop.state(recorder.state), Agenda(program, run)
+        program.quantities.hidden = self._state.hidden.ctypes.data
+        self._hooks = Hooks(run, program.quantities, self._steps, self._state, self._agenda)
 
     def advance(self, block: DesiredStretch, first: int, last: int) -> None:
-        """Make some steps of a block; events of the plant come between two calls of the library."""
-        middles = block.steps.middles
+        """Make some steps of a block; what is on the agenda comes between two calls of the library."""
+        starts, middles = block.steps.starts, block.steps.middles
         while first < last:
-            self._meet(middles[first])
-            ahead = self._events[0] if self._events else np.inf
-            end = first + max(1, int(np.searchsorted(middles[first:last], ahead)))
+            self._agenda.meet(starts[first], middles[first], self._state)
+            end = first + max(1, int(np.searchsorted(middles[first:last], self._agenda.ahead)))
             self._part(block, first, end)
             first = end
 
-    def _meet(self, middle: float) -> None:
-        """Let events move the state that are due in a step with this middle, s."""
-        state = self._run.loop.state(self._recorder.state)
-        for event in due(self._events, middle):
-            self._run.loop.at(middle).meet(event, state)
-            self._program.hold(state.hidden)
-
     def _part(self, block: DesiredStretch, first: int, last: int) -> None:
         """Make some steps of a block in one go."""
-        steps, part = block.steps, slice(first, last)
-        joined = self._run.clock.joined(steps.first + first, steps.starts[part])
-        marks = _marks(steps.checked[part], steps.logged[part], self._sampled(steps, part), joined)
-        self._call(block, first, steps.times[first : last + 1], marks, steps.middles[part])
+        self._look_at(block)
+        part = slice(first, last)
+        windows = [each[part] for each in self._windows]
+        self._call(first, block.steps.times[first : last + 1], self._marks[part], windows)
 
     def finish(self) -> None:
         """Log the end of the run: one step of no length, in which acts what acted in the last step."""
@@ -211,30 +206,38 @@ class _Steps:
         nothing = Stretch(clock.steps, np.repeat(end, 2), yes, yes, np.array([clock.count]))
         block = DesiredStretch(nothing, _tables(self._run.loop.cell, np.array([end] * 3)))
         due = np.array([every is None or clock.sampled_at_end(every)])
+        if due[0]:
+            self._agenda.tell(clock.end, clock.end, self._state)
         before = clock.stretch(clock.steps - 1, clock.steps).middles
-        self._call(block, 0, nothing.times, _marks(yes, yes, due, no), before)
+        self._look_at(block)
+        self._call(0, nothing.times, _marks(yes, yes, due, no), self._acting(before))
 
-    def _sampled(self, steps: Stretch, part: slice) -> np.ndarray:
+    def _sampled(self, steps: Stretch) -> np.ndarray:
         """Whether each step begins with a sample: on multiples of dt, or always if control is continuous."""
         if self._run.every is None:
-            return np.ones(len(steps.starts[part]), dtype=bool)
-        return steps.checked[part] & (steps.number[part] % self._run.every == 0)
+            return np.ones(len(steps.starts), dtype=bool)
+        return steps.checked & (steps.number % self._run.every == 0)
 
-    def _look_at(self, block: DesiredStretch) -> structs.Steps:
-        """The steps of a block."""
-        if block is not self._block:
-            self._program.tell(self._steps, block.desired)
-            self._steps.length, self._block = len(block.steps.starts), block
-        return self._steps
+    def _acting(self, middles: np.ndarray) -> list[np.ndarray]:
+        """Which disturbance and which load acts in steps: what acts in the middle acts in all of one."""
+        schedules = self._run.schedule, self._program.loop.plant.schedule
+        return [schedule.windows(middles).astype(np.intc) for schedule in schedules]
 
-    def _call(
-        self, block: DesiredStretch, first: int, times: np.ndarray, marks: np.ndarray, middles: np.ndarray
-    ) -> None:
-        """Make steps between these times; what acts in the middle of one acts in all of it."""
+    def _look_at(self, block: DesiredStretch) -> None:
+        """Say what is desired and happens in the steps of a block, if that was not said before."""
+        if block is self._block:
+            return
+        steps = block.steps
+        self._program.tell(self._steps, block.desired)
+        self._steps.length, self._block = len(steps.starts), block
+        joined = self._run.clock.joined(steps.first, steps.starts)
+        self._marks = _marks(steps.checked, steps.logged, self._sampled(steps), joined)
+        self._windows = self._acting(steps.middles)
+
+    def _call(self, first: int, times: np.ndarray, marks: np.ndarray, windows: list[np.ndarray]) -> None:
+        """Make steps between these times, with what happens at their starts and acts in them."""
         program, recorder, report = self._program, self._recorder, structs.Report()
-        schedules = self._run.schedule, program.loop.plant.schedule
-        windows = [schedule.windows(middles).astype(np.intc) for schedule in schedules]
-        steps, times = self._look_at(block), np.ascontiguousarray(times)
+        steps, times = self._steps, np.ascontiguousarray(times)
         steps.first, steps.count = first, len(marks)
         arrays = (times, marks, *windows)
         steps.t, steps.marks, steps.disturbed, steps.loaded = (array.ctypes.data for array in arrays)

@@ -13,7 +13,9 @@ import numpy as np
 
 from ..simulation.closed_loop import State
 from ..simulation.engines import Run
-from .structs import Callback, Quantities, Steps
+from .address import Callback
+from .agenda import Agenda
+from .structs import Quantities, Steps
 
 
 class Hooks:
@@ -24,9 +26,11 @@ class Hooks:
         quantities: of the program, which get arrays that live as long as this object.
         steps: which get what is to be called.
         state: of the loop, which the library carries on.
+        agenda: of the run, whose messages say what sensors measure, if there are any.
     """
 
-    def __init__(self, run: Run, quantities: Quantities, steps: Steps, state: State):
+    def __init__(self, run: Run, quantities: Quantities, steps: Steps, state: State, agenda: Agenda):
+        self._agenda = agenda
         self._devices, self._plant, self._state = run.devices, run.loop.plant, state
         self._failure: BaseException | None = None
         self._kept: list[object] = []
@@ -54,8 +58,8 @@ class Hooks:
     # -- internals ----------------------------------------------------------------------------------------
 
     def _sense(self, t: float, middle: float, sampled: int) -> None:
-        """Let sensors measure; what they read are arrays that the library knows."""
-        self._devices.measure(self._state.motion)
+        """Let sensors measure, and messages tell of it; what is read are arrays that the library knows."""
+        self._agenda.hear(t, t, self._devices.measure(self._state.motion), self._state.memory)
 
     def _act(self, t: float, middle: float, sampled: int) -> None:
         """Let actuators act on what is asked for, and take the goals that are due in a step."""

@@ -28,7 +28,7 @@ from ..control.admittance import BoundAdmittance
 from ..control.controller import Controller
 from ..control.gains import Gains
 from ..control.laws.sun_mills import BoundSunMills
-from ..control.network import BoundIdeal
+from ..control.network import Messages
 from ..coupling.cell import Cell
 from ..coupling.coupling import Coupling
 from ..errors import InputError
@@ -44,6 +44,7 @@ from ..tasks.pose import BoundPoseSpace, PoseSpace
 from ..tasks.redundancy import DampedInverse, Inverse, Pseudoinverse, Redundancy
 from ..tasks.sliding import BoundSlidingSpace, SlidingSpace
 from ..tasks.spaces import BoundCartesianSpace, BoundJointSpace, CartesianSpace, JointSpace
+from .hearing import parts_of
 from .plugged import learner
 
 SPACES = (JointSpace, CartesianSpace, PoseSpace, SlidingSpace)
@@ -85,8 +86,6 @@ def check_known(loop: ClosedLoop) -> None:
         _check_own_methods(part)
     _check_controller(loop.controller)
     _check_plant(loop)
-    if "sensors" in loop.devices.settings and type(loop.controller.network) is not BoundIdeal:
-        raise _refusal("sensors", "sensors", "sensors together with a network that is not ideal")
 
 
 def check_untouched(loop: ClosedLoop) -> None:
@@ -117,7 +116,8 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
     yield Part("controller", controller, (Controller,))
     if isinstance(controller.law, BoundSunMills):  # others are traced
         yield Part("law", controller.law, (BoundSunMills,))
-    yield Part("network", controller.network, (BoundIdeal,))
+    yield from (Part(*part) for part in parts_of(controller.network))
+    yield Part("messages", loop.messages, (Messages,))
     learns = learner(controller)
     if isinstance(learns, BoundGradient):  # others are traced
         yield Part("adaptation", learns, (BoundGradient,))

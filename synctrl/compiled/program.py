@@ -20,8 +20,10 @@ from ..simulation.closed_loop import ClosedLoop, State
 from ..simulation.guard import limits_of
 from ..simulation.plant import Plant
 from . import structs
+from .address import Doubles
 from .build import cached_library, content_key, require_casadi
 from .carrying import carrying_constants, held_constants, object_function
+from .hearing import exchange_of
 from .kind import Classified, Kind, classify, standing
 from .known import check_known, check_untouched
 from .plugged import learner
@@ -41,7 +43,8 @@ def generate(kinds: list[Kind]) -> Iterator[str]:
             yield _written(function)
     if any(kind.holds for kind in kinds):
         yield _written(object_function(f"kind{len(kinds)}_object"))
-    yield header(kinds) + (Path(__file__).parent / "driver.c").read_text(encoding="utf-8")
+    parts = (Path(__file__).parent / name for name in ("network.c", "driver.c"))
+    yield header(kinds) + "".join(part.read_text(encoding="utf-8") for part in parts)
 
 
 def _written(function: Any) -> str:
@@ -65,7 +68,7 @@ class CompiledLoop:
 
     Attributes:
         sizes: lengths of rows, see `SIZES`, and the numbers of robots, pairs and objects, n, p and o, and
-            h, of what the plant remembers.
+            r and h, of what network and plant remember.
         cell, quantities, work: what the driver is given; see `structs.py`.
         carried: true inertial parameters with every load, (loads, n, bodies).
         scratch: sizes of the scratch arrays arg, res, iw and w that the generated functions ask for.
@@ -78,7 +81,7 @@ class CompiledLoop:
         self.loop, self.library = loop, library
         cell, objects = loop.cell, int(isinstance(loop.plant, CarryingPlant))
         self.sizes = {**largest(classified.kinds), "n": cell.n, "p": cell.coupling.pairs, "o": objects}
-        self.sizes["h"] = loop.plant.hidden0.size
+        self.sizes |= {"r": loop.controller.network.start().size, "h": loop.plant.hidden0.size}
         self._keep: list[np.ndarray] = []
         self.cell = self._cell([*classified.kind_of, len(classified.kinds)])
         self.quantities = structs.Quantities()
@@ -100,7 +103,9 @@ class CompiledLoop:
         y, y_dot, first = np.ascontiguousarray(y), np.zeros(self.loop.size), np.zeros(1, dtype=np.intc)
         desired = dict(zip((*DESIRED, *SLIDE), reference.desired, strict=False))
         weights = one_after_another(reference.weights)
-        steps = structs.Steps(disturbed=first.ctypes.data, loaded=first.ctypes.data)
+        t = np.full(2, float(reference.t))
+        addresses = {"disturbed": first, "loaded": first, "t": t}
+        steps = structs.Steps(**{name: array.ctypes.data for name, array in addresses.items()})
         self.tell(steps, {**desired, "weights": weights, "disturbance": disturbance, "pi": self.carried})
         self.call("state_dot", steps, y, y_dot)
         return y_dot
@@ -155,11 +160,11 @@ class CompiledLoop:
         return structs.Cell(
             n=cell.n,
             p=coupling.pairs,
-            o=self.sizes["o"],
-            h=self.sizes["h"],
+            **{name: self.sizes[name] for name in ("o", "r", "h")},
             arity=coupling.edges.shape[1],
             rubs=int(plant.rubs),
             saturates=int(plant.saturate),
+            exchange=exchange_of(self.loop.controller.network, self.address),
             **found,
         )
 
@@ -168,7 +173,7 @@ class CompiledLoop:
         size, n = self.loop.size, self.sizes["n"]
         lengths = {"arg": arg, "res": res, "iw": iw, "w": w, "stage": size, "held": size, "side": n}
         found = {name: self.address(np.zeros(length + 1)) for name, length in lengths.items()}
-        rates = (structs.Doubles * 4)(*(self.address(np.zeros(size)) for _ in range(4)))
+        rates = (Doubles * 4)(*(self.address(np.zeros(size)) for _ in range(4)))
         return structs.Work(k=rates, **found)
 
 
@@ -231,7 +236,7 @@ def _rates(rate: State) -> dict[str, np.ndarray]:
         "q'": rate.q,
         "v'": rate.v,
         "z'": rate.z,
-        "integral'": rate.memory,
+        "memory'": rate.memory,
         "the plant's state'": rate.hidden,
     }
 

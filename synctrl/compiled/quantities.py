@@ -24,8 +24,9 @@ class Quantity(NamedTuple):
         owner: where it is: "state" and "rate" in y and y', "cell" for constants, "instant" for what is
             desired at a stage of a step, "load" and "disturbance" for what is constant between edges of
             these, "work" for what generated functions and the driver hand on.
-        rows: "n" for one per robot, "p" for one per pair, "o" for one per object that is carried, "h" for
-            one per number that the plant remembers, "one" for one that all robots share.
+        rows: "n" for one per robot, "p" for one per pair, "o" for one per object that is carried, "r" and
+            "h" for one per number that the network and the plant remember, "one" for one that all robots
+            share.
         columns: length of a row, a product of numbers and of the names in `SIZES`.
         meaning: what it is.
     """
@@ -60,12 +61,12 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "q": Quantity("state", "n", "nv", "positions of the joints"),
         "v": Quantity("state", "n", "nv", "velocities of the joints"),
         "z": Quantity("state", "n", "Z", "state of the adaptation; with (14) it is theta_hat"),
-        "integral": Quantity("state", "p", "m", "integrals of epsilon"),
+        "memory": Quantity("state", "r", "1", "what the network remembers"),
         "body": Quantity("state", "o", "13", "pose and twist of what is carried"),
         "q_dot": Quantity("rate", "n", "nv", "q'"),
         "v_dot": Quantity("rate", "n", "nv", "v'"),
         "z_dot": Quantity("rate", "n", "Z", "z'"),
-        "integral_dot": Quantity("rate", "p", "m", "epsilon less what leaks"),
+        "memory_dot": Quantity("rate", "r", "1", "its rate"),
         "body_dot": Quantity("rate", "o", "13", "their rates"),
         "base": Quantity("cell", "n", "12", "placement of the first joint: rotation by rows, translation"),
         "true_base": Quantity("cell", "n", "12", "the same of what really stands there"),
@@ -121,6 +122,7 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "side": Quantity("work", "n", "tip", "of which the sign says the side of a singular configuration"),
         "epsilon": Quantity("work", "p", "m", "synchronization errors"),
         "epsilon_dot": Quantity("work", "p", "m", "their rates"),
+        "integral": Quantity("work", "p", "m", "integrals of epsilon"),
         "E": Quantity("work", "n", "m", "a robot's share of the integrals of epsilon"),
         "sigma": Quantity("work", "n", "m", "its share of epsilon"),
         "sigma_dot": Quantity("work", "n", "m", "its share of the rates of epsilon"),
@@ -219,6 +221,7 @@ LOGS: Mapping[str, str] = MappingProxyType(
         "damping": "damping",
         "velocity_lost": "velocity_lost",
         "plant_state": "hidden",
+        "network_state": "memory",
         "measured_q": "measured_q",
         "measured_v": "measured_v",
         "actuator_torque": "driven",
@@ -238,7 +241,7 @@ def columns(name: str, sizes: Mapping[str, int]) -> int:
 
 
 def shape(name: str, sizes: Mapping[str, int]) -> tuple[int, int]:
-    """Shape of the array of a quantity; `sizes` has n, p, o and h too, see `Quantity.rows`."""
+    """Shape of the array of a quantity; `sizes` has n, p, o, r and h too, see `Quantity.rows`."""
     return {"one": 1, **sizes}[QUANTITIES[name].rows], columns(name, sizes)
 
 

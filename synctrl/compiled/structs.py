@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 
 from ..simulation.guard import checks
+from .address import CALLBACK, Arguments, Callbacks, Chars, Doubles, Ints, Longs, Results
+from .hearing import Exchange, Hearing
 from .kind import Kind
 from .quantities import FUNCTIONS, LOGS, QUANTITIES, owned_by
 
@@ -35,41 +37,25 @@ class Mark(IntFlag):
     JOINED = 8
 
 
-class Address(ctypes.c_void_p):
-    """An address, and how C declares what has it."""
-
-    written: str
-
-
-def _address(written: str) -> type[Address]:
-    return type("Address", (Address,), {"written": written})
-
-
-Doubles, Ints, Chars, Longs = map(_address, ("double *", "int *", "char *", "long long *"))
-#: a function in Python that the driver calls: time, the middle of the step, whether a sample falls on it -> 0
-Callback = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.c_double, ctypes.c_int)
-Callbacks = _address("Callback *")
-#: what generated functions read, and what they write
-Arguments, Results = map(_address, ("const double **", "double **"))
-
-
 class Cell(ctypes.Structure):
     """What does not change in a run: sizes, who is compared with whom, and whether joints rub.
 
     Attributes:
-        n, p, o, h, arity: robots, pairs, objects that are carried, numbers that the plant remembers, and
-            robots in one pair.
+        n, p, o, r, h, arity: robots, pairs, objects that are carried, numbers that the network and the plant
+            remember, and robots in one pair.
         kind: of each robot, and then of each object.
         edge, sign: (p, arity), robots that are compared, and entries of S.
         first, incident, incident_sign: where the pairs of a robot begin, (n + 1), and robot after robot its
             pairs, with entries of S.
         rubs, saturates: whether there is friction, and whether torque is cut off.
+        exchange: how the robots hear of each other.
     """
 
     _fields_ = [
-        *((name, ctypes.c_int) for name in ("n", "p", "o", "h", "arity", "rubs", "saturates")),
+        *((name, ctypes.c_int) for name in ("n", "p", "o", "r", "h", "arity", "rubs", "saturates")),
         *((name, Ints) for name in ("kind", "edge", "first", "incident")),
         *((name, Doubles) for name in ("sign", "incident_sign")),
+        ("exchange", Exchange),
     ]
 
 
@@ -171,7 +157,7 @@ class Report(ctypes.Structure):
 
 
 #: in an order in which each knows those that it has inside
-STRUCTURES = (Cell, Quantities, Arrays, Steps, Log, StepError, Work, Report)
+STRUCTURES = (Exchange, Cell, Quantities, Arrays, Steps, Log, StepError, Work, Report)
 
 _WRITTEN: dict[Any, str] = {ctypes.c_int: "int ", ctypes.c_long: "long ", ctypes.c_double: "double "}
 
@@ -223,12 +209,13 @@ def _member(name: str, kind: Any) -> str:
 
 
 def _constants(kinds: list[Kind]) -> Iterable[str]:
-    """Sizes, how many kinds there are, marks, what the guard may find, and what is called back."""
+    """Sizes, how many kinds there are, marks, ways to hear, what the guard may find, what is called back."""
     yield _enumeration({**largest(kinds), "KINDS": len(kinds) + 1})
-    yield _enumeration({name: mark.value for name, mark in Mark.__members__.items()})
+    for words in (Mark, Hearing):
+        yield _enumeration({name: word.value for name, word in words.__members__.items()})
     found = enumerate(checks(kinds[0].watches), start=1)
     yield _enumeration({f"FOUND_{check.upper()}": k for k, check in found})
-    yield "typedef int Callback(double, double, int);\n"
+    yield CALLBACK
 
 
 def _enumeration(constants: Mapping[str, int]) -> str:

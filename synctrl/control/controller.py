@@ -151,7 +151,7 @@ class Controller:
         self.unbound = learning, options.law
         self.leak = spread("leak", gains.leak, (m,))
         connection = Ideal(self.leak) if network is None else network
-        offers("network", connection, ("bind",), "a network, for example Ideal()")
+        offers("network", connection, ("bind", "as_dict"), "a network, for example Ideal()")
         self.network, self.network_settings = connected(connection, cell, gains), settings_of(connection)
         self._shift = shift_of(self.adaptation, self.network)
         self._pace = pace_of(self.adaptation, self.network)

@@ -23,8 +23,6 @@ from .network import Messages
 
 #: how far from its place on the grid of samples a call may come, as a share of the period
 LATE = 0.1
-#: how far from a sample a message may be that comes with it, as a share of the period
-GRID = 1e-9
 FAULTS = "error", "hold"
 
 
@@ -72,13 +70,13 @@ class DiscreteController:
     ):
         instance("controller", controller, Controller, "a Controller")
         measured.check_adaptation(controller)
-        measured.check_network(controller.network)
         self.controller, self.cell = controller, controller.cell
         self.period = positive_number("period", period)
         self.include_gravity = boolean("include_gravity", include_gravity)
         self.faults = choice("faults", faults, FAULTS)
         self._shape = self.cell.n, self.cell.nv
         self._messages = Messages(self.cell, controller.network)
+        measured.check_network(controller.network, self._messages, self.period)
         self.torque_limits = limits("torque_limits", torque_limits, self._shape)
         self.held: int
         self.signals: Signals | None
@@ -283,12 +281,9 @@ class DiscreteController:
 
     def _due(self, sample: int) -> list[float]:
         """Messages of the period that ends with a sample; with the first, those at it."""
-        start = self._end(sample - 1) if sample else self._t0
-        return self._messages.between(start, self._end(sample))
-
-    def _end(self, sample: int) -> float:
-        """Before this time a message is due with a sample or with one before; roundings do not matter."""
-        return self._t0 + (sample + GRID) * self.period
+        ends = (self._messages.end(k, self.period, self._t0) for k in (sample - 1, sample))
+        before, end = ends
+        return self._messages.between(before if sample else self._t0, end)
 
     def _advance(self, q: np.ndarray, memory: np.ndarray, signals: Signals, missed: int = 0) -> None:
         """Keep what is commanded, and what will be known at the next sample; or nothing, if a part fails."""

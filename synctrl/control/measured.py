@@ -30,11 +30,14 @@ from ..errors import (
 from ..files import reported, whole_file
 from ..tasks.measurement import first_beyond
 from .controller import Controller, Signals
+from .network import Messages
 
 #: bytes of an archive beside its arrays, per array: names, sizes and numpy's header
 OVERHEAD = 1024
 #: periods up to which samples can be told from each other
 LONGEST = 2.0**50
+#: instants of messages in one of them
+PER_SAMPLE = 1000
 #: what the package's spaces watch: the kind of error, and what it is about
 _ENDS = {
     "condition": (SingularJacobianError, "condition number of the Jacobian"),
@@ -118,11 +121,13 @@ def _undefined(cell: Cell, t: float, what: str, robot: int) -> NonFiniteError:
     )
 
 
-def check_network(network: Any) -> None:
-    """Refuse a network without messages that has delays: what acts at samples knows nothing in between.
+def check_network(network: Any, messages: Messages, period: float) -> None:
+    """Refuse a network with delays but no messages: what acts at samples knows nothing in between.
+
+    So are far more messages than samples: all of one period, s, tell what was true at one sample.
 
     Raises:
-        InputError: it is one.
+        InputError: it is one of these.
     """
     if getattr(network, "continuous", False):
         raise InputError(
@@ -131,6 +136,9 @@ def check_network(network: Any) -> None:
             subject="network",
             found=None,
         )
+    if (found := len(messages.between(0.0, period))) > PER_SAMPLE:
+        wanted = f"at most {PER_SAMPLE} messages in a period of {period:g} s"
+        raise InputError.expected(wanted, found, "network, messages")
 
 
 def check_adaptation(controller: Controller) -> None:

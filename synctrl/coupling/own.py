@@ -79,7 +79,8 @@ def own_cell(cell: Cell, robot: int) -> Cell:
         theta_hat0=cell.theta_hat0[robot, : len(parameters.theta)].copy(),
         name=cell.names[robot],
     )
-    return Cell([member], OwnCoupling(cell.coupling, robot), _own_space(cell, robot), cell.name)
+    coupling, clock = OwnCoupling(cell.coupling, robot), cell.clocks[robot : robot + 1].copy()
+    return Cell([member], coupling, _own_space(cell, robot), cell.name, clock)
 
 
 def _own_space(cell: Cell, robot: int) -> Any:

@@ -54,17 +54,17 @@ class PlannedRun:
 
     def possible(self) -> Self:
         """This run, by the reference engine where there is no CasADi or no compiler for the compiled one."""
-        return self if self.engine != "compiled" or _compiles() else replace(self, engine="pinocchio")
+        return replace(self, engine=fastest_engine()) if self.engine == "compiled" else self
 
 
-def _compiles() -> bool:
-    """Whether this machine has what the compiled engine needs."""
+def fastest_engine() -> str:
+    """The compiled engine, or the reference engine on a machine without CasADi or a C compiler."""
     try:
         require_casadi()
         compiler()
     except MissingDependencyError:
-        return False
-    return True
+        return "pinocchio"
+    return "compiled"
 
 
 def run_all(folder: Path, workers: int, planned: Mapping[str, PlannedRun]) -> dict[str, Result]:

@@ -20,6 +20,7 @@ from . import plots
 from .assembly_figures import CURVES, assembly_figure, has
 from .curves import Curves, curves_figure
 from .legends import legend, legend_rows, plain
+from .network_figures import traffic
 from .panels import LEGEND, TITLE, WIDTH, stacked_panels
 from .runs import check_run
 from .style import DESIRED, robot_color
@@ -141,7 +142,7 @@ FIGURES: Mapping[str, Callable[..., Figure]] = MappingProxyType(
 )
 #: those of runs that log what they show
 OF_TASKS: Mapping[str, Callable[..., Figure]] = MappingProxyType(
-    {name: partial(assembly_figure, name=name) for name in CURVES}
+    {"traffic": traffic, **{name: partial(assembly_figure, name=name) for name in CURVES}}
 )
 #: the narrowest figure in which all words have their place, inches
 NARROWEST = 3.0
@@ -200,7 +201,7 @@ def gallery(result: Result, *names: str, width: float = WIDTH) -> Gallery:
         raise InputError.expected(f"at least {NARROWEST:g} inches", width, "width")
     found = Gallery(str(result.info["title"]))
     known = {**FIGURES, **OF_TASKS}
-    asked = names or (*FIGURES, *(name for name in OF_TASKS if has(result, name)))
+    asked = names or (*FIGURES, *(name for name in OF_TASKS if _shows(result, name)))
     for name in asked:
         try:
             found[name] = known[choice("figure", name, tuple(known))](result, width=width)
@@ -212,6 +213,11 @@ def gallery(result: Result, *names: str, width: float = WIDTH) -> Gallery:
     if "torque" in found and unknown:
         found.missing["torque limits"] = f"the result does not say those of {', '.join(unknown)}"
     return found
+
+
+def _shows(result: Result, name: str) -> bool:
+    """Whether a run has what one of `OF_TASKS` shows."""
+    return "message_age" in result.outputs if name == "traffic" else has(result, name)
 
 
 def _png(figure: Figure) -> str:

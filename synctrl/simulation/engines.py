@@ -15,7 +15,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..checks import choice
+from ..checks import choice, positive_number
+from ..coupling.member_checks import warn_of_unasked_friction
 from ..coupling.reachability import SAMPLES, check_motions, check_reachable
 from ..errors import InputError, RunInterrupted, SimulationError, SynctrlError
 from .advance import Sample, Solver, advance
@@ -25,11 +26,12 @@ from .controls import Continuous, Sampled
 from .devices import LiveDevices
 from .diagnosis import diagnosed
 from .guard import Guard, Progress, date, report_time, user_failure
-from .integrators import RungeKutta, Scipy
+from .integrators import ADAPTIVE, RungeKutta, Scipy, check_method
+from .limits import warn_of_saturation
 from .recorder import NOTHING, Recorder
 from .result import Result
 from .schedules import DisturbanceSchedule
-from .step_error import StepError, step_report
+from .step_error import StepError, step_report, warn_of_step
 
 #: instants at which weights are looked at before a run, at most
 WEIGHT_SAMPLES = 2000
@@ -249,3 +251,31 @@ def find_engine(engine: str | Engine) -> Engine:
         known = ", ".join(map(repr, ENGINES))
         raise InputError.expected(f"one of {known}, or an engine of your own", engine, "engine")
     return engine
+
+
+def carry_out(
+    run: Run,
+    integrator: str,
+    engine: str | Engine,
+    tolerances: tuple[float, float],
+    progress: Progress | None,
+) -> Result:
+    """Check what is left to be checked, and make a run."""
+    choice("integrator", integrator, ("rk4", *ADAPTIVE))
+    by = find_engine(engine)
+    if progress is not None and not callable(progress):
+        raise InputError.expected("a function of the time reached", progress, "progress")
+    rtol, atol = (positive_number(*each) for each in zip(("rtol", "atol"), tolerances, strict=True))
+    if adaptive := integrator != "rk4":
+        check_method(integrator, engine, run.info["control_period"])
+    elif (reason := by.refuses(run)) is not None:
+        raise InputError(reason, subject="engine")
+    else:
+        run.check_step()
+    run.check()
+    warn_of_unasked_friction(run.experiment.cell)
+    run.loop.warn()
+    result = run_adaptive(run, integrator, rtol, atol, progress) if adaptive else by.run(run, progress)
+    warn_of_step(result.info["step_error"], result.names, run.info["dt"])
+    warn_of_saturation(result)
+    return result

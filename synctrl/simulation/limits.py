@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..control.adaptation import Adaptation, bounded
 from ..control.controller import Signals
+from ..control.gains import Gains
 from ..coupling.cell import Cell
 from ..errors import SaturationWarning, warn
 from ..renamed import names_elsewhere
@@ -115,6 +117,21 @@ def saturation_report(plant: Plant, arrays: Mapping[str, np.ndarray]) -> list[di
         }
         for i, joint in np.argwhere(share > 0)
     ]
+
+
+def learning_within(
+    plant: Plant, gains: Gains, adaptation: Adaptation | None
+) -> tuple[Gains, Adaptation | None]:
+    """Gains and adaptation of a controller: (14) is `bounded` where the plant may cut its torque off.
+
+    Args:
+        plant: the true cell.
+        gains, adaptation: those that are given; an adaptation that is given stays what it is.
+    """
+    Gamma = gains.Gamma
+    if adaptation is not None or Gamma is None or not np.isfinite(plant.torque_limits).any():
+        return gains, adaptation
+    return gains.replace(Gamma=None), bounded(plant.cell, Gamma, plant.schedule.carried)
 
 
 def applied_output(plant: Plant, tau: np.ndarray) -> dict[str, Output]:

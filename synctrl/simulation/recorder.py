@@ -8,26 +8,22 @@ give is checked here before it gets into a `Result`.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..checks import printable
-from ..coupling.cell import Cell
 from ..errors import InputError
 from ..renamed import names_elsewhere
-from ..robots.mechanism import joint_limits
-from ..robots.written import write_robot
 from .advance import Sample
 from .clock import Clock
 from .closed_loop import ClosedLoop, State
+from .description import describe_run, sizes
 from .devices.fitted import DRIVEN, MEASURED, ROLES, LiveDevices
 from .limits import APPLIED, DampingLog, applied_output, limit_report, saturation_report
 from .memory import check_fits
 from .plant import Output
-from .result import LAYOUT, Result, array_unit
+from .result import LAYOUT, Result
 
 
 class Account(NamedTuple):
@@ -112,15 +108,14 @@ class Recorder:
         lengths = {"time": self.count, **sizes(loop)}
         taken = {*info, *describe_run(loop), *LAYOUT, *_STATE_AXES, *OF_EVERY_RUN}
         told = {name: array for name, (array, _, _) in self._learned(logged).items()}
-        found = Account(*loop.plant.account({PLANT_STATE: np.zeros((self.count, 0)), **logged, **told}))
-        network = loop.controller.network
-        if hasattr(network, "account"):
-            found = Account(found.report, {**network.account(logged), **found.outputs})
-        for what, entries in found._asdict().items():
-            _check_names(f"plant {type(loop.plant).__qualname__}, {what}", entries, taken)
-        for name, output in found.outputs.items():
-            _check_output(f"plant {type(loop.plant).__qualname__}, outputs, {name}", output, lengths)
-        return found
+        network, plant = loop.controller.network, loop.plant
+        heard = network.account(logged) if hasattr(network, "account") else {}
+        _check_outputs(f"network {type(network).__qualname__}, outputs", heard, taken, lengths)
+        found = Account(*plant.account({PLANT_STATE: np.zeros((self.count, 0)), **logged, **told}))
+        where, taken = f"plant {type(plant).__qualname__}", {*taken, *heard}
+        _check_names(f"{where}, report", found.report, taken)
+        _check_outputs(f"{where}, outputs", found.outputs, taken, lengths)
+        return Account(found.report, {**heard, **found.outputs})
 
     def result(
         self, status: str, info: Mapping[str, Any], experiment: Any, account: Account = NOTHING
@@ -200,76 +195,6 @@ def _taken(array: np.ndarray, count: int) -> np.ndarray:
     return np.ascontiguousarray(array) if count == len(array) else array[:count].copy()
 
 
-def sizes(loop: ClosedLoop) -> dict[str, int]:
-    """Lengths of all dimensions but time."""
-    cell = loop.cell
-    return {
-        "robot": cell.n,
-        "pair": cell.coupling.pairs,
-        "axis": cell.m,
-        "joint": cell.nv,
-        "parameter": cell.theta.shape[1],
-    }
-
-
-def describe_run(loop: ClosedLoop) -> dict[str, Any]:
-    """Names, units, gains and options, as plain data."""
-    cell, controller = loop.cell, loop.controller
-    about = {
-        "title": cell.name,
-        "robots": _describe_robots(cell),
-        "axes": list(cell.labels),
-        "task_unit": cell.unit,
-        "axis_units": list(cell.units),
-        "weighted_unit": cell.weighted_unit,
-        "weighted_units": list(cell.weighted_units),
-        "coupling": cell.coupling.name,
-        "pairs": cell.coupling.edges.tolist(),
-        "signs": cell.coupling.signs.tolist(),
-        "sizes": sizes(loop),
-        "gains": controller.gains.as_dict(),
-        "adaptation": controller.adaptation_settings,
-        "law": controller.law_settings,
-        "network": controller.network_settings,
-        "reference_acceleration": controller.reference_acceleration,
-        "k_r_space": controller.k_r_space,
-        "versions": versions(),
-    }
-    if controller.admittance_settings is not None:
-        about["admittance"] = controller.admittance_settings
-    about |= loop.devices.settings
-    return {**about, "units": {name: array_unit(about, name) for name in LAYOUT}}
-
-
-def _describe_robots(cell: Cell) -> list[dict[str, Any]]:
-    return [
-        {
-            "name": name,
-            "model": robot.name,
-            "joints": list(robot.joint_names),
-            "joint_units": list(robot.joint_units),
-            "parameters": list(parameters.names),
-            "theta": [float(value) for value in parameters.theta],
-            "torque_limits": [float(x) if np.isfinite(x) else None for x in joint_limits(robot).torque],
-            **write_robot(robot),
-        }
-        for name, robot, parameters in zip(cell.names, cell.robots, cell.parameters, strict=True)
-    ]
-
-
-def versions() -> dict[str, str]:
-    """Versions of the packages that determine the numbers."""
-    return {package: _version(package) for package in ("synctrl", "pin", "numpy", "scipy")}
-
-
-@cache
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "not installed as a package"
-
-
 def _check_names(where: str, entries: Any, taken: Collection[str]) -> None:
     if not isinstance(entries, Mapping):
         raise InputError.expected("entries by name", entries, where, shown=f"{entries!r:.80}")
@@ -277,6 +202,13 @@ def _check_names(where: str, entries: Any, taken: Collection[str]) -> None:
         if not isinstance(name, str) or not name.isidentifier() or name in taken:
             text = f"expected names that are not taken, found {name!r:.80}"
             raise InputError(text, subject=where, found=name)
+
+
+def _check_outputs(where: str, outputs: Any, taken: Collection[str], lengths: Mapping[str, int]) -> None:
+    """Outputs by name, of a plant or of a network."""
+    _check_names(where, outputs, taken)
+    for name, output in outputs.items():
+        _check_output(f"{where}, {name}", output, lengths)
 
 
 def _check_output(where: str, output: Any, lengths: Mapping[str, int]) -> None:

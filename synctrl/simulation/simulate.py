@@ -23,29 +23,26 @@ from typing import Any
 import numpy as np
 
 from ..checks import boolean, choice, instance, label, positive_number
-from ..control.adaptation import Adaptation, bounded
+from ..control.adaptation import Adaptation
 from ..control.admittance import Admittance
 from ..control.agent import Agent, agents_of
 from ..control.controller import Controller
 from ..control.discrete import DiscreteController
 from ..control.gains import Gains
 from ..control.laws import Law
-from ..control.network import Communication
+from ..control.network import Communication, Network
 from ..coupling.cell import Cell
-from ..coupling.member_checks import warn_of_unasked_friction
-from ..errors import InputError
 from ..renamed import names_elsewhere
 from .clock import TIE, make_clock, multiple
 from .closed_loop import ClosedLoop
 from .devices import Actuator, Devices, Sensor
-from .engines import Engine, Run, find_engine, run_adaptive
+from .engines import Engine, Run, carry_out
 from .guard import Progress
-from .integrators import ADAPTIVE, check_method
-from .limits import warn_of_saturation
+from .limits import learning_within
 from .plant import PHYSICS, Plant, torque_limits
 from .result import Result
 from .schedules import Disturbance, DisturbanceSchedule, Payload
-from .step_error import StepError, warn_of_step
+from .step_error import StepError
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +105,7 @@ class Experiment:
         """The differential equation of this experiment; `plant` as in `simulate`."""
         cell = self.told_cell
         body = self.plant_type(cell, physics=plant, payloads=self.payloads, saturate=self.saturate)
-        gains, adaptation = self._learning(body)
+        gains, adaptation = learning_within(body, self.gains, self.adaptation)
         controller = Controller(
             cell,
             gains,
@@ -125,15 +122,9 @@ class Experiment:
     @property
     def told_cell(self) -> Cell:
         """The cell as its robots are told of it, whose clocks the network may have put ahead."""
-        clocks = getattr(self.network, "clocks", None)
-        return self.cell if clocks is None else self.cell.with_clocks(self.cell.clocks + clocks(self.cell.n))
-
-    def _learning(self, plant: Plant) -> tuple[Gains, Adaptation | None]:
-        """Gains and adaptation of the controller: (14) is bounded where its torque may be cut off."""
-        Gamma = self.gains.Gamma
-        if self.adaptation is not None or Gamma is None or not np.isfinite(plant.torque_limits).any():
-            return self.gains, self.adaptation
-        return self.gains.replace(Gamma=None), bounded(self.cell, Gamma, plant.schedule.carried)
+        if not isinstance(self.network, Network):
+            return self.cell
+        return self.cell.with_clocks(self.cell.clocks + self.network.clocks(self.cell.n))
 
     def simulate(
         self,
@@ -174,7 +165,7 @@ class Experiment:
             GainWarning, RobotWarning: forces inside an object may grow; nobody says if stated friction acts.
         """
         run = self.plan(duration, dt, control_period, plant, log_dt)
-        return _carry_out(run, integrator, engine, (rtol, atol), progress)
+        return carry_out(run, integrator, engine, (rtol, atol), progress)
 
     def controller(
         self, period: float, *, include_gravity: bool = True, faults: str = "error"
@@ -272,34 +263,6 @@ def simulate(
     given = dict(locals())  # every argument by its name
     experiment = Experiment(**{field.name: given.pop(field.name) for field in fields(Experiment)})
     return experiment.simulate(**given)
-
-
-def _carry_out(
-    run: Run,
-    integrator: str,
-    engine: str | Engine,
-    tolerances: tuple[float, float],
-    progress: Progress | None,
-) -> Result:
-    """Check what is left to be checked, and make a run."""
-    choice("integrator", integrator, ("rk4", *ADAPTIVE))
-    by = find_engine(engine)
-    if progress is not None and not callable(progress):
-        raise InputError.expected("a function of the time reached", progress, "progress")
-    rtol, atol = (positive_number(*each) for each in zip(("rtol", "atol"), tolerances, strict=True))
-    if adaptive := integrator != "rk4":
-        check_method(integrator, engine, run.info["control_period"])
-    elif (reason := by.refuses(run)) is not None:
-        raise InputError(reason, subject="engine")
-    else:
-        run.check_step()
-    run.check()
-    warn_of_unasked_friction(run.experiment.cell)
-    run.loop.warn()
-    result = run_adaptive(run, integrator, rtol, atol, progress) if adaptive else by.run(run, progress)
-    warn_of_step(result.info["step_error"], result.names, run.info["dt"])
-    warn_of_saturation(result)
-    return result
 
 
 __getattr__ = names_elsewhere(__name__, ".engines", "run_reference")

@@ -32,6 +32,21 @@ from .factors import (
     weights,
 )
 from .journal import load, trajectories
+from .network_factors import (
+    network_burst_end,
+    network_burst_start,
+    network_delay,
+    network_event,
+    network_heartbeat,
+    network_horizon,
+    network_jitter,
+    network_loss,
+    network_offset,
+    network_omega,
+    network_period,
+    network_receiver,
+    network_seed,
+)
 from .sweep import Sweep
 
 __all__ = [
@@ -58,6 +73,19 @@ __all__ = [
     "load",
     "model_error",
     "network",
+    "network_burst_end",
+    "network_burst_start",
+    "network_delay",
+    "network_event",
+    "network_heartbeat",
+    "network_horizon",
+    "network_jitter",
+    "network_loss",
+    "network_offset",
+    "network_omega",
+    "network_period",
+    "network_receiver",
+    "network_seed",
     "noise",
     "noise_seed",
     "torque_lag",

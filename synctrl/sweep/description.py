@@ -15,7 +15,7 @@ from ..analysis.metrics import ERRORS, Band, checked_band
 from ..checks import count, instance, positive_number
 from ..errors import InputError, ResultError
 from ..files import read_regular
-from ..simulation.recorder import describe_run
+from ..simulation.description import describe_run
 from ..simulation.schedules import DisturbanceSchedule
 from .distributions import Values, described
 from .factors import Setup

@@ -136,29 +136,29 @@ def true_parameters(values: Values, robot: int | None = None, body: int | None =
         values: factors above 0.
         robot, body: which ones, counted from 0; by default all.
     """
-    return _indexed("true_parameters", values, variations.with_scaled_bodies, robot=robot, body=body)
+    return indexed("true_parameters", values, variations.with_scaled_bodies, robot=robot, body=body)
 
 
 def initial_estimates(values: Values, robot: int | None = None) -> Factor:
     """Factor by which the initial estimates theta_hat(0) are multiplied."""
-    return _indexed("initial_estimates", values, variations.with_scaled_estimates, robot=robot)
+    return indexed("initial_estimates", values, variations.with_scaled_estimates, robot=robot)
 
 
 def model_error(values: Values, robot: int | None = None) -> Factor:
     """Relative error of the initial estimates: theta_hat(0) = (1 + value) theta; -1 is to know nothing."""
-    return _indexed("model_error", values, variations.with_model_error, robot=robot)
+    return indexed("model_error", values, variations.with_model_error, robot=robot)
 
 
 def initial_positions(values: Values, robot: int | None = None, joint: int | None = None) -> Factor:
     """Angle (or length) that is added to initial joint positions, rad (or m)."""
     change = partial(variations.with_moved_start, quantity="q0")
-    return _indexed("initial_positions", values, change, robot=robot, joint=joint)
+    return indexed("initial_positions", values, change, robot=robot, joint=joint)
 
 
 def initial_velocities(values: Values, robot: int | None = None, joint: int | None = None) -> Factor:
     """Velocity that is added to initial joint velocities, rad/s (or m/s)."""
     change = partial(variations.with_moved_start, quantity="v0")
-    return _indexed("initial_velocities", values, change, robot=robot, joint=joint)
+    return indexed("initial_velocities", values, change, robot=robot, joint=joint)
 
 
 def disturbance_scale(values: Values, disturbance: int = 0) -> Factor:
@@ -175,7 +175,7 @@ def disturbance_start(values: Values, disturbance: int = 0) -> Factor:
 
 def weights(values: Values, robot: int | None = None) -> Factor:
     """Factor by which the coupling's weights c_i are multiplied."""
-    return _indexed("weights", values, variations.with_scaled_weights, robot=robot)
+    return indexed("weights", values, variations.with_scaled_weights, robot=robot)
 
 
 def control_period(values: Values) -> Factor:
@@ -200,7 +200,7 @@ def _keep(experiment: Experiment, value: Value) -> Experiment:
     return experiment
 
 
-def _indexed(name: str, values: Values, change: Change, **indices: int | None) -> Factor:
+def indexed(name: str, values: Values, change: Change, **indices: int | None) -> Factor:
     """A factor that concerns what has these indices, counted from 0; None stands for all of it."""
     return Factor(_name(name, **indices), values, partial(change, **indices))
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..analysis.metrics import Band, settling_bands
 from ..checks import choice, count, index, instance, positive_number
 from ..errors import InputError, SimulationError
-from ..simulation.recorder import versions
+from ..simulation.description import versions
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .description import checked_bands, describe_base

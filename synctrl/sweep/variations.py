@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..checks import index
+from ..control.network import Ideal, Network
 from ..coupling.cell import Cell, Member
 from ..coupling.coupling import Coupling
 from ..errors import InputError
@@ -105,6 +106,32 @@ def with_scaled_weights(experiment: Experiment, value: float, robot: int | None 
     return replace(experiment, cell=Cell(cell.members, coupling, cell.space, cell.name))
 
 
+def with_setting(experiment: Experiment, value: Value, setting: str) -> Experiment:
+    """Another value for a setting of the network."""
+    return replace(experiment, network=_network(experiment).replace(**{setting: value}))
+
+
+def with_seed(experiment: Experiment, value: float) -> Experiment:
+    """Another seed of the network, a whole number that a table may have as a float."""
+    whole = isinstance(value, float) and value.is_integer()
+    return with_setting(experiment, int(value) if whole else value, "seed")
+
+
+def with_burst(experiment: Experiment, value: float, part: int) -> Experiment:
+    """Another probability for links to turn bad, part 0, or to heal, part 1."""
+    burst = list(_network(experiment).burst or (0.0, 1.0))
+    burst[part] = value
+    return replace(experiment, network=_network(experiment).replace(burst=burst))
+
+
+def with_clock(experiment: Experiment, value: float, robot: int | None = None) -> Experiment:
+    """Clocks of one robot or of all that are ahead, s."""
+    network, n = _network(experiment), experiment.cell.n
+    offset = network.clocks(n)
+    offset[_index("robot", robot, n)] = value
+    return replace(experiment, network=network.replace(offset=offset))
+
+
 def scaled_coupling(coupling: Coupling, m: int, scale: np.ndarray) -> Coupling:
     """A coupling with its weights times a number for each robot, (n, 1, 1); in space of dimension m."""
 
@@ -143,6 +170,20 @@ def _fit(matrix: np.ndarray, robot: Robot) -> np.ndarray:
     states = rng.uniform(-2, 2, (20, 3, robot.nv))
     Y = np.concatenate([robot.regressor(q, v, v, a) for q, v, a in states])
     return np.linalg.lstsq(Y @ matrix, Y @ robot.inertial_parameters, rcond=None)[0]
+
+
+def _network(experiment: Experiment) -> Network:
+    """The network of an experiment, whose settings are known.
+
+    Raises:
+        InputError: it is of another kind.
+    """
+    network = experiment.network
+    if isinstance(network, Network):
+        return network
+    if not isinstance(network, Ideal | None):
+        raise InputError.expected("a Network, which has settings", type(network).__name__, "network")
+    return Network()
 
 
 def _with_members(

@@ -147,7 +147,8 @@ class Proof(NamedTuple):
 
     Attributes:
         energies: terms of V beside the kinetic energy and the storage of the adaptation, N·m, not below 0.
-        rates: their time derivatives by the chain rule, N·m/s, under the same names.
+        rates: their time derivatives by the chain rule, N·m/s, under the same names; sigma stands in them
+            where E' is, and nowhere else.
         powers: the terms of V' that remain of them, N·m/s, not above 0.
     """
 

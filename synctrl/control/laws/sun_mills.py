@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...checks import choice
+from ...checks import boolean, choice
 from ...coupling.cell import Cell
 from ...errors import InputError
 from ..gains import Gains, spread
@@ -29,22 +29,27 @@ class SunMills:
     Args:
         reference_acceleration: "exact", the derivative of xref', or "paper", as (13) prints it.
         k_r_space: "joint" for damping K_r s_q, or "task" for J^T K_r c^-1 r.
+        injection: whether the torque has a/(4 Lambda) J^T c^T K_eps r as well, a the largest entry of the
+            diagonal of S^T S: as much damping as any constant delay between robots may take.
 
     Raises:
-        InputError: an unknown word.
+        InputError: an unknown word, or no bool.
     """
 
     statement = (
         "e and epsilon go to zero, parameters known or not; with xref'' of (13) under the gain condition"
     )
 
-    def __init__(self, reference_acceleration: str = "exact", k_r_space: str = "joint"):
+    def __init__(
+        self, reference_acceleration: str = "exact", k_r_space: str = "joint", injection: bool = False
+    ):
         self.reference_acceleration = choice(
             "reference_acceleration", reference_acceleration, REFERENCE_ACCELERATIONS
         )
         self.k_r_space = choice("k_r_space", k_r_space, K_R_SPACES)
+        self.injection = boolean("injection", injection)
 
-    def bind(self, cell: Cell, gains: Gains) -> BoundSunMills:
+    def bind(self, cell: Cell, gains: Gains) -> BoundSunMills | BoundInjection:
         """This law for a cell.
 
         Raises:
@@ -56,13 +61,19 @@ class SunMills:
         if (leak > Lambda).any():
             found = float(leak[leak > Lambda][0])
             raise InputError.expected("rates up to Lambda, beyond which nothing is proved", found, "leak")
-        return BoundSunMills(Lambda, beta, K_eps, self.reference_acceleration, leak)
+        law = BoundSunMills(Lambda, beta, K_eps, self.reference_acceleration, leak)
+        if not self.injection:
+            return law
+        starts, _, entries = cell.coupling.incidence
+        a = np.add.reduceat(entries**2, starts[:-1]).max()
+        return BoundInjection(law, a / (4 * Lambda) * K_eps)
 
     def as_dict(self) -> dict[str, Any]:
         return {
             "name": "SunMills",
             "reference_acceleration": self.reference_acceleration,
             "k_r_space": self.k_r_space,
+            **({"injection": True} if self.injection else {}),
         }
 
 
@@ -141,3 +152,27 @@ class BoundSunMills:
                 **lost,
             },
         )
+
+
+class BoundInjection:
+    """`BoundSunMills` with damping of r beside its force, J^T c^T B r.
+
+    Args:
+        law: the law.
+        injection: B, (m,), N·m·s if weights have no unit.
+    """
+
+    statement = SunMills.statement
+
+    def __init__(self, law: BoundSunMills, injection: np.ndarray):
+        self.law, self.injection = law, injection
+
+    def command(self, errors: Errors) -> Asked:
+        asked = self.law.command(errors)
+        r = asked.u[0] - np.matvec(errors.c, errors.x_dot)
+        return asked._replace(force=asked.force + np.matvec(errors.c.mT, self.injection * r))
+
+    def proof(self, along: Along) -> Proof:
+        """That of the law, and what B takes of the kinetic energy."""
+        proof = self.law.proof(along)
+        return proof._replace(powers={**proof.powers, "injection": -along.r * self.injection * along.r})

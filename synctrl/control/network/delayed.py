@@ -2,8 +2,8 @@
 
 What was said is kept at instants of a grid, and Hermite's polynomial of degree five is laid through W and its
 first two derivatives. What is believed of w is the derivative of what is believed of W, exactly, and so
-on: nothing jumps, and the proof for constant delays holds as it stands. Before the beginning w was what it is
-then, and W = t w.
+on: nothing jumps, and the proof for constant delays holds as it stands. Before the beginning W = t w with the
+w of then.
 """
 
 from __future__ import annotations
@@ -14,10 +14,14 @@ import numpy as np
 
 from ...coupling.cell import Cell
 from ...errors import InputError
-from .w_form import WForm
+from .w_form import ASK, WForm, check_number
 
+#: the theorem that covers it
+DELAYS = "constant delays"
 #: longest step of the grid, s
 GRID = 2e-3
+#: shortest one, s
+FINEST = 1e-9
 #: how many steps of it may be kept
 LONGEST = 4096
 #: how far an instant may be from the grid, as a share of its step
@@ -40,23 +44,29 @@ class BoundDelayed(WForm):
         delay: as given.
 
     Raises:
-        InputError: the longest delay is too many times the shortest.
+        InputError: a delay that is too short, or too many times the shortest one.
     """
 
     continuous = True
+    theorem = DELAYS
 
     def __init__(self, cell: Cell, leak: np.ndarray, delay: np.ndarray):
         late = delay[delay > 0]
         self.delay, self._step = delay, float(min(GRID, late.min()))
-        places = int(np.ceil(late.max() / self._step)) + 3
-        if places > LONGEST:
+        if self._step < FINEST:
+            raise InputError.expected(f"delays of 0 or at least {FINEST:g} s", self._step, "delay")
+        room = LONGEST * self._step
+        if late.max() > room:
             raise InputError.expected(
-                f"delays up to {LONGEST - 3:d} times the shortest of them, {self._step:g} s",
-                late.max(),
+                f"delays up to {room:g} s, {LONGEST} steps of {self._step:g} s, which are no longer than the "
+                "shortest delay",
+                float(late.max()),
                 "delay",
             )
+        places = int(np.ceil(late.max() / self._step)) + 3
         n, m = cell.n, cell.m
         super().__init__(cell, leak, begun=(1,), since=(1,), first=(n, m), kept=(places, n, 3, m))
+        self.suspicion = f"robots hear each other up to {late.max():g} s late; {ASK}"
         self._places, self._at_once = places, delay == 0
         self._coefficients = hermite() * self._step ** (np.arange(6) % 3)  # of derivatives by time
         late_sums = np.unique(np.add.outer(np.append(0.0, late), late))
@@ -72,12 +82,14 @@ class BoundDelayed(WForm):
         W, W_dot, W_ddot = self._interpolated(u, rows)
         found = np.array((W, W_dot + self.leak * W, W_ddot + self.leak * W_dot))
         w, early = now.first[sender], t < now.since[0] + self.delay
-        found[:, early] = np.array(((then - now.since[0])[:, None] * w, w, 0 * w))[:, early]
+        W = (then - now.since[0])[:, None] * w
+        found[:, early] = np.array((W, w + self.leak * W, self.leak * w))[:, early]
         found[:, self._at_once] = own[:, sender[self._at_once]]
         return found
 
     def messages(self, start: float, end: float) -> np.ndarray:
         """The grid, and instants at which a derivative of what is heard may jump, start <= t < end, s."""
+        check_number(start, end, self._step, "delay")
         grid = self._step * np.arange(np.floor(start / self._step), np.ceil(end / self._step) + 1)
         found = np.unique(np.concatenate((grid, self._kinks)))
         return found[(found >= start) & (found < end)]

@@ -14,9 +14,9 @@ from what they hear would disagree for ever.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from copy import copy
-from math import prod
 from types import SimpleNamespace
 from typing import Any
 
@@ -66,7 +66,7 @@ class Links:
         return len(self.hearer)
 
     def shares(self, own: np.ndarray, heard: np.ndarray) -> np.ndarray:
-        """E, sigma and sigma', (3, n, m).
+        """E, sigma and sigma', (3, n, m), or some of them.
 
         Args:
             own: W, w and w' of every robot, as it knows them, (3, n, m).
@@ -74,6 +74,18 @@ class Links:
         """
         told = self._A @ heard.transpose(1, 0, 2).reshape(self.count, -1)
         return self.own * own + told.reshape(own.shape[1], *own.shape[::2]).transpose(1, 0, 2)
+
+    @property
+    def share(self) -> float:
+        """How much a robot hears of others beside what it hears of itself.
+
+        With D the diagonal of S^T S it is the largest eigenvalue of D^-1/2 |A| D^-1/2. It is at most 1 in a
+        coupling of pairs, because 2 |S_ki x_i S_kj x_j| <= (S_ki x_i)^2 + (S_kj x_j)^2.
+        """
+        n = len(self.own)
+        A, scale = np.zeros((n, n)), 1 / np.sqrt(self.own[:, 0])
+        A[self.hearer, self.sender] = np.abs(self.weight)
+        return float(np.linalg.eigvalsh(scale[:, None] * A * scale)[-1])
 
     def of(self, matrix: np.ndarray) -> np.ndarray:
         """The entries of a setting, a number or (n, n), for every link, (l,)."""
@@ -85,12 +97,17 @@ class Parts:
 
     Args:
         shapes: of the parts, by name.
+
+    Attributes:
+        size: of the vector.
+        starts: where each part begins, by name.
     """
 
     def __init__(self, shapes: Mapping[str, tuple[int, ...]]):
-        sizes = [prod(shape) for shape in shapes.values()]
+        sizes = [math.prod(shape) for shape in shapes.values()]
         ends = np.cumsum(sizes).tolist()
         self.size = ends[-1]
+        self.starts = {name: end - size for name, size, end in zip(shapes, sizes, ends, strict=True)}
         self._parts = [
             (name, slice(end - size, end), shape)
             for (name, shape), size, end in zip(shapes.items(), sizes, ends, strict=True)

@@ -15,6 +15,8 @@ from .protocol import BoundNetwork
 
 #: how far beyond an interval a message may be that counts as in it, as a share of its ends
 ROUNDING = 1e-12
+#: how far from a sample a message may be that comes with it, as a share of the period
+GRID = 1e-9
 
 
 class Messages:
@@ -51,6 +53,17 @@ class Messages:
                 f"instants in order with {start:g} <= t < {end:g} s", times, where, shown=f"{times!s:.80}"
             )
         return times.tolist()
+
+    @staticmethod
+    def end(sample: Any, period: float, start: float = 0.0) -> Any:
+        """Before this time, s, a message is due with a sample or with one before; roundings do not matter.
+
+        Args:
+            sample: number of the sample, or of several, (k,).
+            period: between two samples, s.
+            start: when the first one is, s.
+        """
+        return start + (sample + GRID) * period
 
     def received(
         self, times: Sequence[float], reference: Reference, motion: np.ndarray, memory: np.ndarray

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from inspect import signature
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import choice, count, finite_array, positive_number
+from ...checks import choice, positive_number
 from ...coupling.cell import Cell
 from ...errors import InputError
 from ..gains import Gains, spread
@@ -16,18 +16,31 @@ from .delayed import BoundDelayed
 from .links import Links
 from .posted import BoundPosted, Traffic
 from .receivers import Extrapolate, Filter, Hold, Receiver
+from .settings import (
+    above_0,
+    burst_of,
+    is_given,
+    not_too_large,
+    of_pairs,
+    plain,
+    probability,
+    row_of,
+    seed_of,
+)
 from .w_form import WForm
 
 RECEIVERS = "hold", "filter", "extrapolate"
-#: settings that only messages have, with what they are if nobody gives them
-OF_MESSAGES = {"jitter": 0.0, "loss": 0.0, "burst": None, "event": None, "heartbeat": None}
+#: settings that only messages have
+OF_MESSAGES = "jitter", "loss", "burst", "event", "heartbeat"
+#: how many messages of a robot may be on the way at once: they are all part of the state
+ON_THE_WAY = 10_000
 
 
 class Network:
     """Robots that tell each other what they know of their own errors, in the W form, see `Links`.
 
-    Delay, jitter and loss may be numbers or (n, n), where entry [i, j] is of what robot i hears from robot j;
-    times are in s.
+    Delay, jitter and loss may be numbers or (n, n), where entry [i, j] is of what robot i hears from robot j,
+    and the diagonal does not count; times are in s.
 
     Args:
         period: between two messages of a robot; None for exchange in continuous time, with exact delays.
@@ -66,14 +79,14 @@ class Network:
         seed: int = 0,
         horizon: float | None = None,
     ):
-        self.period = None if period is None else positive_number("period", period)
-        self.delay, self.jitter = (_at_least_0(k, v) for k, v in (("delay", delay), ("jitter", jitter)))
-        self.loss, self.burst = _probability("loss", loss), _burst(burst)
-        self.offset = finite_array("offset", offset)
-        self.event = None if event is None else _above_0("event", event)
+        self.period = None if period is None else not_too_large("period", positive_number("period", period))
+        self.delay, self.jitter = of_pairs("delay", delay), of_pairs("jitter", jitter)
+        self.loss, self.burst = probability("loss", loss), burst_of(burst)
+        self.offset = not_too_large("offset", row_of("offset", offset))
+        self.event = None if event is None else above_0("event", event)
         self.heartbeat = None if heartbeat is None else positive_number("heartbeat", heartbeat)
         self.receiver = choice("receiver", receiver, RECEIVERS)
-        self.omega, self.seed = positive_number("omega", omega), count("seed", seed, least=0)
+        self.omega, self.seed = not_too_large("omega", positive_number("omega", omega)), seed_of(seed)
         self.horizon = None if horizon is None else positive_number("horizon", horizon)
         self._check()
 
@@ -96,21 +109,38 @@ class Network:
         share = float(Links(cell.coupling).own.max(initial=0.0)) * float(beta.max(initial=0.0))
         return self._bound(cell, leak, 1 / share if share > 0 else np.inf)
 
+    def replace(self, **changes: Any) -> Self:
+        """This network with some of its settings changed.
+
+        Raises:
+            InputError: no setting of that name, or values that such a network cannot have.
+        """
+        known = signature(Network).parameters
+        if unknown := sorted(set(changes) - set(known)):
+            raise InputError.expected(f"some of {', '.join(known)}", ", ".join(unknown), "network")
+        return type(self)(**{**vars(self), **changes})
+
     def as_dict(self) -> dict[str, Any]:
         """Name, and the settings that are not what they are by default, as plain data."""
-        default = {name: parameter.default for name, parameter in signature(Network).parameters.items()}
-        own = {name: plain(value) for name, value in vars(self).items()}
-        return {"name": "Network", **{k: v for k, v in own.items() if v != default.get(k)}}
+        return {"name": "Network", **self._given()}
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{k}={v!r}' for k, v in self._given().items())})"
 
     # -- internals ----------------------------------------------------------------------------------------
 
+    def _given(self) -> dict[str, Any]:
+        """The settings that are not what they are by default, as plain data."""
+        default = {name: parameter.default for name, parameter in signature(Network).parameters.items()}
+        own = {name: plain(value) for name, value in vars(self).items()}
+        return {name: value for name, value in own.items() if value != default[name]}
+
     def _check(self) -> None:
         """Refuse settings that do not go together."""
-        given = {name: plain(getattr(self, name)) != plain(default) for name, default in OF_MESSAGES.items()}
-        if self.period is None and any(given.values()):
-            name = next(name for name, is_given in given.items() if is_given)
-            found = plain(getattr(self, name))
-            raise InputError.expected("a period with it: only messages have one", found, name)
+        given = [name for name in OF_MESSAGES if is_given(getattr(self, name))]
+        if self.period is None and given:
+            found = plain(getattr(self, given[0]))
+            raise InputError.expected("a period with it: only messages have one", found, given[0])
         if self.heartbeat is not None and self.event is None:
             raise InputError.expected("an event with it", self.heartbeat, "heartbeat")
         if self.horizon is not None and self.receiver != "extrapolate":
@@ -121,11 +151,12 @@ class Network:
         delay, jitter, loss = (links.of(self._of_links(name, cell.n)) for name in ("delay", "jitter", "loss"))
         self.clocks(cell.n)
         if self.period is not None:
-            oldest = self.period + float((delay + jitter).max(initial=0.0))
+            longest = float((delay + jitter).max(initial=0.0))
+            self._check_on_the_way(longest)
             event = None if self.event is None else spread("event", self.event, (cell.m,))
             heartbeat = np.inf if self.heartbeat is None else self.heartbeat
             traffic = Traffic(self.period, delay, jitter, loss, self.burst, event, heartbeat, self.seed)
-            return BoundPosted(cell, leak, self._receiver(oldest, limit), traffic)
+            return BoundPosted(cell, leak, self._receiver(self.period + longest, limit), traffic)
         return BoundDelayed(cell, leak, delay) if delay.any() else WForm(cell, leak)
 
     def clocks(self, n: int) -> np.ndarray:
@@ -135,6 +166,15 @@ class Network:
             InputError: for another number of robots.
         """
         return spread("offset", self.offset, (n,))
+
+    def _check_on_the_way(self, longest: float) -> None:
+        """Refuse messages that need longer than the state can keep them, s."""
+        room = ON_THE_WAY * (self.period or 0.0)
+        if longest > room:
+            raise InputError.expected(
+                f"delay and jitter up to {room:g} s, with which {ON_THE_WAY} messages of a robot are on "
+                "the way at once", longest, "delay",
+            )  # fmt: skip
 
     def _of_links(self, name: str, n: int) -> np.ndarray:
         """A setting of every link, (n, n)."""
@@ -165,48 +205,3 @@ class Network:
                 oldest, "receiver='extrapolate'",
             )  # fmt: skip
         return Extrapolate(horizon)
-
-
-def plain(value: Any) -> Any:
-    """A setting as plain data."""
-    return (
-        value.tolist()
-        if isinstance(value, np.ndarray)
-        else list(value)
-        if isinstance(value, tuple)
-        else value
-    )
-
-
-def _at_least_0(name: str, value: ArrayLike) -> np.ndarray:
-    array = finite_array(name, value)
-    if array.min(initial=0.0) < 0:
-        raise InputError.expected("times of at least 0, s", float(array.min()), name)
-    return array
-
-
-def _above_0(name: str, value: ArrayLike) -> np.ndarray:
-    array = finite_array(name, value)
-    if array.min(initial=np.inf) <= 0:
-        raise InputError.expected("numbers above 0", float(array.min()), name)
-    return array
-
-
-def _probability(name: str, value: ArrayLike) -> np.ndarray:
-    array = _at_least_0(name, value)
-    if array.max(initial=0.0) >= 1:
-        raise InputError.expected(
-            "probabilities below 1, or nothing would ever come", float(array.max()), name
-        )
-    return array
-
-
-def _burst(value: Any) -> tuple[float, float] | None:
-    """Probabilities of turning bad, and of healing."""
-    if value is None:
-        return None
-    turns, heals = finite_array("burst", value, (2,)).tolist()
-    if not (0 <= turns <= 1 and 0 < heals <= 1):
-        wanted = "probabilities of turning bad, 0 to 1, and of turning good, above 0"
-        raise InputError.expected(wanted, (turns, heals), "burst")
-    return turns, heals

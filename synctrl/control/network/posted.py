@@ -21,8 +21,10 @@ import numpy as np
 from ...coupling.cell import Cell
 from .links import Links
 from .receivers import Receiver
-from .w_form import WForm
+from .w_form import ASK, WForm, check_number
 
+#: the theorem that covers it, with a filter
+FILTER = "a filter under any loss"
 #: stands for an instant that does not come, in a memory of finite numbers, s
 NEVER = 1e300
 #: how far an instant may be from the one that it is, as a share of the period
@@ -91,7 +93,10 @@ class BoundPosted(WForm):
             stamps=(places,), letters=(places, n, rows, m), arrivals=(places, l), bad=(l,), sent=(n,),
             come=(l,), told=(n * tells, 1 + 2 * m),
         )  # fmt: skip
-        self.receiver, self.traffic = receiver, traffic
+        self.receiver, self.traffic, self.jumps = receiver, traffic, receiver.jumps
+        self.theorem = None if receiver.jumps else FILTER
+        advice = "it jumps then; send more often, or use receiver='filter'" if self.jumps else ASK
+        self.suspicion = f"robots hear each other by messages every {traffic.period:g} s: {advice}"
         self._chances: Callable[[int], np.ndarray] = lru_cache(4 * places + 16)(self._draw)
 
     def start(self) -> np.ndarray:
@@ -105,11 +110,19 @@ class BoundPosted(WForm):
     def memory_rates(self, t: float, memory: np.ndarray) -> Mapping[str, np.ndarray]:
         return self.receiver.rates(self.parts(memory))
 
+    def gap(self, t: float, memory: np.ndarray) -> np.ndarray:
+        found = self.receiver.gap(t, self.parts(memory), self.leak)
+        return self.links.shares(np.zeros((2, len(self.links.own), found.shape[-1])), found)
+
+    def outside(self) -> str | None:
+        return "what robots believe of each other jumps at messages" if self.jumps else None
+
     # -- messages -----------------------------------------------------------------------------------------
 
     def messages(self, start: float, end: float) -> np.ndarray:
         """Instants at which messages are sent or may arrive, with start <= t < end, s."""
         period, longest = self.traffic.period, self.traffic.on_the_way
+        check_number(start, end, period, "period")
         first = max(0, int(np.floor(start / period)) - longest)
         numbers = np.arange(first, int(np.ceil(end / period)) + 1)
         sent = numbers * period

@@ -40,6 +40,10 @@ class BoundNetwork(Protocol):
     - `leak`, (m,), 1/s, the rate at which its integrals are forgotten, which has to be that of the gains.
     - `outside`, without arguments: what the theorem does not know of it, in words, or None if the theorem
       holds with it. Without one its runs are outside the theorem, and certificates say so.
+    - `jumps`, whether what robots know of each other jumps at its messages; by default it does, if there are
+      any, and V with it.
+    - `gap(t, memory)`: what the rates of E and sigma have beyond sigma - leak E and sigma', (2, n, m), where
+      the laws do not get what they need.
     - `messages(start, end)` and `meet(t, w, memory)`: the instants of its messages with start <= t < end, in
       order, s, and its memory after the one at instant t, with w as in `exchange`; without side effects. With
       continuous control a message arrives at its instant, with sampled control at the first sample that is
