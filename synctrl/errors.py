@@ -165,8 +165,8 @@ class SimulationError(SynctrlError):
         robot: index of the robot concerned, counted from 0, or None.
         joint: index of its joint, counted from 0, or None if it is not about one.
         cause: why, as one word: "disturbance", "step", "period", "Lambda", "beta", "K_r", "K_eps", "Gamma",
-            "friction", "start", "singular", "orientation", "unstable"; "motion", "weights" or "part" where
-            what a user wrote gives no finite numbers; None if it is of another kind.
+            "friction", "network", "start", "singular", "orientation", "unstable"; "motion", "weights" or
+            "part" where what a user wrote gives no finite numbers; None if it is of another kind.
     """
 
     def __init__(

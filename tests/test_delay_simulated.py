@@ -12,6 +12,7 @@ from synctrl import Cell, Experiment, Member, Network
 from synctrl.analysis import DelayMargin, delay_margin
 from synctrl.analysis.period_margin import Exchange, sampled_growth
 from synctrl.errors import StepWarning
+from synctrl.simulation.devices import DeadTime, DifferencedVelocity, Lag
 
 #: how far joint 6 of one robot begins off its place, rad; the other one as far to the other side
 HAIR = 1e-7
@@ -77,3 +78,24 @@ def test_the_nonlinear_cell_grows_from_message_to_message_as_the_frozen_one(
     expected = sampled_growth(margin.frozen, Exchange(period, delay, receiver, 100.0))
     assert root(x[6:], period, 1).real == pytest.approx(expected, rel=0.05)
     assert expected > 1.0
+
+
+SENSING = [DifferencedVelocity(200.0)]
+
+
+@pytest.mark.parametrize(
+    ("sensors", "actuators"), [((), ()), (SENSING, ()), (SENSING, [DeadTime(2e-3), Lag(2e-3)])]
+)
+def test_the_nonlinear_cell_grows_with_its_devices_as_the_frozen_one(cell, sensors, actuators):
+    """What is heard at a sample is as old as the delay exactly, as messages come with the samples."""
+    T, delay = 4e-3, 0.036
+    network = Network(period=T, delay=delay, receiver="hold")
+    experiment = Experiment(
+        cell, GAINS.replace(Gamma=0.0), 0.7, network=network, sensors=sensors, actuators=actuators
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        error = experiment.simulate(dt=T, control_period=T).tracking_error[75:]
+    s = root(error[:, 0, 5] - error[:, 1, 5], T, 6)
+    margin = delay_margin(ur5_joints(), GAINS, sensors=sensors, actuators=actuators, control_period=T)
+    assert s.real == pytest.approx(margin.growth(delay), rel=0.05)

@@ -14,6 +14,7 @@ from ur5_joints import GAINS, ur5_joints
 
 from synctrl.analysis import delay_margin, period_margin
 from synctrl.experiments import a460_pair, mixed_four, panda_four, planar_four, ur5_payload
+from synctrl.simulation.devices import DeadTime, DifferencedVelocity, Lag
 
 PAGE = (Path(__file__).parents[1] / "docs" / "delays.md").read_text("utf-8")
 READY: dict[str, Callable] = {
@@ -30,14 +31,14 @@ DEVICES = {
     "control every 1 ms": {"control_period": 1e-3},
     "control every 1 ms, velocities by a filter of 500 rad/s": {
         "control_period": 1e-3,
-        "sensors": [SimpleNamespace(omega=500.0)],
+        "sensors": [DifferencedVelocity(500.0)],
     },
     "control every 1 ms, velocities by a filter of 200 rad/s": {
         "control_period": 1e-3,
-        "sensors": [SimpleNamespace(omega=200.0)],
+        "sensors": [DifferencedVelocity(200.0)],
     },
-    "torque that lags by 1 ms": {"actuators": [SimpleNamespace(time_constant=1e-3)]},
-    "dead time of 1 ms": {"actuators": [SimpleNamespace(time=1e-3)]},
+    "torque that lags by 1 ms": {"actuators": [Lag(1e-3)]},
+    "dead time of 1 ms": {"actuators": [DeadTime(1e-3)]},
 }
 
 
@@ -79,3 +80,8 @@ def test_a_cell_has_the_margins_of_the_table(name):
 @pytest.mark.parametrize("name", DEVICES)
 def test_devices_leave_the_margin_of_the_table(name):
     assert rows(2)[name] == [shown(delay_margin(ur5_joints(), GAINS, **DEVICES[name]).delay, "every")]
+
+
+def test_four_planar_arms_are_as_slow_at_200_ms_as_the_page_says():
+    paper = planar_four()
+    assert -1 / delay_margin(paper.cell, paper.gains).growth(0.2) == pytest.approx(120, rel=0.02)  # s

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from refusals import refused
@@ -14,6 +12,7 @@ from synctrl.analysis import delay_margin
 from synctrl.analysis.equipped import Equipment, dead_time, equipment, equipped, lag
 from synctrl.analysis.frozen import Frozen, freeze
 from synctrl.errors import InputError
+from synctrl.simulation.devices import DeadTime, DifferencedVelocity, Lag
 
 #: two arms whose damping a lag of some milliseconds does not turn into the opposite
 SOFT = GAINS.replace(Lambda=3.0, beta=3.0, K_r=0.2 * GAINS.K_r, K_eps=10.0)
@@ -66,30 +65,28 @@ def test_the_roots_are_those_of_the_loop_with_the_responses_of_its_parts(frozen,
 
 def test_what_hardly_lags_hardly_moves_the_margin(ur5):
     expected = delay_margin(ur5, SOFT).delay
-    quick = delay_margin(ur5, SOFT, actuators=[SimpleNamespace(time_constant=1e-6)])
+    quick = delay_margin(ur5, SOFT, actuators=[Lag(1e-5)])
     assert quick.delay == pytest.approx(expected, rel=1e-2) and quick.by == "analysis"
 
 
 def test_differences_lag_by_half_a_period_and_their_filter_by_its_time():
     T = 1e-3
-    plain = equipment([SimpleNamespace(omega=None)], control_period=T)
+    plain = equipment([DifferencedVelocity()], control_period=T)
     assert plain.velocity_lag == plain.dead_time == 0.5 * T
-    filtered = equipment([SimpleNamespace(omega=50.0)], control_period=T)
+    filtered = equipment([DifferencedVelocity(50.0)], control_period=T)
     assert filtered.velocity_lag == pytest.approx(1 / 50.0, rel=1e-3)
 
 
 def test_actuators_add_up_and_the_slowest_joint_counts():
-    parts = equipment(
-        actuators=[SimpleNamespace(time_constant=np.array([0.01, 0.02])), SimpleNamespace(time=0.003)]
-    )
+    parts = equipment(actuators=[Lag(np.array([0.01, 0.02])), DeadTime(0.003)])
     assert parts == Equipment(0.0, 0.003, 0.02)
 
 
 def test_a_cell_that_its_actuators_alone_bring_down_has_no_margin(ur5):
-    margin = delay_margin(ur5, GAINS, actuators=[SimpleNamespace(time_constant=0.2)])
+    margin = delay_margin(ur5, GAINS, actuators=[Lag(0.2)])
     assert margin.delay == 0.0 and margin.rate > 0 and "without delay" in str(margin)
 
 
 def test_differences_without_a_period_are_refused(ur5):
     with refused(InputError, "control_period"):
-        delay_margin(ur5, GAINS, sensors=[SimpleNamespace(omega=50.0)])
+        delay_margin(ur5, GAINS, sensors=[DifferencedVelocity(50.0)])

@@ -5,6 +5,7 @@ from .comparison import Comparison, compare, side_by_side
 from .delay_map import DelayMap, delay_map
 from .delay_margin import DelayMargin, delay_margin
 from .period_margin import period_margin
+from .resolution import resolution_error
 
 __all__ = [
     "Certificate",
@@ -16,5 +17,6 @@ __all__ = [
     "delay_map",
     "delay_margin",
     "period_margin",
+    "resolution_error",
     "side_by_side",
 ]

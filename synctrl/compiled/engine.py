@@ -194,10 +194,10 @@ class _Steps:
 
     def _part(self, block: DesiredStretch, first: int, last: int) -> None:
         """Make some steps of a block in one go."""
-        steps, part = block.steps, slice(first, last)
-        joined = self._run.clock.joined(steps.first + first, steps.starts[part])
-        marks = _marks(steps.checked[part], steps.logged[part], self._sampled(steps, part), joined)
-        self._call(block, first, steps.times[first : last + 1], marks, steps.middles[part])
+        self._look_at(block)
+        part = slice(first, last)
+        windows = [each[part] for each in self._windows]
+        self._call(first, block.steps.times[first : last + 1], self._marks[part], windows)
 
     def finish(self) -> None:
         """Log the end of the run: one step of no length, in which acts what acted in the last step."""
@@ -209,29 +209,35 @@ class _Steps:
         if due[0]:
             self._agenda.tell(clock.end, clock.end, self._state)
         before = clock.stretch(clock.steps - 1, clock.steps).middles
-        self._call(block, 0, nothing.times, _marks(yes, yes, due, no), before)
+        self._look_at(block)
+        self._call(0, nothing.times, _marks(yes, yes, due, no), self._acting(before))
 
-    def _sampled(self, steps: Stretch, part: slice) -> np.ndarray:
+    def _sampled(self, steps: Stretch) -> np.ndarray:
         """Whether each step begins with a sample: on multiples of dt, or always if control is continuous."""
         if self._run.every is None:
-            return np.ones(len(steps.starts[part]), dtype=bool)
-        return steps.checked[part] & (steps.number[part] % self._run.every == 0)
+            return np.ones(len(steps.starts), dtype=bool)
+        return steps.checked & (steps.number % self._run.every == 0)
 
-    def _look_at(self, block: DesiredStretch) -> structs.Steps:
-        """The steps of a block."""
-        if block is not self._block:
-            self._program.tell(self._steps, block.desired)
-            self._steps.length, self._block = len(block.steps.starts), block
-        return self._steps
+    def _acting(self, middles: np.ndarray) -> list[np.ndarray]:
+        """Which disturbance and which load acts in steps: what acts in the middle acts in all of one."""
+        schedules = self._run.schedule, self._program.loop.plant.schedule
+        return [schedule.windows(middles).astype(np.intc) for schedule in schedules]
 
-    def _call(
-        self, block: DesiredStretch, first: int, times: np.ndarray, marks: np.ndarray, middles: np.ndarray
-    ) -> None:
-        """Make steps between these times; what acts in the middle of one acts in all of it."""
+    def _look_at(self, block: DesiredStretch) -> None:
+        """Say what is desired and happens in the steps of a block, if that was not said before."""
+        if block is self._block:
+            return
+        steps = block.steps
+        self._program.tell(self._steps, block.desired)
+        self._steps.length, self._block = len(steps.starts), block
+        joined = self._run.clock.joined(steps.first, steps.starts)
+        self._marks = _marks(steps.checked, steps.logged, self._sampled(steps), joined)
+        self._windows = self._acting(steps.middles)
+
+    def _call(self, first: int, times: np.ndarray, marks: np.ndarray, windows: list[np.ndarray]) -> None:
+        """Make steps between these times, with what happens at their starts and acts in them."""
         program, recorder, report = self._program, self._recorder, structs.Report()
-        schedules = self._run.schedule, program.loop.plant.schedule
-        windows = [schedule.windows(middles).astype(np.intc) for schedule in schedules]
-        steps, times = self._look_at(block), np.ascontiguousarray(times)
+        steps, times = self._steps, np.ascontiguousarray(times)
         steps.first, steps.count = first, len(marks)
         arrays = (times, marks, *windows)
         steps.t, steps.marks, steps.disturbed, steps.loaded = (array.ctypes.data for array in arrays)

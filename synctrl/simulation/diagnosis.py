@@ -110,11 +110,21 @@ def find_cause(stop: Stop) -> Cause:
         excesses = [each for each in stop.excesses(driven) if each.share > 1]
         if excesses:
             return _too_fast(stop, excesses)
+        if getattr(stop.loop.controller.network, "jumps", False) and (late := _heard_late(stop)) is not None:
+            return late
     if stop.conditions.max() > NEARLY:
         return _nearly_singular(stop)
     if push is not None and push.acceleration > STRONG:
         return _pushed(stop, push)
-    return _strong_start(stop) or _unclear(stop)
+    return _strong_start(stop) or _heard_late(stop) or _unclear(stop)
+
+
+def _heard_late(stop: Stop) -> Cause | None:
+    """A network that may have done it, by its own words."""
+    words = getattr(stop.loop.controller.network, "suspicion", None)
+    if words is None or stop.calm or stop.h is None:
+        return None
+    return Cause("network", words, *stop.quickest(range(stop.loop.cell.n)))
 
 
 def _pushed(stop: Stop, push: Push) -> Cause:

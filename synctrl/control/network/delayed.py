@@ -14,7 +14,7 @@ import numpy as np
 
 from ...coupling.cell import Cell
 from ...errors import InputError
-from .w_form import WForm, check_number
+from .w_form import ASK, WForm, check_number
 
 #: the theorem that covers it
 DELAYS = "constant delays"
@@ -66,6 +66,7 @@ class BoundDelayed(WForm):
         places = int(np.ceil(late.max() / self._step)) + 3
         n, m = cell.n, cell.m
         super().__init__(cell, leak, begun=(1,), since=(1,), first=(n, m), kept=(places, n, 3, m))
+        self.suspicion = f"robots hear each other up to {late.max():g} s late; {ASK}"
         self._places, self._at_once = places, delay == 0
         self._coefficients = hermite() * self._step ** (np.arange(6) % 3)  # of derivatives by time
         late_sums = np.unique(np.add.outer(np.append(0.0, late), late))

@@ -21,7 +21,7 @@ import numpy as np
 from ...coupling.cell import Cell
 from .links import Links
 from .receivers import Receiver
-from .w_form import WForm, check_number
+from .w_form import ASK, WForm, check_number
 
 #: the theorem that covers it, with a filter
 FILTER = "a filter under any loss"
@@ -95,6 +95,8 @@ class BoundPosted(WForm):
         )  # fmt: skip
         self.receiver, self.traffic, self.jumps = receiver, traffic, receiver.jumps
         self.theorem = None if receiver.jumps else FILTER
+        advice = "it jumps then; send more often, or use receiver='filter'" if self.jumps else ASK
+        self.suspicion = f"robots hear each other by messages every {traffic.period:g} s: {advice}"
         self._chances: Callable[[int], np.ndarray] = lru_cache(4 * places + 16)(self._draw)
 
     def start(self) -> np.ndarray:

@@ -11,6 +11,9 @@ from ...errors import InputError
 from .links import Links, Parts
 from .protocol import Received
 
+#: where a reader finds how late robots may hear each other
+ASK = "synctrl.analysis.delay_margin says how late they may"
+
 #: how many instants of messages are made at once: an hour of one in a millisecond
 MOST = 3_600_000
 
@@ -29,12 +32,14 @@ class WForm:
         leak: as given.
         parts: names for the parts of the memory, a flat vector.
         jumps: whether what robots know of each other jumps at messages.
+        suspicion: what to think of where a run ran away for no other reason, in words, or None.
         theorem: for networks of what kind the proof covers this one, in words; None if it needs none, or
             there is none.
     """
 
     jumps = False
     theorem: str | None = None
+    suspicion: str | None = None
 
     def __init__(self, cell: Cell, leak: np.ndarray, links: Links | None = None, **further: tuple[int, ...]):
         self.links, self.leak = Links(cell.coupling) if links is None else links, leak
