@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..control.laws import DIFFUSION
 from ..errors import InputError
 from ..simulation.plant import Plant
 from ..simulation.result import Result
@@ -238,6 +239,7 @@ def _in_words(run: Replay, name: str) -> str:
 _WORDS = {
     "law": "the force of a law without a proof",
     "network": "what the network keeps robots from knowing",
+    DIFFUSION: "power of diffusive coupling, whose storage is not in V",
     "friction": "friction that the model does not contain",
     "disturbance": "torque from outside",
     "saturation": "torque that saturation takes away, for which no adaptation makes up while it lasts",
