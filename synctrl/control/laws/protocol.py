@@ -147,7 +147,7 @@ class Along:
     e_star: np.ndarray
     r: np.ndarray
     c: np.ndarray
-    slips: np.ndarray
+    slips: Any = None
 
 
 class Proof(NamedTuple):
