@@ -27,6 +27,8 @@ from synctrl.paper.claims_of_cells import a460_claims, own_findings, planar_four
 from synctrl.paper.edge_task import EDGE
 from synctrl.paper.fairness import another_law_does_better, fair_section
 from synctrl.paper.judge import judge_section
+from synctrl.paper.margin_section import margin_section
+from synctrl.paper.network_section import NETWORK
 from synctrl.paper.paper_sections import (
     a460_section,
     honesty_section,
@@ -57,8 +59,8 @@ ANIMATED = (
     "planar_four_synchronized_disturbed",
     "planar_four_independent_disturbed",
 )
-#: the tasks of the paper's introduction
-TASKS = (CARRY, EDGE, PATH)
+#: the tasks of the paper's introduction, and robots that talk
+TASKS = (CARRY, EDGE, PATH, NETWORK)
 TRIAL = 1.0  # s
 #: the run whose estimated bodies are drawn
 BODIES = "a460_pair_synchronized"
@@ -113,6 +115,7 @@ def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun], limit:
         introduction(checked),
         *sections,
         *tasks,
+        margin_section(out),
         honesty_section(own),
         bodies_section(bodies, BODIES, out / "figures" / "bodies"),
         identification_section(learned),

@@ -9,7 +9,7 @@ import pytest
 from refusals import refused
 from seams.pulling_law import Pulling
 
-from synctrl import Network
+from synctrl import CartesianSpace, Cell, Coupling, Experiment, Network
 from synctrl.compiled.program import Program
 from synctrl.control.adaptation import Natural
 from synctrl.control.network import BoundPosted
@@ -30,7 +30,7 @@ NETWORKS = {
     "at once": Network(),
     "delays": Network(delay=UNEQUAL),
     "hold": Network(0.01, delay=0.003, receiver="hold"),
-    "extrapolate": Network(0.004, receiver="extrapolate"),
+    "extrapolate": Network(0.004, loss=0.4, receiver="extrapolate"),
     "filter": Network(0.01, delay=0.012, jitter=0.004, loss=0.3, seed=1),
     "events": Network(0.004, delay=0.003, burst=(0.2, 0.4), event=1e-3, heartbeat=0.03),
 }
@@ -74,6 +74,16 @@ def test_messages_that_fall_between_steps_and_samples_come_at_the_same_instants(
     network = Network(0.0073, delay=0.0011, jitter=0.0031, receiver="hold")
     assert_same_run(planar_four(network=network))
     assert_same_run(planar_four(network=network), control_period=3e-3, duration=0.045)  # a sample at the end
+
+
+@pytest.mark.parametrize("name", ["at once", "filter"])
+def test_links_of_any_sign_and_weight_agree(name):
+    experiment = planar_four()
+    cell, coupling = experiment.cell, Coupling.star(4).weighted([0.5, 1.0, 2.0])
+    weighted = Cell(cell.members, coupling, CartesianSpace("xy"))
+    assert_same_run(
+        Experiment(weighted, experiment.gains.replace(beta=5.0), 0.03, network=NETWORKS[name]), 0.03
+    )
 
 
 @pytest.mark.parametrize("receiver", ["hold", "filter"])
