@@ -1,5 +1,7 @@
 """Runs over a network: what a reader sees of them, and what they say when they had to stop."""
 
+import pickle
+
 import numpy as np
 import pytest
 from refusals import refused
@@ -31,3 +33,17 @@ def test_chance_is_a_matter_of_the_seed_alone():
 
     np.testing.assert_array_equal(heard(1), heard(1))
     assert (heard(1) != heard(2)).any()
+
+
+@pytest.mark.parametrize("receiver", ["filter", "hold", "extrapolate"])
+def test_a_controller_goes_elsewhere_with_its_messages_on_the_way(receiver: str):
+    network = Network(1e-3, delay=1.5e-3, jitter=2e-3, loss=0.3, burst=(0.1, 0.5), receiver=receiver)
+    experiment = planar_four(network=network)
+    cell, here = experiment.cell, experiment.controller(1e-3)
+    here.reset(0.0, cell.q0, cell.v0)
+    samples = 1e-3 * np.arange(12)
+    for t in samples[:6]:
+        here.step(t, cell.q0, cell.v0)
+    there = pickle.loads(pickle.dumps(here))
+    for t in samples[6:]:
+        np.testing.assert_array_equal(there.step(t, cell.q0 + t, cell.v0), here.step(t, cell.q0 + t, cell.v0))

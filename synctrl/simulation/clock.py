@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -76,6 +77,14 @@ class Clock:
     jumps: np.ndarray = field(default_factory=lambda: np.zeros(0), compare=False)
     every: int = field(default=1, compare=False)
 
+    @cached_property
+    def _moved(self) -> tuple[np.ndarray, np.ndarray]:
+        return _columns(self.moved)
+
+    @cached_property
+    def _between(self) -> tuple[np.ndarray, np.ndarray]:
+        return _columns(self.between)
+
     @property
     def steps(self) -> int:
         """How many steps there are, those to and from jumps included."""
@@ -111,16 +120,15 @@ class Clock:
     def grid(self, index: np.ndarray) -> np.ndarray:
         """Multiples of dt with indices from 0 to `count`, s."""
         times = np.where(index < self.count, index * self.dt, self.end)
-        _put(self.moved, index, times)
+        _put(self._moved, index, times)
         return times
 
     def stretch(self, first: int, last: int) -> Stretch:
         """The steps [first, last)."""
         steps = np.arange(first, last + 1)
-        ends = [place for place, _ in self.between]
-        number = steps - np.searchsorted(ends, steps, side="right")  # the multiple at or before each
+        number = steps - np.searchsorted(self._between[0], steps, side="right")  # the multiple at or before
         times = self.grid(number)
-        checked = ~_put(self.between, steps, times)[:-1]
+        checked = ~_put(self._between, steps, times)[:-1]
         return Stretch(first, times, checked, checked & (number[:-1] % self.every == 0), number[:-1])
 
     def stretches(self, length: int) -> Iterator[tuple[int, int]]:
@@ -177,45 +185,53 @@ def make_clock(
         raise InputError(f"{duration:g} s in steps of {dt:g} s are more than {MAX_STEPS} steps", subject="dt")
     every = 1 if log_dt is None else multiple("log_dt", log_dt, dt)
     bare = Clock(dt, int(np.ceil(duration / dt - TIE)), duration, every=every)
-    near = [(_nearest(bare, instant, least=1), float(instant)) for instant in breaks]
-    moved = {k: instant for k, instant in near if abs(bare.at(k) - instant) <= TIE * dt}
+    instants = np.array(breaks, dtype=float)
+    near = _nearest(bare, instants, least=1)
+    close = np.abs(bare.grid(near) - instants) <= TIE * dt
+    moved = dict(zip(near[close].tolist(), instants[close].tolist(), strict=True))
     end = moved.get(bare.count, duration)
     return _with_jumps(replace(bare, end=end, moved=tuple(sorted(moved.items()))), edges, breaks)
 
 
 def _with_jumps(clock: Clock, edges: Sequence[float], breaks: Sequence[float]) -> Clock:
     """The clock with what jumps inside the run."""
-    on_grid = [(edge, clock.at(_nearest(clock, edge))) for edge in edges]
-    snapped = [on if abs(on - edge) <= TIE * clock.dt else edge for edge, on in on_grid]
-    jumps = np.unique([float(jump) for jump in (*breaks, *snapped) if 0 < jump < clock.end])
-    off_grid = [jump for jump in jumps.tolist() if clock.at(_nearest(clock, jump)) != jump]
-    between = tuple((_before(clock, jump) + 1 + k, jump) for k, jump in enumerate(off_grid))
+    given = np.array(edges, dtype=float)
+    on_grid = clock.grid(_nearest(clock, given))
+    snapped = np.where(np.abs(on_grid - given) <= TIE * clock.dt, on_grid, given)
+    jumps = np.unique(np.concatenate((np.array(breaks, dtype=float), snapped)))
+    jumps = jumps[(jumps > 0) & (jumps < clock.end)]
+    near = _nearest(clock, jumps)
+    off_grid = clock.grid(near) != jumps
+    instants, last = jumps[off_grid], near[off_grid]
+    last -= clock.grid(last) > instants  # the multiple before each
+    places = last + 1 + np.arange(len(last))
+    between = tuple(zip(places.tolist(), instants.tolist(), strict=True))
     return replace(clock, between=between, jumps=jumps)
 
 
-def _put(marks: tuple[tuple[int, float], ...], index: np.ndarray, times: np.ndarray) -> np.ndarray:
+def _columns(marks: tuple[tuple[int, float], ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Places and instants of marks."""
+    return np.array([place for place, _ in marks], dtype=int), np.array([instant for _, instant in marks])
+
+
+def _put(marks: tuple[np.ndarray, np.ndarray], index: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Write marked instants over the times that have their index; which these are."""
-    if not marks:
+    places, instants = marks
+    if not len(places):
         return np.zeros(len(index), dtype=bool)
-    places, instants = np.array([place for place, _ in marks]), np.array([instant for _, instant in marks])
     found = np.searchsorted(places, index).clip(max=len(places) - 1)
     hit = places[found] == index
     times[hit] = instants[found[hit]]
     return hit
 
 
-def _nearest(clock: Clock, instant: float, least: int = 0) -> int:
-    """The multiple of dt that is closest to an instant; of two that are, the first."""
-    guess = round(min(max(instant / clock.dt, 0.0), clock.count))
-    around = {guess - 1, guess, guess + 1, clock.count - 1, clock.count}
-    known = sorted(k for k in around if least <= k <= clock.count)
-    return min(known, key=lambda k: abs(clock.at(k) - instant))
-
-
-def _before(clock: Clock, instant: float) -> int:
-    """The last multiple of dt before an instant that is none."""
-    near = _nearest(clock, instant)
-    return near if clock.at(near) < instant else near - 1
+def _nearest(clock: Clock, instants: np.ndarray, least: int = 0) -> np.ndarray:
+    """The multiples of dt that are closest to some instants, (k,); of two that are, the first."""
+    guess = np.rint(np.clip(instants / clock.dt, 0, clock.count)).astype(int)
+    ends = np.full((2, len(guess)), [[clock.count - 1], [clock.count]])
+    around = np.concatenate((guess + np.array([[-1], [0], [1]]), ends)).clip(least, clock.count)
+    best = np.abs(clock.grid(around.ravel()).reshape(around.shape) - instants).argmin(axis=0)
+    return around[best, np.arange(len(guess))]
 
 
 def before(t: float) -> float:

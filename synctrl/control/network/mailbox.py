@@ -71,7 +71,6 @@ class BoundMailbox(BoundPosted):
     ):
         super().__init__(cell, leak, receiver, traffic, links)
         self.robot, self._m = robot, cell.m
-        self._chances = self._draw  # nothing is drawn; a cache would not go to another process
         self._kept = tuple(receiver.shapes(links.count, cell.m))
         self._link = {int(sender): k for k, sender in enumerate(links.sender)}
 

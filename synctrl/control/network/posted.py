@@ -12,8 +12,8 @@ beginning.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import lru_cache
+from collections.abc import Mapping
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,6 +59,26 @@ class Traffic(NamedTuple):
         return int((self.delay + self.jitter).max(initial=0.0) / self.period + NEAR) + 2
 
 
+class Chance:
+    """What chance does to message k on every link: loss, jitter, and a change to or from bad, (3, l).
+
+    Args:
+        seed: of chance.
+        links: how many there are, l.
+        room: for how many messages it is kept.
+    """
+
+    def __init__(self, seed: int, links: int, room: int):
+        self._given = seed, links, room
+        self._drawn = lru_cache(room)(partial(_draw, seed, links))
+
+    def __call__(self, k: int) -> np.ndarray:
+        return self._drawn(k)
+
+    def __reduce__(self) -> tuple[type, tuple[int, int, int]]:
+        return type(self), self._given  # what is kept is drawn again elsewhere
+
+
 class BoundPosted(WForm):
     """Messages between the robots of a cell.
 
@@ -97,7 +117,7 @@ class BoundPosted(WForm):
         self.theorem = None if receiver.jumps else FILTER
         advice = "it jumps then; send more often, or use receiver='filter'" if self.jumps else ASK
         self.suspicion = f"robots hear each other by messages every {traffic.period:g} s: {advice}"
-        self._chances: Callable[[int], np.ndarray] = lru_cache(4 * places + 16)(self._draw)
+        self._chances = Chance(traffic.seed, l, 4 * places + 16)
 
     def beside(self, places: int, n: int, l: int, m: int) -> Shapes:
         """Shapes of what else messages say, by name: nothing.
@@ -161,11 +181,6 @@ class BoundPosted(WForm):
         }
 
     # -- internals ----------------------------------------------------------------------------------------
-
-    def _draw(self, k: int) -> np.ndarray:
-        """Chance of message k on every link: of loss, of jitter, and of a change to or from bad, (3, l)."""
-        source = np.random.Philox(key=self.traffic.seed, counter=[0, k, 0, 0])
-        return np.random.Generator(source).random((3, self.links.count))
 
     def _arriving(self, numbers: np.ndarray) -> list[np.ndarray]:
         """When the messages with these numbers may come."""
@@ -238,3 +253,9 @@ class BoundPosted(WForm):
         now.held[news] = now.letters[place[news], self.links.sender[news]]
         now.come += come.sum(axis=0)
         now.arrivals[come] = NEVER
+
+
+def _draw(seed: int, links: int, k: int) -> np.ndarray:
+    """See `Chance`."""
+    source = np.random.Philox(key=seed, counter=[0, k, 0, 0])
+    return np.random.Generator(source).random((3, links))
