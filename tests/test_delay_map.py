@@ -63,6 +63,15 @@ def test_messages_at_once_that_come_often_are_the_ideal_exchange(receiver):
     assert found.growth[0, 0] == pytest.approx(growth(freeze(cell, gains), 0.0), rel=0.03)
 
 
+@pytest.mark.parametrize("name", ["planar", "A460"])
+def test_where_next_to_everything_is_lost_robots_are_alone_with_what_they_heard_first(name):
+    cell, gains = CELLS[name]()
+    alone = np.linalg.eigvals(freeze(cell, gains).own).real.max()
+    found = delay_map(cell, gains, Network(0.02, receiver="hold"), [0.0], [0.0, 1 - 1e-12], duration=8.0)
+    assert found.growth[0, 1] == pytest.approx(alone, rel=0.05)
+    assert found.growth[0, 0] != pytest.approx(alone, rel=0.05)
+
+
 @pytest.mark.filterwarnings("ignore::synctrl.errors.StepWarning")  # steps are judged by tiny velocities here
 @pytest.mark.parametrize(
     ("name", "receiver", "delay", "duration", "dt", "start"),
