@@ -282,9 +282,6 @@ def _advice(result: Result) -> str:
     return "" if step is None else f", expected at most dt = {step:g} s"
 
 
-# -- in words ---------------------------------------------------------------------------------------------
-
-
 def _ends(term: np.ndarray) -> dict[str, float]:
     return {"start": float(term[0]), "end": float(term[-1])}
 
