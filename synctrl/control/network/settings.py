@@ -56,7 +56,7 @@ def _apart(value: Any) -> Any:
         return value
     if given.ndim != 2 or given.dtype.kind not in "iuf":
         return value
-    return np.where(np.eye(*given.shape, dtype=bool), 0, given)
+    return np.where(np.eye(*given.shape) > 0, 0, given)
 
 
 def of_pairs(name: str, value: ArrayLike, unit: str = ", s") -> np.ndarray:
