@@ -12,7 +12,7 @@ from ur5_joints import GAINS, ur5_joints
 from synctrl import Network
 from synctrl.analysis import DelayMap, delay_margin
 from synctrl.experiments import a460_pair, planar_four
-from synctrl.paper.margin_section import Talking, joint_by_joint, margin_table
+from synctrl.paper.margin_section import Talking, joint_by_joint, map_caption, margin_table
 from synctrl.paper.network_section import (
     NETWORK,
     a_filter_costs_almost_nothing,
@@ -22,6 +22,8 @@ from synctrl.paper.network_section import (
     rms,
     size_of_epsilon,
 )
+from synctrl.paper.report import Table
+from synctrl.paper.tasks import task_section
 from synctrl.show.delay_figures import delay_map_figure
 
 
@@ -89,6 +91,22 @@ def test_the_boundary_is_drawn_where_errors_begin_to_grow():
     assert [len(one.collections), len(two.collections)] == [1, 2]
     (line,) = two.collections[1].get_paths()
     np.testing.assert_allclose(line.vertices[:, 0], 50.0)  # ms, half way
+
+
+def test_the_section_has_a_row_for_every_run_and_says_how_many_messages_were_sent(short, tmp_path):
+    section = task_section(NETWORK, dict.fromkeys(NETWORK.planned, short), (), tmp_path)
+    (table,) = (block for block in section.blocks if isinstance(block, Table))
+    assert [row[0] for row in table.rows] == list(NETWORK.labels.values())
+    assert {row[3] for row in table.rows} == {"20"}
+    assert (tmp_path / "figures" / "network_epsilon.svg").is_file()
+
+
+def test_the_caption_counts_the_points_at_which_errors_grow():
+    delays, losses = np.array([0.0, 0.1]), np.array([0.0, 0.5])
+    found = DelayMap(delays, losses, np.array([[-1.0, -1.0], [2.0, -1.0]]), 0.01)
+    caption = map_caption({"hold": {"one": found, "two": found}, "filter": {"one": found}})
+    assert "2 of 8 of the points with “hold”" in caption
+    assert "1 of 4 with “filter”" in caption
 
 
 def test_all_runs_of_the_section_can_be_made_by_the_compiled_engine():

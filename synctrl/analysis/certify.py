@@ -145,9 +145,8 @@ def certify(result: Result, experiment: Experiment | None = None) -> Certificate
     known = not unproven and heard is None
     doubts = tuple(_doubts(run, record, errors, None if excused else growth, known))
     verdict = VERDICTS[2] if doubts else VERDICTS[1] if found else VERDICTS[0]
-    title = str(result.info["title"])
     return Certificate(
-        title, verdict, found, doubts, growth, record, condition, errors, _every(result),
+        str(result.info["title"]), verdict, found, doubts, growth, record, condition, errors, _every(result),
         _consistency(run), getattr(run.loop.controller.law, "statement", None),
         getattr(run.loop.chain, "theorem", None), heard,
     )  # fmt: skip
@@ -238,6 +237,7 @@ def _in_words(run: Replay, name: str) -> str:
 _WORDS = {
     "law": "the force of a law without a proof",
     "network": "what the network keeps robots from knowing",
+    "diffusion": "power of diffusive coupling, whose storage is not in V",
     "friction": "friction that the model does not contain",
     "disturbance": "torque from outside",
     "saturation": "torque that saturation takes away, for which no adaptation makes up while it lasts",

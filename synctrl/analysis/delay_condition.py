@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..control.controller import Controller
-from ..control.laws.sun_mills import BoundInjection, BoundSunMills
+from ..control.laws.sun_mills import BoundDiffusion, BoundInjection, BoundSunMills
 from ..control.network import BoundPosted, Links, WForm
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
@@ -121,6 +121,8 @@ def _reason(run: Replay, network: WForm, margin: float | None) -> str | None:
     controller = run.loop.controller
     if (words := network.outside()) is not None:
         return words
+    if isinstance(controller.law, BoundDiffusion):
+        return "the storage of its diffusive coupling is not in V"
     if not isinstance(controller.law, (BoundSunMills, BoundInjection)):
         return f"its theorem is of SunMills, not of {controller.law_settings['name']}"
     if run.loop.chain is not None:

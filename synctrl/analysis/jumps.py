@@ -41,7 +41,8 @@ def jumps_in(
     """
     events = _events_in(t, loop, period)
     on_log, between = set(), {*events}
-    for jump in (*schedule.edges, *loop.plant.schedule.edges, *loop.cell.breaks):
+    heard = getattr(loop.controller.network, "breaks", ())
+    for jump in (*schedule.edges, *loop.plant.schedule.edges, *loop.cell.breaks, *heard):
         if t[0] < jump < t[-1]:
             nearest = int(np.abs(t - jump).argmin())
             if abs(t[nearest] - jump) <= tolerance(t):

@@ -27,7 +27,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..control.laws import Along, Proof
+from ..control.laws import DIFFUSION, Along, Proof
 from ..control.network import BoundNetwork
 from ..renamed import names_elsewhere
 from ..simulation.closed_loop import ClosedLoop
@@ -148,7 +148,7 @@ def lyapunov(result: Result | Replay, experiment: Experiment | None = None) -> L
         missed,
         bound + operations(run.loop) * EPS * float(np.max(V)),
         {name: supplied(run, term) for name, term in power.items()},
-        ("damping", *proof.powers, "friction in Y", *GIVING),
+        _inside(run, proof),
         run.events,
     )
 
@@ -197,11 +197,18 @@ def operations(loop: ClosedLoop) -> int:
 def _proof(run: Replay) -> Proof:
     """The law's part in V and V'; nothing of a law that has no proof."""
     x, law = run.rows, cast(Any, run.loop.controller.law)
-    along = Along(x.epsilon, x.epsilon_dot, x.E, x.sigma, x.sigma_dot, x.e_star, x.r, x.c)
+    along = Along(x.epsilon, x.epsilon_dot, x.E, x.sigma, x.sigma_dot, x.e_star, x.r, x.c, x.slips)
     if not hasattr(law, "proof"):
         return Proof({}, {}, {})
     proof, moves = law.proof(along), replace(along, sigma=x.sigma + x.E_gap)  # in rates it stands for E'
     return proof._replace(rates=law.proof(moves).rates)
+
+
+def _inside(run: Replay, proof: Proof) -> tuple[str, ...]:
+    """Names of the powers that the theorem knows: diffusive coupling only where all is heard at once."""
+    ideal = _is_ideal(run.loop.controller.network)
+    known = (name for name in proof.powers if ideal or name != DIFFUSION)
+    return ("damping", *known, "friction in Y", *GIVING)
 
 
 def _rates(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:

@@ -49,6 +49,7 @@ class Moment(NamedTuple):
         E, sigma, sigma_dot, e_star, u, r: (n, m).
         force: what the law asks for in task space, (n, m).
         c, c_dot, c_inv: (n, m, m).
+        slips: what the network told of r, see `Received`, (2, n, m); nothing where nobody asks.
         J, J_inv: (n, m, nv) and (n, nv, m); identities in joint space.
         M: mass matrices, (n, nv, nv).
         C_s: C(q, v) s_q, (n, nv).
@@ -85,6 +86,7 @@ class Moment(NamedTuple):
     c: np.ndarray
     c_dot: np.ndarray
     c_inv: np.ndarray
+    slips: np.ndarray
     J: np.ndarray
     J_inv: np.ndarray
     M: np.ndarray
@@ -199,7 +201,8 @@ def _row(
         np.array(adaptation.storage_rate(z, s.z_dot, theta)),
         np.array([*adaptation.powers(z, theta, s.seen).values()]), *_chain(loop, y, y_dot, s),
         s.epsilon, s.epsilon_dot, s.E, s.sigma, s.sigma_dot, s.e_star, s.u, s.r, s.force, s.reference.c,
-        s.reference.c_dot, s.reference.c_inv, J, J_inv, M, C_s,
+        s.reference.c_dot, s.reference.c_inv, np.array([] if s.errors.slips is None else s.errors.slips),
+        J, J_inv, M, C_s,
         np.matvec(np.abs(s.Y), np.abs(s.theta_hat) + np.abs(theta)),
     )  # fmt: skip
 

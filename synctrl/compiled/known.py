@@ -27,7 +27,7 @@ from ..control.adaptation.gradient import BoundGradient
 from ..control.admittance import BoundAdmittance
 from ..control.controller import Controller
 from ..control.gains import Gains
-from ..control.laws.sun_mills import BoundSunMills
+from ..control.laws.sun_mills import BoundDiffusion, BoundSunMills
 from ..control.network import Messages
 from ..coupling.cell import Cell
 from ..coupling.coupling import Coupling
@@ -114,7 +114,7 @@ def _parts(loop: ClosedLoop) -> Iterator[Part]:
         yield from _held(loop.plant)
     yield Part("schedule of payloads", loop.plant.schedule, (PayloadSchedule,))
     yield Part("controller", controller, (Controller,))
-    if isinstance(controller.law, BoundSunMills):  # others are traced
+    if isinstance(controller.law, (BoundSunMills, BoundDiffusion)):  # others are traced
         yield Part("law", controller.law, (BoundSunMills,))
     yield from (Part(*part) for part in parts_of(controller.network))
     yield Part("messages", loop.messages, (Messages,))

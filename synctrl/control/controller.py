@@ -28,7 +28,7 @@ from .adaptation import Adaptation, Seen, chosen, pace_of, shift_of
 from .admittance import Admittance, BoundAdmittance
 from .gains import Gains, spread, spread_rows
 from .laws import Asked, Errors, Law, completed
-from .network import Communication, Ideal, Received, check_leak, connected
+from .network import Communication, Ideal, Received, check_leak, connected, connected_with_slips
 from .parts import check_parts, settings_of
 
 
@@ -152,7 +152,8 @@ class Controller:
         self.leak = spread("leak", gains.leak, (m,))
         connection = Ideal(self.leak) if network is None else network
         offers("network", connection, ("bind", "as_dict"), "a network, for example Ideal()")
-        self.network, self.network_settings = connected(connection, cell, gains), settings_of(connection)
+        connect = connected_with_slips if getattr(self.law, "needs_slips", False) else connected
+        self.network, self.network_settings = connect(connection, cell, gains), settings_of(connection)
         self._shift = shift_of(self.adaptation, self.network)
         self._pace = pace_of(self.adaptation, self.network)
         self._give_way(admittance)
@@ -249,7 +250,8 @@ class Controller:
             task, felt = self.admittance.moved(task, z, reference, wrenches)
         w = law.compute_weighted_errors(weights, task.error)
         received = self.network.exchange(reference.t, w, integral)
-        errors = Errors(reference.t, task.error, task.motion[1], task.rates, w, received.shares, weights)
+        told = received.shares, weights, received.slips
+        errors = Errors(reference.t, task.error, task.motion[1], task.rates, w, *told)
         asked = self.law.command(errors)
         v_ref, a_ref, s_q, feedback = law.compute_joint_command(
             asked, task, v, space, self.K_r, self.k_r_space

@@ -36,6 +36,8 @@ def own_controllers(whole: Controller) -> tuple[Controller, ...]:
         InputError: another network, or a law or an adaptation of which no robot can do its part with its own
             errors and messages alone.
     """
+    if getattr(whole.law, "needs_slips", False):
+        raise _not_alone(whole, 0, "it needs r of others, which the messages of agents do not have")
     if type(whole.network) is not BoundPosted:
         found = whole.network_settings["name"]
         raise InputError.expected("one of messages for agents, Network(period=...)", found, "network")

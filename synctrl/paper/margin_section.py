@@ -64,7 +64,8 @@ def margin_section(out: Path) -> Section:
         out: the folder of the page.
     """
     cells = talking_cells()
-    figure = as_picture(delay_map_figure(maps_of(cells)), out / "figures" / "delay_map", _MAP)
+    maps = maps_of(cells)
+    figure = as_picture(delay_map_figure(maps), out / "figures" / "delay_map", map_caption(maps))
     words = (Text(each) for each in _MARGINS)
     return Section("How much delay can this cell take?", (*words, margin_table(cells), figure))
 
@@ -106,10 +107,19 @@ def maps_of(cells: Mapping[str, Talking]) -> dict[str, dict[str, DelayMap]]:
     }
 
 
+def map_caption(maps: Mapping[str, Mapping[str, DelayMap]]) -> str:
+    """What the maps show, and at how many of their points errors grow."""
+    grow = {}
+    for kind, row in maps.items():
+        stable = np.concatenate([found.stable.ravel() for found in row.values()])
+        grow[kind] = f"{int((~stable).sum())} of {stable.size}"
+    return _MAP.format(**grow)
+
+
 _MARGINS = (
     "Robots that hear of each other late may swing, although each of them alone is well damped. Linear "
     "equations of small errors, frozen at the start, say from which delay on, and how seldom robots may "
-    "send. If K_r − a/(4Λ) JᵀcᵀK_ε c J, a = max (SᵀS)_ii, is positive definite for every robot, every "
+    "send. If K_r − a/(4Λ) Jᵀ cᵀ K_ε c J, a = max Σ_k S²_ki, is positive definite for every robot, every "
     "constant delay is tolerated: a theorem, with nothing to be computed but the least eigenvalue.",
     "Between messages a robot holds what it has heard, or extrapolates it, at most 1/(βa) long, or "
     "follows it with a filter of second order. In the maps robots send every 10 ms.",
@@ -120,8 +130,8 @@ _TABLE = (
 )
 _MAP = (
     "Growth of small errors over delay and loss, messages every 10 ms; the worst of three trials of 4 s. "
-    "Blue falls, red grows, the black line is between them. Above it, a larger loss may help: what is "
-    "held for long excites less. With the filter all three cells are stable everywhere on the map. Larger "
-    "errors are another matter: what jumps when a message comes may be too much for robots that are not "
-    "linear."
+    "Blue falls, red grows, the black line is between them. Errors grow at {hold} of the points with "
+    "“hold”, and at {filter} with “filter”. A loss is not a delay: where much is lost, arms that would "
+    "swing together hardly hear of each other. Larger errors are another matter: what jumps when a "
+    "message comes may be too much for robots that are not linear."
 )

@@ -27,6 +27,8 @@ BAD = partial(Network, period=0.01, delay=0.01, jitter=0.01, loss=0.2)
 LONG = 0.1
 #: "costs almost nothing" and "doubles": RMS of epsilon as a share of what it is with ideal communication
 ALMOST_NOTHING, DOUBLE = 1.05, 2.0
+#: how long the runs with a push are, s
+PUSHED = 1.5
 #: of its peak that may be left of epsilon after a long delay
 FADED = 0.5
 
@@ -141,10 +143,10 @@ NETWORK = Task(
     title="Robots that talk",
     words=_RUNS,
     planned={
-        "ideal": _run(_pushed, 2.0),
-        "late": _run(partial(_pushed, network=Network(delay=0.05)), 2.0),
-        "filter": _run(partial(_pushed, network=BAD()), 2.0),
-        "hold": _run(partial(_pushed, network=BAD(receiver="hold")), 2.0),
+        "ideal": _run(_pushed, PUSHED),
+        "late": _run(partial(_pushed, network=Network(delay=0.05)), PUSHED),
+        "filter": _run(partial(_pushed, network=BAD()), PUSHED),
+        "hold": _run(partial(_pushed, network=BAD(receiver="hold")), PUSHED),
         "long": _long(partial(planar_four, network=Network(delay=LONG)), 3.0),
         "long_a460": _long(partial(a460_pair, friction=False, network=Network(delay=LONG)), 2.0),
     },

@@ -49,7 +49,9 @@ def delay_map_figure(maps: Mapping[str, Mapping[str, DelayMap]]) -> Figure:
 
 def _panel(panel: Axes, found: DelayMap, norm: SymLogNorm) -> QuadMesh:
     delays, losses, growth = 1e3 * found.delays, 100 * found.losses, found.growth.T
-    colours = panel.pcolormesh(delays, losses, growth, shading="nearest", cmap="RdBu_r", norm=norm)
+    colours = panel.pcolormesh(
+        delays, losses, growth, shading="nearest", cmap="RdBu_r", norm=norm, edgecolors="face"
+    )
     if growth.min() < 0 < growth.max():
         panel.contour(delays, losses, growth, [0.0], colors="black", linewidths=1.6)
     return colours

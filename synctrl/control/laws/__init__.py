@@ -4,11 +4,12 @@ from .chung_slotine import ChungSlotine
 from .classic import ComputedTorque, PDGravity, SlotineLi
 from .master_slave import MasterSlave
 from .options import Options, chosen
-from .protocol import Along, Asked, BoundLaw, Errors, Law, Proof, completed, no_errors
+from .protocol import DIFFUSION, Along, Asked, BoundLaw, Errors, Law, Proof, completed, no_errors
 from .shape_keeping import ShapeKeeping
 from .sun_mills import SunMills
 
 __all__ = [
+    "DIFFUSION",
     "Along",
     "Asked",
     "BoundLaw",

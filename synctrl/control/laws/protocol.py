@@ -40,6 +40,8 @@ class Errors:
         shares: what the network told, (3, n, m): E, sigma and sigma', which are S^T times the integrals of
             epsilon, epsilon itself and its rate.
         weights: c, c', c'' and c^-1, (n, m, m) each.
+        slips: what the network told of the r of others, (2, n, m), to a law that `needs_slips`; see
+            `Received`.
 
     The same, each (n, m), is called e, e_dot, xd_dot, xd_ddot, w, w_dot, E, sigma and sigma_dot; and the
     weights c, c_dot, c_ddot and c_inv.
@@ -52,6 +54,7 @@ class Errors:
     weighted: np.ndarray
     shares: np.ndarray
     weights: Weights
+    slips: Any = None
 
     e = property(lambda self: self.error[0])
     e_dot = property(lambda self: self.error[1])
@@ -80,6 +83,8 @@ class Errors:
         )  # fmt: skip
 
 
+#: name of the power of diffusive coupling: not above 0 only where robots hear each other at once
+DIFFUSION = "diffusion"
 #: what is in `Errors`: rows, (n, m) each, and weights, (n, m, m) each
 ROWS = ("e", "e_dot", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot", "E", "sigma", "sigma_dot")
 WEIGHTS = ("c", "c_dot", "c_ddot", "c_inv")
@@ -107,7 +112,8 @@ class Asked(NamedTuple):
 def no_errors(n: int, m: int) -> Errors:
     """Errors that are all zero, under weights of one."""
     none, one, zero = np.zeros((3, n, m)), np.broadcast_to(np.eye(m), (n, m, m)), np.zeros((n, m, m))
-    return Errors(0.0, none[:2], none[0], none[:2], none[:2], none, Weights(one, zero, zero, one))
+    weights = Weights(one, zero, zero, one)
+    return Errors(0.0, none[:2], none[0], none[:2], none[:2], none, weights, none[:2])
 
 
 def completed(asked: Asked, errors: Errors) -> Asked:
@@ -130,6 +136,7 @@ class Along:
         E, sigma, sigma_dot: what the network told, (T, n, m).
         e_star, r: coupled errors and coupled velocity errors, (T, n, m).
         c: weights, (T, n, m, m).
+        slips: what the network told of the r of others, (T, 2, n, m), if it did.
     """
 
     epsilon: np.ndarray
@@ -140,6 +147,7 @@ class Along:
     e_star: np.ndarray
     r: np.ndarray
     c: np.ndarray
+    slips: Any = None
 
 
 class Proof(NamedTuple):
@@ -149,7 +157,7 @@ class Proof(NamedTuple):
         energies: terms of V beside the kinetic energy and the storage of the adaptation, N·m, not below 0.
         rates: their time derivatives by the chain rule, N·m/s, under the same names; sigma stands in them
             where E' is, and nowhere else.
-        powers: the terms of V' that remain of them, N·m/s, not above 0.
+        powers: the terms of V' that remain of them, N·m/s, not above 0; but for `DIFFUSION`.
     """
 
     energies: Mapping[str, np.ndarray]
@@ -160,7 +168,8 @@ class Proof(NamedTuple):
 class BoundLaw(Protocol):
     """A law for the robots of one cell.
 
-    It may also have a method `proof`, from `Along` to `Proof`, and a `statement`, when it converges.
+    It may also have a method `proof`, from `Along` to `Proof`, and a `statement`, when it converges. One that
+    has `needs_slips` wants to be told the r of others, which not every network does.
     """
 
     def command(self, errors: Errors) -> Asked:

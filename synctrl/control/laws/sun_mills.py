@@ -10,12 +10,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ...checks import boolean, choice
+from ...checks import boolean, choice, finite_array
 from ...coupling.cell import Cell
 from ...errors import InputError
 from ..gains import Gains, spread
-from .protocol import Along, Asked, Errors, Proof
+from .protocol import DIFFUSION, Along, Asked, Errors, Proof
 
 #: what xref'' may be: the derivative of xref', or what (13) prints
 REFERENCE_ACCELERATIONS = "exact", "paper"
@@ -31,9 +32,12 @@ class SunMills:
         k_r_space: "joint" for damping K_r s_q, or "task" for J^T K_r c^-1 r.
         injection: whether the torque has a/(4 Lambda) J^T c^T K_eps r as well, a the largest entry of the
             diagonal of S^T S: as much damping as any constant delay between robots may take.
+        diffusion: K_2, a number or (m,), N·m·s if weights have no unit: the torque has
+            J^T c^T K_2 sum_j |A_ij| (r_i + sgn(A_ij) r_j) as well, with r_j as the network brings it, and A
+            what S^T S has beside its diagonal. It needs a `Network`.
 
     Raises:
-        InputError: an unknown word, or no bool.
+        InputError: an unknown word, no bool, or gains that are not finite or below 0.
     """
 
     statement = (
@@ -41,15 +45,22 @@ class SunMills:
     )
 
     def __init__(
-        self, reference_acceleration: str = "exact", k_r_space: str = "joint", injection: bool = False
+        self,
+        reference_acceleration: str = "exact",
+        k_r_space: str = "joint",
+        injection: bool = False,
+        diffusion: ArrayLike = 0.0,
     ):
         self.reference_acceleration = choice(
             "reference_acceleration", reference_acceleration, REFERENCE_ACCELERATIONS
         )
         self.k_r_space = choice("k_r_space", k_r_space, K_R_SPACES)
         self.injection = boolean("injection", injection)
+        self.diffusion = finite_array("diffusion", diffusion)
+        if self.diffusion.min(initial=0.0) < 0:
+            raise InputError.expected("gains of at least 0", float(self.diffusion.min()), "diffusion")
 
-    def bind(self, cell: Cell, gains: Gains) -> BoundSunMills | BoundInjection:
+    def bind(self, cell: Cell, gains: Gains) -> BoundSunMills | BoundInjection | BoundDiffusion:
         """This law for a cell.
 
         Raises:
@@ -61,12 +72,13 @@ class SunMills:
         if (leak > Lambda).any():
             found = float(leak[leak > Lambda][0])
             raise InputError.expected("rates up to Lambda, beyond which nothing is proved", found, "leak")
-        law = BoundSunMills(Lambda, beta, K_eps, self.reference_acceleration, leak)
-        if not self.injection:
-            return law
-        starts, _, entries = cell.coupling.incidence
-        a = np.add.reduceat(entries**2, starts[:-1]).max()
-        return BoundInjection(law, a / (4 * Lambda) * K_eps)
+        law: Any = BoundSunMills(Lambda, beta, K_eps, self.reference_acceleration, leak)
+        if self.injection:
+            starts, _, entries = cell.coupling.incidence
+            a = np.add.reduceat(entries**2, starts[:-1]).max()
+            law = BoundInjection(law, a / (4 * Lambda) * K_eps)
+        K_2 = spread("diffusion", self.diffusion, (cell.m,))
+        return BoundDiffusion(law, K_2) if K_2.any() else law
 
     def as_dict(self) -> dict[str, Any]:
         return {
@@ -74,6 +86,7 @@ class SunMills:
             "reference_acceleration": self.reference_acceleration,
             "k_r_space": self.k_r_space,
             **({"injection": True} if self.injection else {}),
+            **({"diffusion": self.diffusion.tolist()} if self.diffusion.any() else {}),
         }
 
 
@@ -176,3 +189,35 @@ class BoundInjection:
         """That of the law, and what B takes of the kinetic energy."""
         proof = self.law.proof(along)
         return proof._replace(powers={**proof.powers, "injection": -along.r * self.injection * along.r})
+
+
+class BoundDiffusion:
+    """`BoundSunMills` with diffusive coupling, J^T c^T K_2 sum_j |A_ij| (r_i + sgn(A_ij) r_j).
+
+    With r_j of a constant delay d ago, V and 1/2 sum_i sum_j |A_ij| int_{t-d}^t r_j^T K_2 r_j fall by
+    1/2 sum_i sum_j |A_ij| x^T K_2 x, x = r_i + sgn(A_ij) r_j(t - d), more than without it. V has no such
+    integral.
+
+    Args:
+        law: the law, with or without injection.
+        diffusion: K_2, (m,), N·m·s if weights have no unit.
+    """
+
+    statement = SunMills.statement
+    needs_slips = True
+
+    def __init__(self, law: BoundSunMills | BoundInjection, diffusion: np.ndarray):
+        self.law, self.diffusion = law, diffusion
+        self.injection = getattr(law, "injection", 0.0)
+
+    def command(self, errors: Errors) -> Asked:
+        asked, (weight, heard) = self.law.command(errors), errors.slips
+        r = asked.u[0] - np.matvec(errors.c, errors.x_dot)
+        pulled = self.diffusion * (weight * r + heard)
+        return asked._replace(force=asked.force + np.matvec(errors.c.mT, pulled))
+
+    def proof(self, along: Along) -> Proof:
+        """That of the law, and the power of its coupling, which takes and gives."""
+        proof, (weight, heard) = self.law.proof(along), along.slips.swapaxes(0, 1)
+        power = -along.r * self.diffusion * (weight * along.r + heard)
+        return proof._replace(powers={**proof.powers, DIFFUSION: power})

@@ -7,7 +7,7 @@ from .mailbox import BoundMailbox, Mailbox
 from .messages import Messages
 from .network import Network
 from .posted import BoundPosted
-from .protocol import BoundNetwork, Communication, Received, check_leak, connected
+from .protocol import BoundNetwork, Communication, Received, check_leak, connected, connected_with_slips
 from .w_form import WForm
 from .wire import Message
 
@@ -28,4 +28,5 @@ __all__ = [
     "WForm",
     "check_leak",
     "connected",
+    "connected_with_slips",
 ]

@@ -49,42 +49,55 @@ class BoundDelayed(WForm):
 
     continuous = True
     theorem = DELAYS
+    #: how many links one after another what is recalled may have come over
+    hops = 1
 
     def __init__(self, cell: Cell, leak: np.ndarray, delay: np.ndarray):
         late = delay[delay > 0]
         self.delay, self._step = delay, float(min(GRID, late.min()))
         if self._step < FINEST:
             raise InputError.expected(f"delays of 0 or at least {FINEST:g} s", self._step, "delay")
-        room = LONGEST * self._step
+        room, oldest = LONGEST * self._step / self.hops, self.hops * late.max()
         if late.max() > room:
             raise InputError.expected(
-                f"delays up to {room:g} s, {LONGEST} steps of {self._step:g} s, which are no longer than the "
-                "shortest delay",
+                f"delays up to {room:g} s, {LONGEST // self.hops} steps of {self._step:g} s, which are no "
+                "longer than the shortest delay",
                 float(late.max()),
                 "delay",
             )
-        places = int(np.ceil(late.max() / self._step)) + 3
+        places = int(np.ceil(oldest / self._step)) + 3
         n, m = cell.n, cell.m
         super().__init__(cell, leak, begun=(1,), since=(1,), first=(n, m), kept=(places, n, 3, m))
         self.suspicion = f"robots hear each other up to {late.max():g} s late; {ASK}"
-        self._places, self._at_once = places, delay == 0
+        self._places = places
         self._coefficients = hermite() * self._step ** (np.arange(6) % 3)  # of derivatives by time
         late_sums = np.unique(np.add.outer(np.append(0.0, late), late))
         self._kinks = late_sums if len(late_sums) <= 64 else np.unique(late)
 
     def heard(self, t: float, own: np.ndarray, memory: np.ndarray) -> np.ndarray:
-        now, sender = self.parts(memory), self.links.sender
-        then = t - self.delay
+        return self.recalled(t, self.delay, self.links.sender, own, memory)
+
+    def recalled(
+        self, t: float, age: np.ndarray, who: np.ndarray, own: np.ndarray, memory: np.ndarray
+    ) -> np.ndarray:
+        """W, w and w' as they were, (3, k, m).
+
+        Args:
+            t, own, memory: as of `heard`.
+            age: how long ago, (k,), s.
+            who: of which robot, (k,).
+        """
+        now, then, at_once = self.parts(memory), t - age, age == 0
         before = np.floor(then / self._step - NEAR)
         u = then / self._step - before
         place = before.astype(int) if np.isfinite(t) else np.zeros(len(then), dtype=int)
-        rows = np.concatenate([now.kept[(place + i) % self._places, sender] for i in (0, 1)], axis=1)
+        rows = np.concatenate([now.kept[(place + i) % self._places, who] for i in (0, 1)], axis=1)
         W, W_dot, W_ddot = self._interpolated(u, rows)
         found = np.array((W, W_dot + self.leak * W, W_ddot + self.leak * W_dot))
-        w, early = now.first[sender], t < now.since[0] + self.delay
+        w, early = now.first[who], t < now.since[0] + age
         W = (then - now.since[0])[:, None] * w
         found[:, early] = np.array((W, w + self.leak * W, self.leak * w))[:, early]
-        found[:, self._at_once] = own[:, sender[self._at_once]]
+        found[:, at_once] = own[:, who[at_once]]
         return found
 
     def messages(self, start: float, end: float) -> np.ndarray:

@@ -75,6 +75,16 @@ class Links:
         told = self._A @ heard.transpose(1, 0, 2).reshape(self.count, -1)
         return self.own * own + told.reshape(own.shape[1], *own.shape[::2]).transpose(1, 0, 2)
 
+    def slips(self, told: np.ndarray, counts: np.ndarray) -> np.ndarray:
+        """Sums of |A_ij| and of A_ij r_j over the links that count, (2, n, m), the first in all columns.
+
+        Args:
+            told: r of who is heard, (l, m).
+            counts: 1 for links that count, 0 for others, (l,).
+        """
+        weight, heard = abs(self._A) @ counts, self._A @ (counts[:, None] * told)
+        return np.stack((np.broadcast_to(weight[:, None], heard.shape), heard))
+
     @property
     def share(self) -> float:
         """How much a robot hears of others beside what it hears of itself.

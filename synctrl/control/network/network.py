@@ -27,6 +27,7 @@ from .settings import (
     row_of,
     seed_of,
 )
+from .slips import with_slips
 from .w_form import WForm
 
 RECEIVERS = "hold", "filter", "extrapolate"
@@ -108,6 +109,14 @@ class Network:
         beta, leak = (spread(name, getattr(gains, name), (cell.m,)) for name in ("beta", "leak"))
         share = float(Links(cell.coupling).own.max(initial=0.0)) * float(beta.max(initial=0.0))
         return self._bound(cell, leak, 1 / share if share > 0 else np.inf)
+
+    def bind_with_slips(self, cell: Cell, gains: Gains) -> WForm:
+        """`bind_for` of robots that tell each other r as well, for a law that needs it.
+
+        Raises:
+            InputError: see `bind_for`.
+        """
+        return with_slips(self.bind_for(cell, gains), cell, gains)
 
     def replace(self, **changes: Any) -> Self:
         """This network with some of its settings changed.

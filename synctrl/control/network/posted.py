@@ -20,7 +20,7 @@ import numpy as np
 
 from ...coupling.cell import Cell
 from .links import Links
-from .receivers import Receiver
+from .receivers import Receiver, Shapes
 from .w_form import ASK, WForm, check_number
 
 #: the theorem that covers it, with a filter
@@ -111,13 +111,22 @@ class BoundPosted(WForm):
         super().__init__(
             cell, leak, links, **receiver.shapes(l, m), begun=(1,), stamp=(l,), held=(l, rows, m),
             stamps=(places,), letters=(places, n, rows, m), arrivals=(places, l), bad=(l,), sent=(n,),
-            come=(l,), told=(n * tells, 1 + 2 * m),
+            come=(l,), told=(n * tells, 1 + 2 * m), **self.beside(places, n, l, m),
         )  # fmt: skip
         self.receiver, self.traffic, self.jumps = receiver, traffic, receiver.jumps
         self.theorem = None if receiver.jumps else FILTER
         advice = "it jumps then; send more often, or use receiver='filter'" if self.jumps else ASK
         self.suspicion = f"robots hear each other by messages every {traffic.period:g} s: {advice}"
         self._chances = Chance(traffic.seed, l, 4 * places + 16)
+
+    def beside(self, places: int, n: int, l: int, m: int) -> Shapes:
+        """Shapes of what else messages say, by name: nothing.
+
+        Args:
+            places: how many messages of a robot are kept.
+            n, l, m: numbers of robots, links and task coordinates.
+        """
+        return {}
 
     def start(self) -> np.ndarray:
         memory = np.zeros(self.parts.size)

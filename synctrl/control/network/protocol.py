@@ -24,12 +24,15 @@ class Received(NamedTuple):
         shares: E, sigma and sigma', (3, n, m): what every robot makes of its own errors and of what it heard.
             The laws need E' = sigma - leak E, and sigma' to be the rate of sigma.
         memory_dot: rate of the memory, of its shape.
+        slips: of a network that was asked for it, what every robot heard of the r of others, (2, n, m):
+            sum_j |A_ij|, in all columns, and sum_j A_ij r_j, over those of whom something counts.
     """
 
     epsilon: np.ndarray
     epsilon_dot: np.ndarray
     shares: np.ndarray
     memory_dot: np.ndarray
+    slips: np.ndarray | None = None
 
 
 class BoundNetwork(Protocol):
@@ -69,7 +72,8 @@ class BoundNetwork(Protocol):
 class Communication(Protocol):
     """A network, before it knows the cell.
 
-    It may have `bind_for(cell, gains)` beside `bind`, if it has to know the gains of the controller as well.
+    It may have `bind_for(cell, gains)` beside `bind`, if it has to know the gains of the controller as well,
+    and `bind_with_slips(cell, gains)`, if its robots can tell each other r, which a law may need.
     """
 
     def bind(self, cell: Cell) -> BoundNetwork:
@@ -91,6 +95,19 @@ def connected(network: Communication, cell: Cell, gains: Gains) -> BoundNetwork:
     """
     bind_for = getattr(network, "bind_for", None)
     return network.bind(cell) if bind_for is None else bind_for(cell, gains)
+
+
+def connected_with_slips(network: Communication, cell: Cell, gains: Gains) -> BoundNetwork:
+    """A network whose robots tell each other r as well, for a law that needs it.
+
+    Raises:
+        InputError: a network without r, or what does not fit, named.
+    """
+    bind = getattr(network, "bind_with_slips", None)
+    if bind is None:
+        wanted = "one whose robots tell each other r, for example Network(), for diffusive coupling"
+        raise InputError.expected(wanted, type(network).__name__, "network")
+    return bind(cell, gains)
 
 
 def check_leak(network: BoundNetwork, leak: np.ndarray) -> None:
