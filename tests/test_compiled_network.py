@@ -16,6 +16,7 @@ from synctrl.control.network import BoundPosted
 from synctrl.control.network.receivers import Hold
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, carry_planar, planar_four, ur5_payload
+from synctrl.simulation.devices import Lag, Noise
 from synctrl.simulation.result import LAYOUT
 
 pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
@@ -68,6 +69,18 @@ def test_both_engines_compute_the_same_run_over_a_network(name):
 @pytest.mark.parametrize("name", MESSAGES)
 def test_both_engines_hold_the_same_samples_over_a_network(name):
     assert_same_run(planar_four(network=MESSAGES[name]), control_period=2e-3)
+
+
+@pytest.mark.parametrize("name", ["hold", "filter"])
+def test_what_robots_tell_is_what_their_sensors_measure_in_both_engines(name):
+    devices = {"sensors": [Noise(q=1e-5, v=1e-4)], "actuators": [Lag(1e-3)]}
+    experiment = planar_four(network=MESSAGES[name], **devices)
+    noisy = assert_same_run(experiment, duration=0.03, control_period=2e-3)
+    exact = replace(experiment, sensors=()).simulate(0.03, control_period=2e-3, engine="compiled")
+    parts = experiment.closed_loop().controller.network.parts
+    held = [parts(run.outputs["network_state"]).held for run in (noisy, exact)]
+    first = 1 if name == "hold" else -1  # w is what is measured now, W what was so until now
+    assert (held[0][first] != held[1][first]).any()
 
 
 def test_messages_that_fall_between_steps_and_samples_come_at_the_same_instants():

@@ -320,6 +320,8 @@ def test_devices_are_refused_by_name_where_there_are_no_samples(role, integrator
         (lambda: small(sensors=Noise(1e-3)), "sensors"),
         (lambda: small(sensors=[Noise]), "sensors[0]"),
         (lambda: small(actuators=[1e-3]), "actuators[0]"),
+        (lambda: small(actuators=[Noise(1e-3)]), "actuators[0]"),
+        (lambda: small(sensors=[Noise(1e-3), Lag(1e-3)]), "sensors[1]"),
         (lambda: small(actuators=[Lag(1e-3), RateLimit(1.0)]), "actuators"),
         (lambda: small(actuators=[Lag(1e-3), Lag(2e-3)]), "actuators"),
         (lambda: small(actuators=[Ripple(0.1), Lag(2e-3)]), "actuators"),

@@ -137,6 +137,15 @@ def test_settings_go_there_and_back_as_plain_data_words_and_bytes(settings: dict
     assert run == same and run.status == "completed"
 
 
+@pytest.mark.parametrize("itself", [1.0, -1.0, NAN, INF])
+@pytest.mark.parametrize("setting", ["delay", "jitter", "loss"])
+def test_what_stands_on_the_diagonal_does_not_count(setting: str, itself: float) -> None:
+    value = np.array([[itself, 0.25], [0.5, itself]])
+    given = Network(0.1, **{setting: value})
+    assert given.as_dict() == Network(0.1, **{setting: [[0, 0.25], [0.5, 0]]}).as_dict()
+    assert value[0, 0] == itself or np.isnan(itself)  # the caller's own array is left alone
+
+
 def test_words_about_a_network_have_what_is_not_as_by_default() -> None:
     assert repr(Network()) == "Network()"
     assert repr(Network(period=0.01, loss=0.2, seed=0)) == "Network(period=0.01, loss=0.2)"

@@ -71,32 +71,34 @@ def delay_map(
     Args:
         cell, gains, q, t, k_r_space: see `delay_margin`.
         network: its period and its receiver; delay and loss are those of the grid.
-        delays: (D,), s, which are rounded to whole periods.
-        losses: (P,), probabilities below 1.
+        delays, losses: (D,), s, which are rounded to whole periods, and (P,), probabilities below 1.
         seed: of chance.
         trials: how often each point is tried; the worst one counts.
         duration: of a trial, s.
 
     Raises:
-        InputError: a value that does not fit, or a network without messages or with settings that have no
-            place here, named.
+        InputError: a value that does not fit, or a network that a map has no place for, named.
     """
     links = Links(cell.coupling)
     frozen = by_link(freeze(cell, gains, q=q, t=t, k_r_space=k_r_space), links)
     exchange = _exchange(network, frozen)
     late = np.rint(_within("delays", delays, np.inf) / exchange.period).astype(int)
     losses, trials = _within("losses", losses, 1.0), count("trials", trials)
-    steps, least = int(positive_number("duration", duration) / exchange.period), FEWEST + int(late.max())
-    if steps < least:
-        expected = f"at least {exchange.period * least:g} s, for the delay"
-        raise InputError.expected(expected, duration, "duration")
-    rng = np.random.default_rng(count("seed", seed, least=0))
-    chance = rng.random((steps, links.hearer.size, 1, trials))
-    lost = (chance < losses[:, None]).reshape(*chance.shape[:2], -1)
+    steps, rng = _steps(duration, exchange, late), np.random.default_rng(count("seed", seed, least=0))
+    lost = (rng.random((steps, links.count, 1, trials)) < losses[:, None]).reshape(steps, links.count, -1)
     start = np.tile(_start(frozen, rng, trials), losses.size)
     slopes = [_slopes(*_trial(frozen, exchange, int(k), lost, start), exchange.period) for k in late]
     worst = np.reshape(slopes, (late.size, losses.size, trials)).max(axis=2)
     return DelayMap(late * exchange.period, losses, worst, exchange.period)
+
+
+def _steps(duration: float, exchange: Exchange, late: np.ndarray) -> int:
+    """How many periods a trial lasts, in which messages come so many periods late, (D,)."""
+    steps, least = int(positive_number("duration", duration) / exchange.period), FEWEST + int(late.max())
+    if steps < least:
+        expected = f"at least {exchange.period * least:g} s, for the delay"
+        raise InputError.expected(expected, duration, "duration")
+    return steps
 
 
 def by_link(frozen: Frozen, links: Links) -> Frozen:

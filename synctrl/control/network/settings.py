@@ -48,9 +48,20 @@ def row_of(name: str, value: ArrayLike) -> np.ndarray:
     return array
 
 
+def _apart(value: Any) -> Any:
+    """A setting of pairs, with 0 where a robot would hear itself; anything else as it came."""
+    try:
+        given = np.asarray(value)
+    except ValueError:  # rows of different lengths
+        return value
+    if given.ndim != 2 or given.dtype.kind not in "iuf":
+        return value
+    return np.where(np.eye(*given.shape) > 0, 0, given)
+
+
 def of_pairs(name: str, value: ArrayLike, unit: str = ", s") -> np.ndarray:
-    """A number of at least 0, or (n, n) of them."""
-    array = _array(name, value)
+    """A number of at least 0, or (n, n) of them, with 0 for the diagonal whatever was given."""
+    array = _array(name, _apart(value))
     if array.ndim not in (0, 2) or array.shape != array.shape[::-1]:
         raise InputError.expected("a number, or (n, n) of them", array.shape, name)
     if array.min(initial=0.0) < 0:

@@ -13,13 +13,18 @@ from ...coupling.cell import Cell
 from ...errors import InputError
 from ...robots.model import joined, unit_for
 from ..plant import Output
-from .actuators import GRID, Actuator, Drive
-from .sensors import Sensor
+from .actuators import GRID, Actuator, DeadTime, Drive, Lag, RateLimit, Ripple, TorqueQuantisation
+from .sensors import Bias, DifferencedVelocity, Noise, Quantisation, Sensor
 
 #: outputs of a run with sensors, and of one with actuators, with their units where joints turn
 MEASURED = {"measured_q": "rad", "measured_v": "rad/s"}
 DRIVEN = {"actuator_torque": "N·m"}
 ROLES = "sensors", "actuators"
+#: parts that are of the other role than this one, and have the same methods
+OTHERS = {
+    "sensors": (DeadTime, Lag, RateLimit, Ripple, TorqueQuantisation),
+    "actuators": (Bias, DifferencedVelocity, Noise, Quantisation),
+}
 
 
 class LiveDevices:
@@ -140,8 +145,10 @@ class Devices:
 
 
 def _checked(role: str, parts: Any) -> Sequence[Any]:
-    """Parts of one role, each of which can be bound and says what it is."""
+    """Parts of one role, each of which can be bound, says what it is, and is none of the other role's."""
     instance(role, parts, Sequence, f"a sequence of {role}")
     for k, part in enumerate(parts):
         offers(f"{role}[{k}]", part, ("bind", "as_dict"), f"one of the {role}, with bind and as_dict")
+        if isinstance(part, OTHERS[role]):
+            raise InputError.expected(f"one of the {role}", type(part).__name__, f"{role}[{k}]")
     return parts
