@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from synctrl import Network
+from synctrl import Cell, Coupling, Experiment, Gains, Member, Network
 from synctrl.errors import NonFiniteError
 from synctrl.experiments import planar_four
+from synctrl.robots.catalog import load_robot
+from synctrl.tasks.trajectories import Hold
 
 
 def test_a_run_that_held_messages_tear_apart_says_so():
@@ -47,3 +49,18 @@ def test_a_controller_goes_elsewhere_with_its_messages_on_the_way(receiver: str)
     there = pickle.loads(pickle.dumps(here))
     for t in samples[6:]:
         np.testing.assert_array_equal(there.step(t, cell.q0 + t, cell.v0), here.step(t, cell.q0 + t, cell.v0))
+
+
+def test_instants_of_messages_grow_with_the_robots_only_with_jitter():
+    arm = load_robot("planar2r")
+
+    def instants(n: int, network: Network) -> int:
+        members = [Member(arm.placed((2.0 * i, 0, 0)), Hold([0.3, 1.0]), q0=[0.3, 1.0]) for i in range(n)]
+        cell, gains = Cell(members, Coupling.signed_ring(n)), Gains(10.0, 5.0, 4.0, 2.0, 0.5)
+        loop = Experiment(cell, gains, 0.1, network=network).closed_loop()
+        return len(loop.messages.between(0.0, 0.1))
+
+    for steady in (Network(0.01, delay=0.023, loss=0.3), Network(delay=0.023)):
+        assert instants(12, steady) == instants(4, steady)
+    unsteady = Network(0.01, delay=0.023, jitter=0.004)
+    assert instants(12, unsteady) > 2 * instants(4, unsteady)

@@ -79,7 +79,7 @@ class Recorder:
 
     def address_ahead(self, name: str) -> int | None:
         """Where the part of an array begins that is not logged yet; None if there is no such array."""
-        array = {**self._arrays, **self._damping.arrays}.get(name)
+        array = self._damping.arrays.get(name, self._arrays.get(name))
         return None if array is None else array[self.count :].ctypes.data
 
     def advance(self, times: np.ndarray) -> None:
