@@ -119,7 +119,8 @@ def map_caption(maps: Mapping[str, Mapping[str, DelayMap]]) -> str:
 _MARGINS = (
     "Robots that hear of each other late may swing, although each of them alone is well damped. Linear "
     "equations of small errors, frozen at the start, say from which delay on, and how seldom robots may "
-    "send. If K_r − a/(4Λ) Jᵀ cᵀ K_ε c J, a = max Σ_k S²_ki, is positive definite for every robot, every "
+    "send. If K_r − a/(4Λ) Jᵀ cᵀ K_ε c J is positive definite for every robot, where a is the largest "
+    "entry on the diagonal of SᵀS, every "
     "constant delay is tolerated: a theorem, with nothing to be computed but the least eigenvalue.",
     "Between messages a robot holds what it has heard, or extrapolates it, at most 1/(βa) long, or "
     "follows it with a filter of second order. In the maps robots send every 10 ms.",

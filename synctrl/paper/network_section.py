@@ -63,8 +63,9 @@ def messages(run: Result) -> float:
 
 def epsilon_curves(run: Result) -> list[Curves]:
     """Size of epsilon over time."""
+    unit = f"10⁻³ {run.info['weighted_unit']}"
     return [
-        Curves("synchronization errors of all pairs, |ε|", "mm", 1e3 * size_of_epsilon(run)[:, None], ["|ε|"])
+        Curves("synchronization errors of all pairs, |ε|", unit, 1e3 * size_of_epsilon(run)[:, None], ["|ε|"])
     ]
 
 
@@ -111,8 +112,8 @@ def a_filter_costs_almost_nothing(filtered: Result, ideal: Result) -> Claim:
         share <= ALMOST_NOTHING,
         (Finding("RMS of ε against ideal communication", share),),
         f"Asked: at most {ALMOST_NOTHING:g} times the RMS of ε with ideal communication, of four arms of "
-        "which one is pushed. The peak of the torque is another matter, see the table: the filter begins "
-        "at rest.",
+        "which one is pushed. The peak of the torque is another matter, see the table: it takes the filter "
+        "some time to follow.",
     )
 
 
@@ -163,7 +164,7 @@ NETWORK = Task(
     ),
     animated=("filter", "hold"),
     columns={
-        "RMS of |ε|, mm": lambda run: 1e3 * rms(run),
+        "RMS of ε, 10⁻³ m² or 10⁻³ rad": lambda run: 1e3 * rms(run),
         "peak torque, N·m": peak_torque,
         "messages (none: all the time)": messages,
     },
