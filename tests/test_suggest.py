@@ -260,10 +260,7 @@ def test_base_parameters_that_are_all_of_one_body_have_the_rates_of_their_body()
 # -- it works on arms --------------------------------------------------------------------------------------
 
 #: a large industrial arm, a light one, one with seven joints, and a small one
-SHORT = [
-    *(("a460", "joint"), ("a460", "position"), ("ur5", "pose")),
-    *(("xarm7", "position"), ("z1", "joint"), ("z1", "pose")),
-]
+SHORT = [("a460", "joint"), ("a460", "position"), ("ur5", "pose"), ("xarm7", "position"), ("z1", "joint")]
 
 
 @pytest.mark.parametrize(("name", "space"), SHORT)
