@@ -69,6 +69,15 @@ def test_what_hardly_lags_hardly_moves_the_margin(ur5):
     assert quick.delay == pytest.approx(expected, rel=1e-2) and quick.by == "analysis"
 
 
+@pytest.mark.parametrize(
+    ("sensors", "actuators"),
+    [([DifferencedVelocity(200.0)], []), ([], [DeadTime(1e-3)]), ([], [Lag(1e-3)])],
+)
+def test_growth_changes_its_sign_at_the_margin_with_any_device(ur5, sensors, actuators):
+    margin = delay_margin(ur5, GAINS, sensors=sensors, actuators=actuators, control_period=1e-3)
+    assert margin.growth(0.999 * margin.delay) < 0 < margin.growth(1.001 * margin.delay)
+
+
 def test_differences_lag_by_half_a_period_and_their_filter_by_its_time():
     T = 1e-3
     plain = equipment([DifferencedVelocity()], control_period=T)

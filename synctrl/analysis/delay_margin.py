@@ -7,7 +7,7 @@ What a robot hears of the others is d old, the same d for all links. Small error
 and the smallest d at which a root s = j omega stands on the imaginary axis is the margin. There e^{j omega d}
 is an eigenvalue of absolute value 1 of
 
-    G(j omega) = sent_W (j omega - A_0)^-1 heard (1, s + l, s (s + l)),    s = j omega, l the leak,
+    G(j omega) = V^T (j omega - A_0)^-1 U,    A_1 = U V^T with as many columns as its rank,
 
 which does not depend on d: where |eig G| crosses 1 gives omega, the angle of the eigenvalue gives d, and if
 nothing crosses no delay does harm. Roots at s = 0 are there whatever the delay is: nobody sees integrals of
@@ -175,14 +175,18 @@ def _parts(grid: np.ndarray) -> list[np.ndarray]:
 
 
 def _loops(frozen: Frozen, omega: np.ndarray) -> np.ndarray:
-    """Eigenvalues of G(j omega), (F, N), the largest first, at some frequencies, (F,)."""
-    s, N = 1j * omega[:, None, None], frozen.leak.size
-    W, w, w_dot = np.split(frozen.heard, 3, axis=1)
-    leaky = s + frozen.leak
-    driven = W + leaky * w + s * leaky * w_dot
-    G = frozen.sent[:N] @ np.linalg.solve(s * np.eye(len(frozen.own)) - frozen.own, driven)
+    """Eigenvalues of G(j omega), (F, rank of A_1), the largest first, at some frequencies, (F,)."""
+    U, V = _factors(frozen)
+    G = V @ np.linalg.solve(1j * omega[:, None, None] * np.eye(len(frozen.own)) - frozen.own, U)
     values = np.linalg.eigvals(G)
     return np.take_along_axis(values, np.argsort(-np.abs(values), axis=1), axis=1)
+
+
+def _factors(frozen: Frozen) -> tuple[np.ndarray, np.ndarray]:
+    """U, (X, r), and V^T, (r, X), of A_1 = U V^T, which has the rank r."""
+    U, S, V = np.linalg.svd(frozen.delayed)
+    rank = int((1e-13 * S[0] < S).sum())
+    return U[:, :rank] * S[:rank], V[:rank]
 
 
 def _characteristic(frozen: Frozen, s: complex, delay: float) -> np.ndarray:
@@ -204,13 +208,12 @@ def _refined(frozen: Frozen, s: complex, delay: float) -> complex:
 def _generator(frozen: Frozen, delay: float) -> np.ndarray:
     """The generator of the cell with what is under way at Chebyshev points between now and `delay` ago.
 
-    Only the part of x that acts when it arrives is kept: A_1 = (U S) V^T with as many rows as its rank.
+    Only V^T x is kept, the part of x that acts when it arrives.
     """
-    U, S, V = np.linalg.svd(frozen.delayed)
-    rank = int((1e-13 * S[0] < S).sum())
+    U, V = _factors(frozen)
     slope = differentiation(POINTS) * 2 / delay
-    arriving = np.kron(np.eye(POINTS)[-1:], U[:, :rank] * S[:rank])
-    entering, along = np.kron(slope[1:, :1], V[:rank]), np.kron(slope[1:, 1:], np.eye(rank))
+    arriving = np.kron(np.eye(POINTS)[-1:], U)
+    entering, along = np.kron(slope[1:, :1], V), np.kron(slope[1:, 1:], np.eye(len(V)))
     return np.block([[frozen.own, arriving], [entering, along]])
 
 
