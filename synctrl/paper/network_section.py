@@ -36,8 +36,6 @@ _pushed = partial(planar_four, disturbance="torque")
 _run = partial(PlannedRun, engine="compiled")
 _long = partial(PlannedRun, dt=2e-3, log_dt=1e-2, engine="compiled")
 #: runs that are drawn
-_long = partial(PlannedRun, dt=2e-3, log_dt=1e-2, engine="compiled")
-#: runs that are drawn
 COMPARED = "ideal", "late", "filter", "hold"
 
 
