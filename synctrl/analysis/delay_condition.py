@@ -21,9 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from ..control.controller import Controller
-from ..control.laws.sun_mills import BoundDiffusion, BoundInjection, BoundSunMills
-from ..control.network import BoundPosted, Links, WForm
+from ..control.laws.sun_mills import BoundDiffusion, BoundInjection, BoundSunMills, delay_damping
+from ..control.network import BoundPosted, WForm
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .replay import Replay, replay
@@ -95,19 +94,14 @@ def _margins(run: Replay) -> np.ndarray:
     x, controller = run.rows, run.loop.controller
     c, J = x.c[run.logged], x.J[run.logged]
     T = c @ J if controller.k_r_space == "joint" else c
-    missing = (reach(controller) - getattr(controller.law, "injection", 0.0))[:, None]
+    taken = delay_damping(controller.cell.coupling, controller.Lambda, controller.K_eps)
+    missing = (taken - getattr(controller.law, "injection", 0.0))[:, None]
     slack = controller.K_r[..., None] * np.eye(controller.K_r.shape[-1]) - T.mT @ (missing * T)
     found = np.empty(slack.shape[:2])
     for i, robot in enumerate(run.loop.cell.robots):
         k = robot.nv if controller.k_r_space == "joint" else controller.cell.m
         found[:, i] = np.linalg.eigvalsh(slack[:, i, :k, :k])[..., 0]
     return found
-
-
-def reach(controller: Controller) -> np.ndarray:
-    """a/(4 Lambda) K_eps, (m,): how much of the damping delays may take, in the coordinates of r."""
-    a = float(Links(controller.cell.coupling).own.max())
-    return a / (4 * controller.Lambda) * controller.K_eps
 
 
 def _reason(run: Replay, network: WForm, margin: float | None) -> str | None:

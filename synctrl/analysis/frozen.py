@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, finite_number, instance
 from ..control.controller import Controller
 from ..control.gains import Gains
+from ..control.laws.sun_mills import delay_damping
 from ..coupling.cell import Cell
 
 
@@ -109,7 +110,7 @@ def freeze(
     place = cell.q0 if q is None else finite_array("q", q, (cell.n, cell.nv))
     S = cell.coupling.matrix
     L = S.T @ S
-    arms = _arms(controller, place, finite_number("t", t), float(L.diagonal().max()))
+    arms = _arms(controller, place, finite_number("t", t))
     own, heard, sent = _matrices(controller, arms, L)
     least = np.array([arm.least_eigenvalue for arm in arms])
     joints = tuple(robot.nv for robot in cell.robots)
@@ -125,8 +126,8 @@ def _proved(controller: Controller, least: np.ndarray, L: np.ndarray) -> bool:
     return bool(not controller.leak.any() and slack > -1e-12 * L.max() and least.min() > 0)
 
 
-def _arms(controller: Controller, q: np.ndarray, t: float, most: float) -> list[Arm]:
-    """All robots at q, (n, nv), with the weights of an instant; `most` is the largest entry of D."""
+def _arms(controller: Controller, q: np.ndarray, t: float) -> list[Arm]:
+    """All robots at q, (n, nv), with the weights of an instant."""
     cell = controller.cell
     reference = cell.references(np.array([t]))[0]
     task = cell.task.measure(np.stack((q, np.zeros_like(q))), reference.desired)
@@ -141,7 +142,7 @@ def _arms(controller: Controller, q: np.ndarray, t: float, most: float) -> list[
         J = np.eye(cell.m) if task.J is None else task.J[i, :, :k]
         M = robot.mass_matrix(q[i, :k])
         Z = gain * (np.eye(k) - P[i, :k] @ J)
-        arms.append(_arm(controller, i, M, c @ J, P[i, :k] @ c_inv, Z, J, most))
+        arms.append(_arm(controller, i, M, c @ J, P[i, :k] @ c_inv, Z, J))
     return arms
 
 
@@ -153,14 +154,14 @@ def _arm(
     P: np.ndarray,
     Z: np.ndarray,
     J: np.ndarray,
-    most: float,
 ) -> Arm:
     """One robot, with damping that acts in its joints or in its task."""
     in_joints = controller.k_r_space == "joint"
     K_r, K_eps = controller.K_r[i, : T.shape[-1] if in_joints else len(T)], controller.K_eps
     acting = T if in_joints else T @ np.linalg.pinv(J)
     B = np.diag(K_r) if in_joints else J.T @ (K_r[:, None] * J)
-    bound = acting.T @ ((0.25 * most * K_eps / controller.Lambda)[:, None] * acting)
+    taken = delay_damping(controller.cell.coupling, controller.Lambda, K_eps)
+    bound = acting.T @ (taken[:, None] * acting)
     least = float(np.linalg.eigvalsh(np.diag(K_r) - bound)[0])
     return Arm(T, P, Z, np.linalg.solve(M, B), np.linalg.solve(M, T.T * K_eps), least)
 

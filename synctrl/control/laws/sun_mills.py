@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from ...checks import boolean, choice, finite_array
 from ...coupling.cell import Cell
+from ...coupling.coupling import Coupling
 from ...errors import InputError
 from ..gains import Gains, spread
 from .protocol import DIFFUSION, Along, Asked, Errors, Proof
@@ -74,9 +75,7 @@ class SunMills:
             raise InputError.expected("rates up to Lambda, beyond which nothing is proved", found, "leak")
         law: Any = BoundSunMills(Lambda, beta, K_eps, self.reference_acceleration, leak)
         if self.injection:
-            starts, _, entries = cell.coupling.incidence
-            a = np.add.reduceat(entries**2, starts[:-1]).max()
-            law = BoundInjection(law, a / (4 * Lambda) * K_eps)
+            law = BoundInjection(law, delay_damping(cell.coupling, Lambda, K_eps))
         K_2 = spread("diffusion", self.diffusion, (cell.m,))
         return BoundDiffusion(law, K_2) if K_2.any() else law
 
@@ -88,6 +87,19 @@ class SunMills:
             **({"injection": True} if self.injection else {}),
             **({"diffusion": self.diffusion.tolist()} if self.diffusion.any() else {}),
         }
+
+
+def delay_damping(coupling: Coupling, Lambda: np.ndarray, K_eps: np.ndarray) -> np.ndarray:
+    """a/(4 Lambda) K_eps, a = max (S^T S)_ii: how much of the damping of r delays may take, (m,), K_eps s.
+
+    Args:
+        coupling: which robots are compared, S.
+        Lambda: (m,), 1/s.
+        K_eps: (m,).
+    """
+    starts, _, entries = coupling.incidence
+    a = np.add.reduceat(entries**2, starts[:-1]).max()
+    return a / (4 * Lambda) * K_eps
 
 
 class BoundSunMills:
