@@ -91,9 +91,23 @@ def test_messages_under_way_are_heard_in_the_order_in_which_they_were_sent(recei
     receiving = state[2:5] / state[0]
     age = (np.floor(share) + 1) * period  # of what was heard last, just before the next message is sent
     past, grown = np.exp(-a * age), a * age
-    if receiver != "filter":
+    if receiver == "filter":
+        held = past * np.exp(-a * period * np.arange(60))[::-1]
+        times = np.append(np.full(59, period), period * (1 - share % 1))
+        np.testing.assert_allclose(receiving, (past, *filtered(held, times, 40.0)), rtol=1e-9)
+    else:
         believed = past * (1.0 if receiver == "hold" else 1 + grown + 0.5 * grown**2)
         assert receiving[0] == pytest.approx(believed, rel=1e-9)
+
+
+def filtered(held, times, omega):
+    """What a filter of second order has after it was pulled to values, each for a time, and its rate."""
+    value = rate = 0.0
+    for target, t in zip(held, times, strict=True):
+        off, fades = value - target, np.exp(-omega * t)
+        slope = rate + omega * off
+        value, rate = target + (off + slope * t) * fades, (rate - omega * slope * t) * fades
+    return value, rate
 
 
 def test_extrapolation_stops_at_its_horizon():
