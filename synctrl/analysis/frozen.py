@@ -96,11 +96,7 @@ def freeze(
     """The cell under the paper's law, frozen at one place.
 
     Args:
-        cell: robots, task and coupling.
-        gains: its gains; Gamma has no part in it.
-        q: joint positions, (n, nv), rad; by default those at which the cell starts.
-        t: instant whose weights count, s.
-        k_r_space: where the damping acts, see `Controller`.
+        cell, gains, q, t, k_r_space: see `delay_margin`.
 
     Raises:
         InputError: gains or positions of the wrong size, or an unknown word.
