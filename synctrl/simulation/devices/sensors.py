@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from ...checks import count, positive_number
 from ...coupling.cell import Cell
-from .settings import Settings, at_joints, numbers_of
+from .settings import Settings, at_joints, in_steps, numbers_of
 
 Measure = Callable[[int, np.ndarray], np.ndarray]
 """Number of a sample, from 0, and positions and velocities of the joints, (2, n, nv), rad and rad/s, or m and
@@ -152,9 +152,8 @@ class _Difference:
 
 
 def _quantised(step: np.ndarray, k: int, motion: np.ndarray) -> np.ndarray:
-    found, counts = motion.copy(), step > 0
-    found[0][counts] = step[counts] * np.rint(motion[0][counts] / step[counts])
-    return found
+    q, v = motion
+    return np.array((in_steps(q, step), v))
 
 
 def _noisy(deviations: np.ndarray, seed: int, k: int, motion: np.ndarray) -> np.ndarray:

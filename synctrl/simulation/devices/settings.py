@@ -49,5 +49,12 @@ def at_joints(name: str, value: ArrayLike, cell: Cell) -> np.ndarray:
     return np.where(joints, spread(name, np.asarray(value), (cell.n, cell.nv)), 0.0)
 
 
+def in_steps(values: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """The nearest multiples step round(values / step), (n, nv); values as they are where the step is 0."""
+    found, steps = values.copy(), step > 0
+    found[steps] = step[steps] * np.rint(values[steps] / step[steps])
+    return found
+
+
 def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
