@@ -14,7 +14,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import count, positive_number
+from ...checks import positive_number
+from ...control.network.settings import seed_of
 from ...coupling.cell import Cell
 from .settings import Settings, at_joints, in_steps, numbers_of
 
@@ -70,7 +71,7 @@ class Noise(Settings):
 
     Args:
         q, v: standard deviations, numbers, (nv,) or (n, nv), rad (or m) and rad/s (or m/s).
-        seed: a whole number of at least 0.
+        seed: a whole number of at least 0 and below 2^63.
 
     Raises:
         InputError: not numbers, not finite, below 0, or no seed.
@@ -83,7 +84,7 @@ class Noise(Settings):
     def __post_init__(self) -> None:
         self._set("q", numbers_of("q", self.q, 0.0))
         self._set("v", numbers_of("v", self.v, 0.0))
-        self._set("seed", count("seed", self.seed, least=0))
+        self._set("seed", seed_of(self.seed))
 
     def bind(self, cell: Cell, period: float) -> Measure:
         return partial(_noisy, _of_both(self, cell), self.seed)
