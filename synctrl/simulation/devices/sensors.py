@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,29 +17,15 @@ from numpy.typing import ArrayLike
 from ...checks import positive_number
 from ...control.network.settings import seed_of
 from ...coupling.cell import Cell
-from .settings import Settings, at_joints, in_steps, numbers_of
+from .settings import Device, Settings, at_joints, in_steps, numbers_of
 
 Measure = Callable[[int, np.ndarray], np.ndarray]
 """Number of a sample, from 0, and positions and velocities of the joints, (2, n, nv), rad and rad/s, or m and
 m/s -> what is measured of them, an array of its own. Samples come one after another."""
 
 
-class Sensor(Protocol):
-    """What measures the joints of a cell; it is the same after runs as before them."""
-
-    def bind(self, cell: Cell, period: float) -> Measure:
-        """How it measures in one run, from its start.
-
-        Args:
-            cell: the robots.
-            period: time between two samples, s.
-
-        Raises:
-            InputError: what does not fit, named.
-        """
-
-    def as_dict(self) -> dict[str, Any]:
-        """Name and settings as plain data."""
+class Sensor(Device[Measure], Protocol):
+    """What measures the joints of a cell."""
 
 
 @dataclass(frozen=True, eq=False)
