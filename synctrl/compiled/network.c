@@ -117,8 +117,8 @@ static void delayed(const Cell *c, const Quantities *a, int link, double t, doub
         for (int j = 0; j < m; j++) { heard[j] = (then - since) * w[j]; heard[m + j] = w[j]; heard[2 * m + j] = 0; }
     } else {
         const double *kept = a->memory + x->kept + (size_t)x->sender[link] * 3 * m;
-        double before = floor(then / x->grid - x->near);
-        size_t places = x->places, place = before, one = (size_t)c->n * 3 * m;
+        double before = floor(then / x->grid - x->near); /* -1 at the beginning */
+        size_t places = x->places, place = before + x->places, one = (size_t)c->n * 3 * m;
         between(x, (const double *[]){ kept + place % places * one, kept + (place + 1) % places * one },
                 then / x->grid - before, heard);
     }
