@@ -18,6 +18,7 @@ from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, carry_planar, planar_four, ur5_payload
 from synctrl.simulation.devices import Lag, Noise
 from synctrl.simulation.result import LAYOUT
+from synctrl.sweep.variations import with_moved_start
 
 pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
 
@@ -111,9 +112,10 @@ def test_integrals_that_leak_agree_over_a_network(receiver):
     assert_same_run(replace(experiment, gains=experiment.gains.replace(leak=3.0)))
 
 
-def test_delays_agree_where_integrals_leak():
-    experiment = planar_four(network=NETWORKS["delays"])
-    assert_same_run(replace(experiment, gains=experiment.gains.replace(leak=3.0)))
+@pytest.mark.parametrize("moved", [0.0, 1e-3])
+def test_delays_agree_where_integrals_leak(moved):
+    experiment = with_moved_start(planar_four(network=NETWORKS["delays"]), moved, "q0", robot=0)
+    assert_same_run(replace(experiment, gains=experiment.gains.replace(leak=3.0)))  # moved: w(0) is not 0
 
 
 def test_robots_that_carry_an_object_agree_over_a_network():

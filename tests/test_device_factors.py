@@ -102,5 +102,6 @@ def test_a_sweep_of_continuous_control_has_rows_that_were_refused_by_name(tmp_pa
 def test_a_value_that_a_device_does_not_take_is_refused_and_named():
     with refused(InputError, "step"):
         with_device(base(), -1.0, "Quantisation", "step")
-    with refused(InputError, "noise_seed", found=0.5):
-        sweep.noise_seed(Grid([0.5])).change(base(), 0.5)
+    for seed in (0.5, "three"):
+        with refused(InputError, "seed"):
+            sweep.noise_seed(Grid([seed])).change(base(), seed)

@@ -308,6 +308,7 @@ def test_devices_are_refused_by_name_where_there_are_no_samples(role, integrator
         (lambda: Quantisation(-1e-3), "step"),
         (lambda: Noise(-1.0), "q"),
         (lambda: Noise(seed=-1), "seed"),
+        (lambda: Noise(seed=2**63), "seed"),
         (lambda: Bias(np.nan), "q"),
         (lambda: DifferencedVelocity(0.0), "omega"),
         (lambda: TorqueQuantisation("fine"), "step"),

@@ -1,10 +1,10 @@
 /* The closed loop of a cell, from step to step.
  *
- * Above this text stands `network.c`, and above that the sizes of rows (m, nv, P, Z, K, bodies, tip, ...), marks of steps, lists of quantities,
- * the structures, and the generated functions of each kind of robot with the table `kinds`; see structs.py. What the
- * quantities are is said in quantities.py. Arrays are row-major and have one row per robot or pair; rows are padded to
- * the largest robot. The state y is made of the quantities in STATE, one after another; what stands behind them is
- * changed by events alone, between two calls.
+ * Above this text stands `network.c`, and above that the sizes of rows (m, nv, P, Z, K, bodies, tip, ...), marks of
+ * steps, lists of quantities, the structures, and the generated functions of each kind of robot with the table `kinds`;
+ * see structs.py. What the quantities are is said in quantities.py. Arrays are row-major and have one row per robot or
+ * pair; rows are padded to the largest robot. The state y is made of the quantities in STATE, one after another; what
+ * stands behind them is changed by events alone, between two calls.
  */
 
 #include <math.h>

@@ -108,20 +108,20 @@ static void between(const Exchange *x, const double *ends[2], double u, double *
     }
 }
 
-/* What was so a while ago; before the beginning w was what it is there. */
+/* What was so a while ago; before the beginning W = t w with the w of then. */
 static void delayed(const Cell *c, const Quantities *a, int link, double t, double *heard) {
     const Exchange *x = &c->exchange;
-    const double *kept = a->memory + x->kept + (size_t)x->sender[link] * 3 * m;
     double since = a->memory[x->since], then = t - x->delay[link];
     if (t < since + x->delay[link]) {
         const double *w = a->memory + x->first + (size_t)x->sender[link] * m;
         for (int j = 0; j < m; j++) { heard[j] = (then - since) * w[j]; heard[m + j] = w[j]; heard[2 * m + j] = 0; }
-        return;
+    } else {
+        const double *kept = a->memory + x->kept + (size_t)x->sender[link] * 3 * m;
+        double before = floor(then / x->grid - x->near); /* -1 at the beginning */
+        size_t places = x->places, place = before + x->places, one = (size_t)c->n * 3 * m;
+        between(x, (const double *[]){ kept + place % places * one, kept + (place + 1) % places * one },
+                then / x->grid - before, heard);
     }
-    double before = floor(then / x->grid - x->near);
-    size_t places = x->places, place = before, one = (size_t)c->n * 3 * m;
-    between(x, (const double *[]){ kept + place % places * one, kept + (place + 1) % places * one },
-            then / x->grid - before, heard);
     without_leak(a, heard);
 }
 

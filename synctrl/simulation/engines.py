@@ -260,7 +260,17 @@ def carry_out(
     tolerances: tuple[float, float],
     progress: Progress | None,
 ) -> Result:
-    """Check what is left to be checked, and make a run."""
+    """Check what is left to be checked, and make a run.
+
+    Args:
+        run: the run.
+        integrator, engine, progress: as of `Experiment.simulate`.
+        tolerances: rtol and atol of SciPy's methods.
+
+    Raises:
+        InputError: one of them means nothing, they do not go together, or the engine refuses the run.
+        SimulationError: the run had to stop; it carries what was logged.
+    """
     choice("integrator", integrator, ("rk4", *ADAPTIVE))
     by = find_engine(engine)
     if progress is not None and not callable(progress):

@@ -6,7 +6,6 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from ..errors import InputError
 from ..simulation.devices import (
     Bias,
     DeadTime,
@@ -19,8 +18,9 @@ from ..simulation.devices import (
     TorqueQuantisation,
 )
 from ..simulation.simulate import Experiment
-from .distributions import Values
+from .distributions import Value, Values
 from .factors import Factor
+from .variations import as_whole
 
 #: in the order in which a device that an experiment does not have yet takes its place
 ORDER: dict[str, tuple[Any, ...]] = {
@@ -52,15 +52,9 @@ def with_device(experiment: Experiment, value: Any, device: str, setting: str) -
     return replace(experiment, **fitted)
 
 
-def with_seed(experiment: Experiment, value: float) -> Experiment:
-    """Another seed of the noise; tables have numbers, so it may be a float that is whole.
-
-    Raises:
-        InputError: it is not whole.
-    """
-    if value != int(value):
-        raise InputError.expected("whole numbers", value, "noise_seed")
-    return with_device(experiment, int(value), "Noise", "seed")
+def with_seed(experiment: Experiment, value: Value) -> Experiment:
+    """Another seed of the noise."""
+    return with_device(experiment, as_whole(value), "Noise", "seed")
 
 
 def encoder_resolution(values: Values) -> Factor:

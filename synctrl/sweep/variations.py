@@ -111,10 +111,14 @@ def with_setting(experiment: Experiment, value: Value, setting: str) -> Experime
     return replace(experiment, network=_network(experiment).replace(**{setting: value}))
 
 
-def with_seed(experiment: Experiment, value: float) -> Experiment:
-    """Another seed of the network, a whole number that a table may have as a float."""
-    whole = isinstance(value, float) and value.is_integer()
-    return with_setting(experiment, int(value) if whole else value, "seed")
+def with_seed(experiment: Experiment, value: Value) -> Experiment:
+    """Another seed of the network."""
+    return with_setting(experiment, as_whole(value), "seed")
+
+
+def as_whole(value: Value) -> Value:
+    """A whole number that a table has as a float as what it is; any other value stays."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def with_burst(experiment: Experiment, value: float, part: int) -> Experiment:

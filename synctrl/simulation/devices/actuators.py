@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from ...checks import finite_number, non_negative_number, shaped
 from ...coupling.cell import Cell
 from ...errors import InputError
-from .settings import Settings, at_joints, numbers_of
+from .settings import Device, Settings, at_joints, in_steps, numbers_of
 
 Command = Callable[[np.ndarray], np.ndarray]
 """Torque that is asked for at a sample, (n, nv), N·m -> torque that is passed on. Samples come in order."""
@@ -28,22 +28,8 @@ Command = Callable[[np.ndarray], np.ndarray]
 GRID = 1e-9
 
 
-class Actuator(Protocol):
-    """What acts on the torque that is asked for at samples; it is the same after runs as before them."""
-
-    def bind(self, cell: Cell, period: float) -> Command:
-        """How it acts in one run, from its start.
-
-        Args:
-            cell: the robots.
-            period: time between two samples, s.
-
-        Raises:
-            InputError: what does not fit, named.
-        """
-
-    def as_dict(self) -> dict[str, Any]:
-        """Name and settings as plain data."""
+class Actuator(Device[Command], Protocol):
+    """What acts on the torque that is asked for at samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +49,7 @@ class TorqueQuantisation(Settings):
         self._set("step", numbers_of("step", self.step, 0.0))
 
     def bind(self, cell: Cell, period: float) -> Command:
-        return partial(_in_steps, at_joints("step", self.step, cell))
+        return partial(in_steps, step=at_joints("step", self.step, cell))
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,12 +222,6 @@ class _Limited:
         last = tau if self._last is None else self._last
         self._last = last + np.clip(tau - last, -self._largest, self._largest)
         return self._last
-
-
-def _in_steps(step: np.ndarray, tau: np.ndarray) -> np.ndarray:
-    found, steps = tau.copy(), step > 0
-    found[steps] = step[steps] * np.rint(tau[steps] / step[steps])
-    return found
 
 
 def _kept(tau: np.ndarray) -> np.ndarray:

@@ -9,36 +9,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import count, positive_number
+from ...checks import positive_number
+from ...control.network.settings import seed_of
 from ...coupling.cell import Cell
-from .settings import Settings, at_joints, numbers_of
+from .settings import Device, Settings, at_joints, in_steps, numbers_of
 
 Measure = Callable[[int, np.ndarray], np.ndarray]
 """Number of a sample, from 0, and positions and velocities of the joints, (2, n, nv), rad and rad/s, or m and
 m/s -> what is measured of them, an array of its own. Samples come one after another."""
 
 
-class Sensor(Protocol):
-    """What measures the joints of a cell; it is the same after runs as before them."""
-
-    def bind(self, cell: Cell, period: float) -> Measure:
-        """How it measures in one run, from its start.
-
-        Args:
-            cell: the robots.
-            period: time between two samples, s.
-
-        Raises:
-            InputError: what does not fit, named.
-        """
-
-    def as_dict(self) -> dict[str, Any]:
-        """Name and settings as plain data."""
+class Sensor(Device[Measure], Protocol):
+    """What measures the joints of a cell."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +57,7 @@ class Noise(Settings):
 
     Args:
         q, v: standard deviations, numbers, (nv,) or (n, nv), rad (or m) and rad/s (or m/s).
-        seed: a whole number of at least 0.
+        seed: a whole number of at least 0 and below 2^63.
 
     Raises:
         InputError: not numbers, not finite, below 0, or no seed.
@@ -83,7 +70,7 @@ class Noise(Settings):
     def __post_init__(self) -> None:
         self._set("q", numbers_of("q", self.q, 0.0))
         self._set("v", numbers_of("v", self.v, 0.0))
-        self._set("seed", count("seed", self.seed, least=0))
+        self._set("seed", seed_of(self.seed))
 
     def bind(self, cell: Cell, period: float) -> Measure:
         return partial(_noisy, _of_both(self, cell), self.seed)
@@ -152,9 +139,8 @@ class _Difference:
 
 
 def _quantised(step: np.ndarray, k: int, motion: np.ndarray) -> np.ndarray:
-    found, counts = motion.copy(), step > 0
-    found[0][counts] = step[counts] * np.rint(motion[0][counts] / step[counts])
-    return found
+    q, v = motion
+    return np.array((in_steps(q, step), v))
 
 
 def _noisy(deviations: np.ndarray, seed: int, k: int, motion: np.ndarray) -> np.ndarray:

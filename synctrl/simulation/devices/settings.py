@@ -1,9 +1,9 @@
-"""What all sensors and actuators share: settings that say what they are, and numbers per joint."""
+"""What all sensors and actuators share: methods, settings that say what they are, and numbers per joint."""
 
 from __future__ import annotations
 
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,27 @@ from ...checks import finite_array
 from ...control.gains import spread
 from ...coupling.cell import Cell
 from ...errors import InputError
+
+#: the function of samples by which a device acts in one run
+Bound = TypeVar("Bound", covariant=True)
+
+
+class Device(Protocol[Bound]):
+    """A sensor or an actuator; it is the same after runs as before them."""
+
+    def bind(self, cell: Cell, period: float) -> Bound:
+        """How it acts in one run, from its start.
+
+        Args:
+            cell: the robots.
+            period: time between two samples, s.
+
+        Raises:
+            InputError: what does not fit, named.
+        """
+
+    def as_dict(self) -> dict[str, Any]:
+        """Name and settings as plain data."""
 
 
 class Settings:
@@ -47,6 +68,13 @@ def at_joints(name: str, value: ArrayLike, cell: Cell) -> np.ndarray:
     """
     joints = np.arange(cell.nv) < np.array([[robot.nv] for robot in cell.robots])
     return np.where(joints, spread(name, np.asarray(value), (cell.n, cell.nv)), 0.0)
+
+
+def in_steps(values: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """The nearest multiples step round(values / step), (n, nv); values as they are where the step is 0."""
+    found, steps = values.copy(), step > 0
+    found[steps] = step[steps] * np.rint(values[steps] / step[steps])
+    return found
 
 
 def _plain(value: Any) -> Any:
