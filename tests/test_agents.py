@@ -37,7 +37,7 @@ from synctrl import (
     load_robot,
 )
 from synctrl.control.adaptation import Ball, Box, Composite, Gradient, Leakage, Natural
-from synctrl.control.laws import ChungSlotine, MasterSlave, ShapeKeeping, SlotineLi
+from synctrl.control.laws import ChungSlotine, MasterSlave, ShapeKeeping, SlotineLi, SunMills
 from synctrl.errors import InputError, ResultError
 from synctrl.experiments import a460_pair, mixed_four, planar_four
 
@@ -201,6 +201,7 @@ WHOLES: dict[str, Callable[[], Experiment]] = {
     "limits that are known": lambda: small_pair(saturate=True),
     "integrals that leak": lambda: small_pair(gains=Gains(10.0, 5.0, 4.0, 2.0, 0.5, leak=1.0)),
     "damping in task space": lambda: small_pair(k_r_space="task"),
+    "damping of what delays may take": lambda: small_pair(law=SunMills(injection=True)),
     "xref'' as printed": lambda: small_pair(reference_acceleration="paper"),
     "Chung and Slotine": lambda: independent(ChungSlotine(0.5)),
     "Slotine and Li": lambda: independent(SlotineLi()),

@@ -23,7 +23,7 @@ import numpy as np
 
 from ..control.controller import Controller
 from ..control.laws.sun_mills import BoundDiffusion, BoundInjection, BoundSunMills
-from ..control.network import BoundPosted, Links, WForm
+from ..control.network import BoundPosted, WForm
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .replay import Replay, replay
@@ -106,8 +106,7 @@ def _margins(run: Replay) -> np.ndarray:
 
 def reach(controller: Controller) -> np.ndarray:
     """a/(4 Lambda) K_eps, (m,): how much of the damping delays may take, in the coordinates of r."""
-    a = float(Links(controller.cell.coupling).own.max())
-    return a / (4 * controller.Lambda) * controller.K_eps
+    return controller.cell.coupling.degree / (4 * controller.Lambda) * controller.K_eps
 
 
 def _reason(run: Replay, network: WForm, margin: float | None) -> str | None:

@@ -74,9 +74,7 @@ class SunMills:
             raise InputError.expected("rates up to Lambda, beyond which nothing is proved", found, "leak")
         law: Any = BoundSunMills(Lambda, beta, K_eps, self.reference_acceleration, leak)
         if self.injection:
-            starts, _, entries = cell.coupling.incidence
-            a = np.add.reduceat(entries**2, starts[:-1]).max()
-            law = BoundInjection(law, a / (4 * Lambda) * K_eps)
+            law = BoundInjection(law, cell.coupling.degree / (4 * Lambda) * K_eps)
         K_2 = spread("diffusion", self.diffusion, (cell.m,))
         return BoundDiffusion(law, K_2) if K_2.any() else law
 
