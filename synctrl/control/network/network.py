@@ -45,7 +45,7 @@ class Network:
 
     Args:
         period: between two messages of a robot; None for exchange in continuous time, with exact delays.
-        delay: how late a robot hears another.
+        delay: how late a robot hears another; in continuous time 0 or at least 1e-6.
         jitter: longest random addition to the delay of a message.
         loss: probability that a message is lost, below 1.
         burst: probabilities per message that a link goes from good to bad, and from bad to good; in between
