@@ -37,7 +37,7 @@ from synctrl import (
     load_robot,
 )
 from synctrl.control.adaptation import Ball, Box, Composite, Gradient, Leakage, Natural
-from synctrl.control.laws import ChungSlotine, MasterSlave, ShapeKeeping, SlotineLi
+from synctrl.control.laws import ChungSlotine, MasterSlave, ShapeKeeping, SlotineLi, SunMills
 from synctrl.errors import InputError, ResultError
 from synctrl.experiments import a460_pair, mixed_four, planar_four
 
@@ -201,6 +201,7 @@ WHOLES: dict[str, Callable[[], Experiment]] = {
     "limits that are known": lambda: small_pair(saturate=True),
     "integrals that leak": lambda: small_pair(gains=Gains(10.0, 5.0, 4.0, 2.0, 0.5, leak=1.0)),
     "damping in task space": lambda: small_pair(k_r_space="task"),
+    "damping of what delays may take": lambda: small_pair(law=SunMills(injection=True)),
     "xref'' as printed": lambda: small_pair(reference_acceleration="paper"),
     "Chung and Slotine": lambda: independent(ChungSlotine(0.5)),
     "Slotine and Li": lambda: independent(SlotineLi()),
@@ -469,6 +470,23 @@ def test_a_desired_motion_of_the_callers_own_replaces_the_robots() -> None:
     assert not np.array_equal(agent.step(*seen[1], (), xd + 0.1), usual.step(*seen[1]))
 
 
+@pytest.mark.parametrize(
+    ("subject", "given"),
+    [
+        *(
+            ("desired", wrong)
+            for wrong in (1.0, "x", [[1], [1, 2]], np.zeros((3, 3)), np.full((3, 2), np.nan))
+        ),
+        *(("inbox", wrong) for wrong in (None, 3, heard(0), heard(0).to_bytes())),
+    ],
+    ids=repr,
+)
+def test_what_a_sample_cannot_be_given_is_refused(subject: str, given: object) -> None:
+    agent, seen = one()
+    with refused(InputError, subject):
+        agent.step(*seen[0], **{subject: given})
+
+
 # -- what cannot be an agent ------------------------------------------------------------------------------
 
 
@@ -500,3 +518,9 @@ def test_an_agent_is_made_of_a_controller_with_a_mailbox() -> None:
         Agent(whole.controller, PERIOD)
     with refused(InputError, "controller"):
         Agent(None, PERIOD)
+
+
+@pytest.mark.parametrize("wrong", ["x", 5.0, [1.0], [[1.0, 2.0]], [-1.0, 1.0], [np.nan, 1.0]])
+def test_limits_that_are_none_of_its_joints_are_refused(wrong: object) -> None:
+    with refused(InputError, "torque_limits"):
+        Agent(one()[0]._loop.controller, PERIOD, torque_limits=wrong)

@@ -64,6 +64,14 @@ def test_compare_and_distribute_are_s_and_its_transpose(graph, columns, random):
     np.testing.assert_allclose(coupling.distribute(z), S.T @ z, atol=1e-12)
 
 
+@given(connected_graphs())
+def test_the_degree_is_the_largest_entry_of_the_diagonal_of_s_transposed_s(graph):
+    n, edges, signs = graph
+    coupling = quiet(n, edges, signs, np.ones(n))
+    for made in (coupling, coupling.weighted(np.linspace(0.5, 2.0, len(edges)))):
+        np.testing.assert_allclose(made.degree, np.diag(made.matrix.T @ made.matrix).max(), rtol=1e-14)
+
+
 @given(st.integers(2, 9), st.integers(1, 3))
 def test_the_sum_compares_and_distributes_as_its_matrix_does(n, columns):
     rng = np.random.default_rng(n)

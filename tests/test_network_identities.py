@@ -19,6 +19,7 @@ from synctrl.analysis.replay import replay
 from synctrl.control.adaptation import Composite, Leakage
 from synctrl.control.laws import ChungSlotine, SlotineLi
 from synctrl.control.network import Received
+from synctrl.control.network.delayed import FINEST, GRID
 from synctrl.experiments import carry_planar
 
 FREE = GAINS.replace(K_eps=0.0)
@@ -121,6 +122,25 @@ def test_without_k_eps_v_falls_by_damping_alone_whatever_the_delays(seed):
     record = found.lyapunov
     assert found.certified, str(found)
     np.testing.assert_allclose(record.V_dot, record.power["damping"], atol=record.rounding.max())
+
+
+@pytest.mark.parametrize("delay", [FINEST, GRID])
+def test_rounding_of_w_leaves_what_is_heard_of_its_derivatives_alone(delay):
+    cell = experiment(coupling("pair", 2, 1)).cell
+    network, start, rate = Network(delay=delay).bind(cell), 1.0, 9.0
+
+    def at(t: float) -> np.ndarray:
+        W = [0.1 + np.sin(rate * t) / rate, np.cos(rate * t), -rate * np.sin(rate * t)]
+        return np.broadcast_to(np.array(W)[:, None, None], (3, cell.n, cell.m))
+
+    memory, first = network.start(), round(start / delay)
+    for k in range(first, first + 3):
+        network.parts(memory).W[...] = at(k * delay)[0]
+        memory = network.meet(k * delay, at(k * delay)[1:], memory)
+    for share in np.linspace(0.05, 0.95, 19):
+        t = (first + 1 + share) * delay
+        found = network.heard(t + delay, at(t + delay), memory)
+        np.testing.assert_allclose(found, at(t)[:, network.links.sender], rtol=0, atol=1e-2)
 
 
 def graphs(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

@@ -20,6 +20,7 @@ from seams.posted_network import BoundPosted, Posted
 
 from synctrl import Experiment, Network, Result
 from synctrl.analysis.certify import certify
+from synctrl.control.network.delayed import FINEST
 from synctrl.errors import InputError, SynctrlError
 from synctrl.experiments import bead_on_path, carry_planar
 from synctrl.simulation.result import LAYOUT
@@ -92,7 +93,8 @@ CASES = list(
         ),
         bad({**POSTED, "event": 1e-3}, heartbeat=NOT_POSITIVE),
         bad({**POSTED, "receiver": "extrapolate"}, horizon=(*NOT_POSITIVE, 10.0, 1e300)),
-        bad({}, delay=(1e-10, 1e-300, 1e9, 1e300, 9.0, [[0, 1e-12], [0.1, 0]], [[0, 1e-300], [1e9, 0]])),
+        bad({}, delay=(0.9 * FINEST, 1e-300, 1e9, 1e300, 9.0, [[0, 1e-12], [0.1, 0]])),
+        bad({}, delay=([[0, 1e-300], [1e9, 0]],)),
         bad({}, jitter=(0.1,), loss=(0.1,), burst=((0.1, 0.1),), event=(1e-3,), heartbeat=(0.5,)),
         bad({}, horizon=(0.1,)),
         bad(POSTED, heartbeat=(0.5,), horizon=(0.1,)),
@@ -183,15 +185,18 @@ def test_continuous_exchange_does_not_go_with_sampled_control() -> None:
 
 
 @pytest.mark.parametrize(
-    ("settings", "setting"),
+    ("settings", "setting", "duration"),
     [
-        *(({"period": period}, "period") for period in (1e-300, 1e-12, 1e-9)),
-        ({"delay": 1e-9}, "delay"),
+        *(({"period": period}, "period", 0.01) for period in (1e-300, 1e-12, 1e-9)),
+        ({"delay": FINEST}, "delay", 1e7 * FINEST),
     ],
 )
-def test_far_too_many_messages_are_refused_before_the_run(settings: dict[str, Any], setting: str) -> None:
+def test_far_too_many_messages_are_refused_before_the_run(
+    settings: dict[str, Any], setting: str, duration: float
+) -> None:
+    experiment = start(network=Network(**settings))
     with refused(InputError, setting):
-        start(network=Network(**settings)).plan(0.01, DT)
+        experiment.plan(duration, DT)
 
 
 @pytest.mark.parametrize("period", [1e-300, 1e-12, 1e-7])
@@ -296,7 +301,7 @@ TRAFFIC = {
 def test_messages_are_counted_and_their_age_has_its_bound(name: str, options: dict[str, float]) -> None:
     network = Network(period=4e-3, **TRAFFIC[name])
     run = start(network=network).simulate(0.06, dt=DT, **options)
-    sent, heard, age = (run.outputs[f"{k}"] for k in ("messages_sent", "messages_heard", "message_age"))
+    sent, heard, age = (run.outputs[k] for k in ("messages_sent", "messages_heard", "message_age"))
     about = {k: (run.info["outputs"][k]["unit"], run.info["outputs"][k]["axes"]) for k in
              ("messages_sent", "messages_heard", "message_age")}  # fmt: skip
     assert about == {

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import instance, numbers
+from ..checks import instance, limits, numbers
+from ..coupling.desired import rows_of
 from . import measured
 from .controller import Controller
 from .discrete import DiscreteController
@@ -51,10 +52,13 @@ class Agent:
     ):
         instance("controller", controller, Controller, "a Controller")
         instance("network", controller.network, BoundMailbox, "a Mailbox")
-        limits = None if torque_limits is None else np.atleast_2d(np.asarray(torque_limits, dtype=float))
         self._network: BoundMailbox = controller.network  # type: ignore[assignment]
         self._loop = _OwnLoop(
-            controller, period, torque_limits=limits, include_gravity=include_gravity, faults=faults
+            controller,
+            period,
+            torque_limits=limits("torque_limits", torque_limits, (controller.cell.nv,))[None],
+            include_gravity=include_gravity,
+            faults=faults,
         )
         self.robot, self.hears = self._network.robot, tuple(self._network.links.sender.tolist())
 
@@ -113,10 +117,14 @@ class Agent:
             desired: xd, xd', xd'', (3, m), in place of the robot's own desired motion.
 
         Raises:
-            InputError: a message that none of its neighbours can have sent, and see `DiscreteController`.
+            InputError: no messages, or one that none of its neighbours can have sent; and see
+                `DiscreteController.step`.
             SynctrlError: see `DiscreteController.step`.
         """
-        wanted = None if desired is None else np.asarray(desired)[:, None]
+        instance("inbox", inbox, Iterable, "messages, see Message.from_bytes")
+        cell, wanted = self._loop.cell, None
+        if desired is not None:
+            wanted = numbers("desired", desired, (rows_of(cell.space), cell.m))[:, None]
         return self._loop.heed(t, self._row("q", q), self._row("v", v), inbox, wanted)[0]
 
     # -- memory -------------------------------------------------------------------------------------------
@@ -195,6 +203,6 @@ def agents_of(whole: DiscreteController) -> tuple[Agent, ...]:
     """
     options: dict[str, Any] = {"include_gravity": whole.include_gravity, "faults": whole.faults}
     return tuple(
-        Agent(own, whole.period, torque_limits=limits[: own.cell.nv], **options)
-        for own, limits in zip(own_controllers(whole.controller), whole.torque_limits, strict=True)
+        Agent(own, whole.period, torque_limits=row[: own.cell.nv], **options)
+        for own, row in zip(own_controllers(whole.controller), whole.torque_limits, strict=True)
     )

@@ -281,9 +281,9 @@ class DiscreteController:
 
     def _due(self, sample: int) -> list[float]:
         """Messages of the period that ends with a sample; with the first, those at it."""
-        ends = (self._messages.end(k, self.period, self._t0) for k in (sample - 1, sample))
-        before, end = ends
-        return self._messages.between(before if sample else self._t0, end)
+        end = self._messages.end
+        start = end(sample - 1, self.period, self._t0) if sample else self._t0
+        return self._messages.between(start, end(sample, self.period, self._t0))
 
     def _advance(self, q: np.ndarray, memory: np.ndarray, signals: Signals, missed: int = 0) -> None:
         """Keep what is commanded, and what will be known at the next sample; or nothing, if a part fails."""

@@ -40,6 +40,9 @@ class Coupling:
         name: for legends.
         unit: unit of the weights, "" if they have none.
 
+    Attributes:
+        degree: a, the largest entry of the diagonal of S^T S.
+
     Raises:
         CouplingError: a robot compared with itself or outside the cell, an entry that is zero, or a graph
             that is not connected. A weight without an inverse is refused before a run starts.
@@ -265,12 +268,16 @@ class Coupling:
 
     def _set_sums(self) -> None:
         """Products with S: written out for a few robots, else as the list of its entries."""
+        self.degree = float(np.bincount(self.edges.ravel(), self.signs.ravel() ** 2).max(initial=0.0))
         if self.robots * self.pairs <= SMALL:
             S = self.matrix
             self._S, self._S_T = partial(np.matmul, S), partial(np.matmul, S.T)
         else:
             S = self._entries()
-            self._S, self._S_T = partial(_sparse_product, S), partial(_sparse_product, S.T.tocsr())
+            self._S, self._S_T = (
+                partial(graphs.sparse_product, S),
+                partial(graphs.sparse_product, S.T.tocsr()),
+            )
 
     def _entries(self) -> Any:
         """S as the list of its entries."""
@@ -289,10 +296,3 @@ def _count(n: int) -> int:
     if isinstance(n, bool) or n < 2:
         raise CouplingError(f"a coupling compares at least 2 robots, found {n}", subject="robots", found=n)
     return int(n)
-
-
-def _sparse_product(S: Any, x: np.ndarray) -> np.ndarray:
-    """S x for one row of x, (..., k), per column of S."""
-    rows = np.moveaxis(x, -2, 0)
-    product = S @ rows.reshape(len(rows), -1)
-    return np.moveaxis(product.reshape(-1, *rows.shape[1:]), 0, -2)

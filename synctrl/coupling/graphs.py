@@ -159,3 +159,10 @@ def _row(edge: Any) -> tuple[Any, Any, Any]:
     if len(parts) not in (2, 3):
         raise InputError.expected("pairs (i, j) or triples (i, j, weight)", edge, "graph")
     return (*parts, 1.0)[:3]
+
+
+def sparse_product(S: Any, x: np.ndarray) -> np.ndarray:
+    """S x for one row of x, (..., k), per column of S."""
+    rows = np.moveaxis(x, -2, 0)
+    product = S @ rows.reshape(len(rows), -1)
+    return np.moveaxis(product.reshape(-1, *rows.shape[1:]), 0, -2)

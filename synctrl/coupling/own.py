@@ -18,7 +18,7 @@ from .weights import ConstantWeights, Weights, WeightSource
 
 
 class OwnCoupling(Coupling):
-    """The weights c_i of one robot of a coupling, and no row of S.
+    """The weights c_i of one robot of a coupling, and no row of S; `degree` is that of all robots.
 
     Args:
         coupling: of all robots.
@@ -30,6 +30,7 @@ class OwnCoupling(Coupling):
         self.edges, self.signs, self._in_pairs = np.zeros((0, 2), dtype=int), np.zeros((0, 2)), True
         self._source = own_weights(coupling._source, robot)
         self._set_sums()
+        self.degree = coupling.degree
 
 
 class OwnWeights:

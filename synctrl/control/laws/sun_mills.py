@@ -97,9 +97,7 @@ def delay_damping(coupling: Coupling, Lambda: np.ndarray, K_eps: np.ndarray) -> 
         Lambda: (m,), 1/s.
         K_eps: (m,).
     """
-    starts, _, entries = coupling.incidence
-    a = np.add.reduceat(entries**2, starts[:-1]).max()
-    return a / (4 * Lambda) * K_eps
+    return coupling.degree / (4 * Lambda) * K_eps
 
 
 class BoundSunMills:
@@ -179,6 +177,11 @@ class BoundSunMills:
         )
 
 
+def coupled_velocity_error(asked: Asked, errors: Errors) -> np.ndarray:
+    """r = u - c x', eqs. (12) and (31), (n, m), unit of c e per s, of a law that says what u is."""
+    return asked.u[0] - np.matvec(errors.c, errors.x_dot)
+
+
 class BoundInjection:
     """`BoundSunMills` with damping of r beside its force, J^T c^T B r.
 
@@ -194,8 +197,8 @@ class BoundInjection:
 
     def command(self, errors: Errors) -> Asked:
         asked = self.law.command(errors)
-        r = asked.u[0] - np.matvec(errors.c, errors.x_dot)
-        return asked._replace(force=asked.force + np.matvec(errors.c.mT, self.injection * r))
+        injected = self.injection * coupled_velocity_error(asked, errors)
+        return asked._replace(force=asked.force + np.matvec(errors.c.mT, injected))
 
     def proof(self, along: Along) -> Proof:
         """That of the law, and what B takes of the kinetic energy."""
@@ -224,7 +227,7 @@ class BoundDiffusion:
 
     def command(self, errors: Errors) -> Asked:
         asked, (weight, heard) = self.law.command(errors), errors.slips
-        r = asked.u[0] - np.matvec(errors.c, errors.x_dot)
+        r = coupled_velocity_error(asked, errors)
         pulled = self.diffusion * (weight * r + heard)
         return asked._replace(force=asked.force + np.matvec(errors.c.mT, pulled))
 

@@ -20,8 +20,8 @@ from .w_form import ASK, WForm, check_number
 DELAYS = "constant delays"
 #: longest step of the grid, s
 GRID = 2e-3
-#: shortest one, s
-FINEST = 1e-9
+#: shortest one, s; W'' of W that is rounded to 1e-16 |W| is off by some 1e-14 |W|/step^2
+FINEST = 1e-6
 #: how many steps of it may be kept
 LONGEST = 4096
 #: how far an instant may be from the grid, as a share of its step

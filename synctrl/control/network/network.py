@@ -45,7 +45,7 @@ class Network:
 
     Args:
         period: between two messages of a robot; None for exchange in continuous time, with exact delays.
-        delay: how late a robot hears another.
+        delay: how late a robot hears another; in continuous time 0 or at least 1e-6.
         jitter: longest random addition to the delay of a message.
         loss: probability that a message is lost, below 1.
         burst: probabilities per message that a link goes from good to bad, and from bad to good; in between
@@ -107,8 +107,8 @@ class Network:
                 extrapolated too far.
         """
         beta, leak = (spread(name, getattr(gains, name), (cell.m,)) for name in ("beta", "leak"))
-        share = float(Links(cell.coupling).own.max(initial=0.0)) * float(beta.max(initial=0.0))
-        return self._bound(cell, leak, 1 / share if share > 0 else np.inf)
+        fastest = cell.coupling.degree * float(beta.max(initial=0.0))
+        return self._bound(cell, leak, 1 / fastest if fastest > 0 else np.inf)
 
     def bind_with_slips(self, cell: Cell, gains: Gains) -> WForm:
         """`bind_for` of robots that tell each other r as well, for a law that needs it.

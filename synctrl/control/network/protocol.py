@@ -47,6 +47,11 @@ class BoundNetwork(Protocol):
       any, and V with it.
     - `gap(t, memory)`: what the rates of E and sigma have beyond sigma - leak E and sigma', (2, n, m), where
       the laws do not get what they need.
+    - `breaks`: further instants at which what is heard jumps, s.
+    - `continuous`, True where robots hear each other in continuous time and late: sampled control refuses it.
+    - `theorem`: for networks of what kind a proof covers it, in words; None if it needs none, or has none.
+    - `suspicion`: what to think of where a run ran away for no other reason, in words, or None.
+    - `account(log)`: outputs of a run by name, each an array with its unit and the names of its axes.
     - `messages(start, end)` and `meet(t, w, memory)`: the instants of its messages with start <= t < end, in
       order, s, and its memory after the one at instant t, with w as in `exchange`; without side effects. With
       continuous control a message arrives at its instant, with sampled control at the first sample that is
