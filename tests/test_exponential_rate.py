@@ -31,7 +31,7 @@ from synctrl import (
     PoseTrajectory,
     load_robot,
 )
-from synctrl.analysis import ExponentialRate, exponential_rate, rates_over_gamma
+from synctrl.analysis import ExponentialRate, RatesOverGamma, exponential_rate, rates_over_gamma
 from synctrl.analysis.decay import simulated_decay
 from synctrl.analysis.monodromy import monodromy
 from synctrl.analysis.on_motion import DesiredMotion
@@ -41,6 +41,7 @@ from synctrl.control.controller import Signals
 from synctrl.control.laws import ChungSlotine
 from synctrl.errors import InputError
 from synctrl.robots.parameters import FrictionParameters, planar_two_link_parameters
+from synctrl.show.rate_figures import rates_figure
 
 GAINS = Gains(Lambda=6.0, beta=3.0, K_r=2.0, K_eps=0.4, Gamma=0.3)
 PERIOD = 1.0
@@ -324,3 +325,29 @@ def test_arms_with_spare_joints_are_refused() -> None:
     cell = Cell(members, Coupling.pair(), CartesianSpace("xy"))
     with refused(InputError, "arm 0", found=3):
         exponential_rate(Experiment(cell, GAINS, 1.0), 1.0)
+
+
+# -- how to choose Gamma -----------------------------------------------------------------------------------
+
+
+def test_errors_that_no_synchronization_error_sees_fall_at_lambda_whatever_gamma() -> None:
+    for name in ("slow", "fast"):
+        _, rate = rate_of(name)
+        assert np.isclose(rate.multipliers, np.exp(-6.0 * PERIOD), rtol=1e-6).sum() >= 2
+    rates = rates_over_gamma(circles(), 0.5, [4.0, 1.0])
+    assert rates.limit == 6.0 and (rates.rates < 6.0).all()
+    assert rates.factors.tolist() == [1.0, 4.0]
+
+
+def test_the_figure_marks_the_best_gamma() -> None:
+    found = RatesOverGamma(np.array([0.1, 1.0, 10.0]), np.array([1.0, 3.0, 2.0]), 6.0, ())
+    for limit, lines in ((6.0, 3), (np.inf, 2)):
+        (panel,) = rates_figure({"two arms": replace(found, limit=limit)}).axes
+        assert len(panel.get_lines()) == lines
+        assert panel.get_lines()[1].get_xydata().tolist() == [[1.0, 3.0]]
+        assert panel.get_ylim()[1] > found.rates.max()
+
+
+def test_factors_that_are_not_above_0_are_refused() -> None:
+    with refused(InputError, "factors"):
+        rates_over_gamma(rods(), PERIOD, [0.0, 1.0])

@@ -98,11 +98,14 @@ class RatesOverGamma:
     Attributes:
         factors: of Gamma, (K,), ascending.
         rates: of all that the motion excites, (K,), 1/s.
+        limit: min Lambda, 1/s, above which no Gamma brings the rate, because errors that no synchronization
+            error sees fall as exp(-Lambda t); infinite if the coupling leaves none of these.
         unexcited: combinations of base parameters that no Gamma learns, in words.
     """
 
     factors: np.ndarray
     rates: np.ndarray
+    limit: float
     unexcited: tuple[str, ...]
 
     @property
@@ -144,7 +147,14 @@ def rates_over_gamma(
         raise InputError.expected("factors above 0", given.tolist(), "factors")
     whole = _Period(experiment, period, start)
     found = [whole.rate(factor) for factor in given.tolist()]
-    return RatesOverGamma(given, np.array([each.excited_rate for each in found]), found[0].unexcited)
+    rates = np.array([each.excited_rate for each in found])
+    return RatesOverGamma(given, rates, _limit(whole.coordinates), found[0].unexcited)
+
+
+def _limit(z: Coordinates) -> float:
+    """The smallest Lambda where S has a null space."""
+    n = z.controller.cell.n
+    return float(z.controller.Lambda.min()) if z.B.shape[1] < n else float("inf")
 
 
 class _Period:
