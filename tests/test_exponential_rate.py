@@ -231,6 +231,14 @@ def test_so_it_is_with_all_that_the_theorem_reaches(make: Callable[[], Experimen
     close(*linear_and_differences(make(), 0.13, 0))
 
 
+def test_integrals_that_act_on_nothing_do_not_count() -> None:
+    gains = GAINS.replace(beta=[3.0, 0.0])
+    half, none = (exponential_rate(rods(gains=g), PERIOD) for g in (gains, gains.independent()))
+    assert half.stable and none.stable
+    assert len(none.multipliers) == len(half.multipliers) - 1
+    close(*linear_and_differences(rods(gains=gains), 0.13, 0))
+
+
 @pytest.mark.parametrize("name", CELLS)
 def test_the_volume_of_errors_falls_by_the_integral_of_the_trace(name: str) -> None:
     """Liouville: det Phi = exp(int trace A), in a time after which there is still some volume."""
@@ -270,9 +278,9 @@ def storage(experiment: Experiment, z: Coordinates, t: float) -> np.ndarray:
     e, I, m = slice(z.parts["e*"][0].start, z.parts["e*"][-1].stop), z.parts["i"][0], cell.m
     epsilon = np.zeros((len(S) * m, z.size))
     epsilon[:, e] = np.kron(S, np.eye(m))
-    epsilon[:, I] = -np.kron(S @ S.T @ z.B, np.diag(gains.beta))
+    epsilon[:, I] = -np.kron(S @ S.T @ z.B, np.diag(gains.beta)[:, z.acting])
     E = np.zeros((cell.n * m, z.size))
-    E[:, I] = np.kron(S.T @ z.B, np.eye(m))
+    E[:, I] = np.kron(S.T @ z.B, np.eye(m)[:, z.acting])
     spring = gains.K_eps * (gains.Lambda - gains.leak) * gains.beta
     P += epsilon.T @ (np.tile(gains.K_eps, len(S))[:, None] * epsilon)
     return (P + E.T @ (np.tile(spring, cell.n)[:, None] * E)) / 2
