@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -359,3 +362,19 @@ def test_the_figure_marks_the_best_gamma() -> None:
 def test_factors_that_are_not_above_0_are_refused() -> None:
     with refused(InputError, "factors"):
         rates_over_gamma(rods(), PERIOD, [0.0, 1.0])
+
+
+def test_the_page_of_the_theorem_runs_and_has_the_numbers_that_it_shows() -> None:
+    page = (Path(__file__).parents[1] / "docs" / "theorem_c.md").read_text("utf-8")
+    names: dict[str, Any] = {}
+    for block in re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL):
+        exec(compile(block, "docs/theorem_c.md", "exec"), names)
+    assert str(names["rate"]) in page
+    shown = re.findall(r"^\| rate, 1/s \| (.*) \|$", page, flags=re.MULTILINE)[0].split(" | ")
+    np.testing.assert_allclose(names["rates"].rates, np.array(shown, float), atol=0.006)
+    assert names["check"].misfit < 0.01
+    assert set(re.findall(r"`(test_\w+)`", page)) <= {*globals(), *TESTS_ELSEWHERE}
+
+
+#: that the page names beside those of this file
+TESTS_ELSEWHERE = {"test_what_adaptation_had_the_time_for_is_not_said_to_be_learned"}

@@ -2,6 +2,7 @@
 
 from .certify import Certificate, certify
 from .comparison import Comparison, compare, side_by_side
+from .decay import Decay, simulated_decay
 from .delay_map import DelayMap, delay_map
 from .delay_margin import DelayMargin, delay_margin
 from .exponential_rate import ExponentialRate, RatesOverGamma, exponential_rate, rates_over_gamma
@@ -11,6 +12,7 @@ from .resolution import resolution_error
 __all__ = [
     "Certificate",
     "Comparison",
+    "Decay",
     "DelayMap",
     "DelayMargin",
     "ExponentialRate",
@@ -24,4 +26,5 @@ __all__ = [
     "rates_over_gamma",
     "resolution_error",
     "side_by_side",
+    "simulated_decay",
 ]
