@@ -4,9 +4,9 @@ The regressor is Y = Y_b K, so that (14) moves the base parameters by t' = -K Ga
 
     d/dt 1/2 t^T G^+ t = - s_q^T Y tilde + s_q^T Y_b (1 - G G^+) t,      G = K Gamma K^T
 
-This is a storage as good as 1/2 tilde^T Gamma^+ tilde, and smaller: of errors that no torque shows nothing is
-left. The last term is the torque of what cannot be learned, (1 - G G^+) t, which is constant; it is zero where
-G has an inverse, which may be so although entries of Gamma are zero.
+This is a storage as good as 1/2 tilde^T Gamma^+ tilde, and smaller: of errors that no torque shows nothing
+is left. The last term is the torque of what cannot be learned, (1 - G G^+) t, which is constant; it is zero
+where G has an inverse, which may be so although entries of Gamma are zero.
 """
 
 from __future__ import annotations
