@@ -14,7 +14,7 @@ See docs/theorem_a.md.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, cast
@@ -23,21 +23,18 @@ import numpy as np
 
 from ..control.adaptation.gradient import BoundGradient, MetricGradient
 from ..errors import RobotError
-from ..robots.base_parameters import grouping
-from ..simulation.clock import before
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
+from .assumptions import unbounded
 from .balance import accumulated
+from .base_storage import base_storages
+from .gain_condition import gain_condition
 from .lyapunov import inside_of, proof_along
 from .metrics import finite_or_none
 from .model_torques import frozen_error
 from .replay import Replay, replay
 from .unmodelled import unmodelled
 
-#: share of a size up to which a difference is rounding
-ROUNDING = 1e-9
-#: eigenvalues of K Gamma K^T, scaled to ones on its diagonal, below which a direction is not adapted
-SINGULAR = 1e-12
 #: what is in V for the error of the estimates
 BASE, OWN = "base parameters", "the adaptation's own"
 
@@ -155,6 +152,11 @@ def dissipation(result: Result | Replay, experiment: Experiment | None = None) -
         InputError: no experiment, or another than the one that made the result.
     """
     run = replay(result, experiment)
+    return balanced(run, unbounded(run, gain_condition(run)))
+
+
+def balanced(run: Replay, reasons: Sequence[str]) -> Dissipation:
+    """`dissipation` of a run of which it is known why the theorem does not reach it; empty if it does."""
     torques = unmodelled(run)
     weighed = {name: _squared(run, torque) for name, torque in torques.items()}
     total = np.sum(list(torques.values()), axis=0)
@@ -169,7 +171,7 @@ def dissipation(result: Result | Replay, experiment: Experiment | None = None) -
     return Dissipation(
         run.result.t, kept + storage, damped, gone, supply, entered, _root(D2),
         dict(zip(weighed, map(_root, each), strict=True)),
-        float(kept[0] + x.storage[run.logged[0]]), kind, _reason(run),
+        float(kept[0] + x.storage[run.logged[0]]), kind, "; ".join(reasons) or None,
     )  # fmt: skip
 
 
@@ -194,22 +196,12 @@ def _storage(run: Replay) -> tuple[np.ndarray, str]:
     own = run.rows.storage[run.logged], OWN
     if type(adaptation) not in (MetricGradient, BoundGradient):
         return own
-    Gamma = cast(MetricGradient, adaptation).Gamma
-    with suppress(RobotError):  # it may not be clear which parameters can be told apart
-        return np.sum([_of_base(run, i, Gamma[i]) for i in range(cell.n)], axis=0), BASE
-    return own
-
-
-def _of_base(run: Replay, i: int, Gamma: np.ndarray) -> np.ndarray:
-    """1/2 t^T (K Gamma K^T)^+ t of robot i, (T,), with t = K tilde of what is adapted."""
-    cell, P = run.loop.cell, run.loop.cell.parameters[i].theta.size
-    K = grouping(cell.parameters[i], cell.robots[i].nv, cell.names[i]).K
     tilde = cell.theta - run.result.theta_hat
-    learned = (tilde - frozen_error(run.loop.controller.adaptation, tilde))[:, i, :P]
-    spread = K @ (np.diag(Gamma[:P]) if Gamma.ndim == 1 else Gamma[:P, :P]) @ K.T
-    units = np.sqrt(np.where(np.diag(spread) > 0, np.diag(spread), 1.0))
-    t = learned @ K.T / units
-    return 0.5 * np.sum(t * (t @ np.linalg.pinv(spread / np.outer(units, units), SINGULAR, True)), axis=1)
+    learned = tilde - frozen_error(adaptation, tilde)
+    with suppress(RobotError):  # it may not be clear which parameters can be told apart
+        storages = base_storages(cell, cast(MetricGradient, adaptation).Gamma)
+        return np.sum([each.energy(learned[:, i]) for i, each in enumerate(storages)], axis=0), BASE
+    return own
 
 
 def _damping(run: Replay) -> np.ndarray:
@@ -225,30 +217,6 @@ def _squared(run: Replay, torque: np.ndarray) -> np.ndarray:
     d = torque if controller.k_r_space == "joint" else np.vecmat(torque, run.rows.J_inv)
     K_r = np.broadcast_to(controller.K_r, d.shape)
     return _sum(np.divide(d**2, K_r, out=np.zeros_like(d), where=d != 0))
-
-
-def _reason(run: Replay) -> str | None:
-    """Why the theorem does not reach a run, in words."""
-    controller = run.loop.controller
-    if not hasattr(controller.law, "proof"):
-        return f"no proof is known for the law {controller.law_settings['name']}"
-    if run.result.info.get("damping"):
-        return "damped inverse kinematics do not follow the law's reference"
-    if controller.k_r_space == "task" and any(robot.nv != run.loop.cell.m for robot in run.loop.cell.robots):
-        return "damping in task space does not damp all motions of a redundant arm"
-    if run.events:
-        return "V jumps at events of plant or network"
-    if any(_jumps(run, t) for t in run.loop.cell.breaks):
-        return "the desired velocity jumps, and V with it"
-    return None
-
-
-def _jumps(run: Replay, t: float) -> bool:
-    """Whether the desired velocity has another value from the left than from the right at a break."""
-    if not run.result.t[0] < t < run.result.t[-1]:
-        return False
-    left, right = (r.desired[1] for r in run.loop.cell.references(np.array([before(t), t])))
-    return bool(np.abs(right - left).max() > ROUNDING * max(1.0, np.abs(right).max()))
 
 
 def _sum(term: np.ndarray) -> np.ndarray:
