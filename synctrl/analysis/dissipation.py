@@ -35,6 +35,8 @@ from .model_torques import frozen_error
 from .replay import Replay, replay
 from .unmodelled import unmodelled
 
+#: share of the largest from which something is worth a word
+SEEN = 1e-9
 #: what is in V for the error of the estimates
 BASE, OWN = "base parameters", "the adaptation's own"
 
@@ -132,13 +134,23 @@ class Dissipation:
         more = {"entered": self.entered, "supply": float(self.supply[-1]), "storage": self.storage}
         return {**numbers, **more, "sources": sources, "reason": self.reason}
 
-    def __str__(self) -> str:
+    @property
+    def lines(self) -> list[str]:
+        """Bounds beside what they are of, and what the unmodelled torque came from, in words."""
         if self.reason is not None:
-            return f"Theorem A does not reach this run: {self.reason}"
-        return (
-            f"X = {self.X:.3g} of at most {self.X_bound:.3g}, Z^2 + V(T) = {self.rest:.3g} of at most "
-            f"{self.rest_bound:.3g}, with D = {self.D:.3g} and V(0) = {self.V0:.3g}"
-        )
+            return [f"Theorem A does not reach this run: {self.reason}"]
+        floor = SEEN * max(self.X, self.D)
+        acting = {name: D for name, D in self.sources.items() if floor < D}
+        named = ", ".join(f"{name} {D:.3g}" for name, D in acting.items())
+        entered = f", R = {self.entered:.3g}" if self.entered > SEEN * self.V0 else ""
+        return [
+            f"Theorem A: X = {self.X:.3g} of at most {self.X_bound:.3g}, Z^2 + V(T) = {self.rest:.3g} of at "
+            f"most {self.rest_bound:.3g}",
+            f"  by V(0) = {self.V0:.3g} ({self.storage}){entered}, D = {self.D:.3g} ({named or 'nothing'})",
+        ]
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines)
 
 
 def dissipation(result: Result | Replay, experiment: Experiment | None = None) -> Dissipation:
