@@ -29,6 +29,7 @@ from .assumptions import unbounded
 from .balance import accumulated
 from .base_storage import base_storages
 from .gain_condition import gain_condition
+from .held import held
 from .lyapunov import inside_of, proof_along
 from .metrics import finite_or_none
 from .model_torques import frozen_error
@@ -169,37 +170,36 @@ def dissipation(result: Result | Replay, experiment: Experiment | None = None) -
 
 def balanced(run: Replay, reasons: Sequence[str]) -> Dissipation:
     """`dissipation` of a run of which it is known why the theorem does not reach it; empty if it does."""
-    torques = unmodelled(run)
-    weighed = {name: _squared(run, torque) for name, torque in torques.items()}
-    total = np.sum(list(torques.values()), axis=0)
-    kept, lost, entering = _law(run)
-    x = run.rows
-    lost = lost + _sum(x.s_q * x.friction_damping)
-    entering = entering + x.storage_rate + _sum(x.s_q * (x.lacking - x.frozen))
-    rates = [_damping(run), lost, _sum(x.s_q * total), entering, _squared(run, total), *weighed.values()]
-    damped, gone, supply, entered, D2, *each = accumulated(run, np.stack(rates, axis=1)).T
-    kept = (kept + 0.5 * _sum(x.s_q * np.matvec(x.M, x.s_q)))[run.logged]
+    sampled = run.result.info.get("control_period") is not None
+    run, further = held(run) if sampled else (run, {})
+    torques, x, (kept, rates, lost) = unmodelled(run, further), run.rows, _law(run)
+    total, model = np.sum(list(torques.values()), axis=0), x.lacking - x.frozen
+    claimed = lost + _sum(x.s_q * (model - np.vecmat(x.force, x.J)))
+    squares = [_squared(run, torque) for torque in (total, *torques.values())]
+    losses = [_damping(run), lost + _sum(x.s_q * x.friction_damping)]
+    powers = [*losses, _sum(x.s_q * total), claimed, rates + x.storage_rate, *squares]
+    damped, gone, supply, due, stored, D2, *each = accumulated(run, np.stack(powers, axis=1)).T
+    own = (kept + x.storage)[run.logged]
+    stored = own - own[0] if sampled else stored  # what is held does not follow the rates of the law
+    energies = (kept + 0.5 * _sum(x.s_q * np.matvec(x.M, x.s_q)))[run.logged]
     storage, kind = _storage(run)
     return Dissipation(
-        run.result.t, kept + storage, damped, gone, supply, entered, _root(D2),
-        dict(zip(weighed, map(_root, each), strict=True)),
-        float(kept[0] + x.storage[run.logged[0]]), kind, "; ".join(reasons) or None,
+        run.result.t, energies + storage, damped, gone, supply, stored + due, _root(D2),
+        dict(zip(torques, map(_root, each), strict=True)),
+        float(energies[0] + x.storage[0]), kind, "; ".join(reasons) or None,
     )  # fmt: skip
 
 
 def _law(run: Replay) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Energies of the law, what they lose, and what enters them otherwise than from the robots, (R,) each."""
-    x, proof = run.rows, proof_along(run)
+    """Energies of the law, their rates, and what they lose, (R,) each."""
+    proof = proof_along(run)
     inside = inside_of(run, proof)
+    known = [power for name, power in proof.powers.items() if name in inside]
     kept, rates, powers = (
-        np.zeros(len(x.s_q)) + sum(map(_sum, terms))
-        for terms in (
-            proof.energies.values(),
-            proof.rates.values(),
-            [power for name, power in proof.powers.items() if name in inside],
-        )
+        np.zeros(len(run.rows.s_q)) + sum(map(_sum, terms))
+        for terms in (proof.energies.values(), proof.rates.values(), known)
     )
-    return kept, -powers, rates - powers - _sum(np.matvec(x.J, x.s_q) * x.force)
+    return kept, rates, -powers
 
 
 def _storage(run: Replay) -> tuple[np.ndarray, str]:

@@ -189,7 +189,7 @@ def _rows(
 def _row(
     result: Result, loop: ClosedLoop, bodies: Bodies, k: int, reference: Reference, disturbance: np.ndarray
 ) -> Moment:
-    q, v, y = result.q[k], result.v[k], _state(result, k)
+    q, v, y = result.q[k], result.v[k], state_at(result, k)
     y_dot, s = loop.evaluate(reference, y, disturbance)
     theta, adaptation, z = loop.cell.theta, loop.controller.adaptation, loop.state(y).z
     J, J_inv = _jacobians(loop, s)
@@ -228,7 +228,7 @@ def _gaps(loop: ClosedLoop, y: np.ndarray, s: Signals, J_inv: np.ndarray) -> tup
     return np.matvec(J_inv, moved.xref_dot - s.asked.xref_dot), gap[0]
 
 
-def _state(result: Result, k: int) -> np.ndarray:
+def state_at(result: Result, k: int) -> np.ndarray:
     """The state of the loop at logged instant k."""
     z = result.outputs.get(ADAPTATION_STATE, result.theta_hat)[k]
     memory = result.outputs.get(NETWORK_STATE, result.sync_integral)[k]

@@ -9,18 +9,25 @@ whatever acts: "other" is d less what has a name, found from the accelerations o
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from .lyapunov import reference_gap
 from .replay import Replay
 
 
-def unmodelled(run: Replay) -> dict[str, np.ndarray]:
+def unmodelled(run: Replay, further: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Torques d by source, (R, n, nv) each, N·m, with the sign that they have beside -K_r s_q.
 
     "friction", "disturbance" and "saturation" are what they say; "model error" what wrong parameters with
     Gamma = 0 do, "weight rate" what the paper's reference acceleration leaves out, and "network" what the
-    reference acceleration does not know of the network.
+    reference acceleration does not know of the network. Under sampled control, whose torques are `further`,
+    that is part of "sampling".
+
+    Args:
+        run: instants of the run.
+        further: torques that have a name already.
     """
     x = run.rows
     named = {
@@ -29,7 +36,7 @@ def unmodelled(run: Replay) -> dict[str, np.ndarray]:
         "saturation": x.cut_off,
         "model error": x.frozen,
         "weight rate": np.matvec(x.M, reference_gap(run)),
-        "network": np.matvec(x.M, x.gap),
+        **(further or {"network": np.matvec(x.M, x.gap)}),
     }
     s_q_dot = x.a_ref + x.gap + reference_gap(run) - x.v_dot
     adapted = x.lacking - x.frozen - x.friction_damping
