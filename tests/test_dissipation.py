@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,8 @@ from hypothesis import strategies as st
 from refusals import refused
 from scipy.optimize import minimize
 from test_devices import ALL, small
+from test_pages import DOCS
+from test_pages import run as run_page
 from test_saturation import pair
 from theory_cells import GAINS, coupling, experiment
 
@@ -24,6 +27,7 @@ from synctrl.control.adaptation import Ball, Leakage
 from synctrl.control.laws import ChungSlotine, MasterSlave
 from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, carry_ur5, panda_four, planar_four, ur5_payload
+from synctrl.experiments.planar_four import GAINS as FOUR
 from synctrl.robots.base_parameters import grouping
 
 pytestmark = [
@@ -284,3 +288,44 @@ def test_a_replay_is_used_as_it_is() -> None:
     run = replay(experiment(coupling("pair", 2, 1), joints=1).simulate(0.01, 1e-3))
     assert isinstance(run, Replay)
     assert dissipation(run).t is run.result.t
+
+
+# -- the page and the figure -------------------------------------------------------------------------------
+
+PAGE = (DOCS / "theorem_a.md").read_text("utf-8")
+NUDGE = Disturbance(0, -1.0, 0.1, 0.2)
+ROWS: dict[str, tuple[Callable[[], Experiment], float | None]] = {
+    "planar_four": (planar_four, None),
+    "planar_four, pushed": (lambda: planar_four(disturbance=NUDGE), None),
+    "planar_four, not adapted": (lambda: planar_four(gains=FOUR.replace(Gamma=0.0)), None),
+    "a460_pair": (a460_pair, None),
+    "a460_pair, held for 2 ms": (lambda: a460_pair(friction=False), 2e-3),
+    "ur5_payload": (ur5_payload, None),
+}
+
+
+def test_the_example_of_the_page_prints_what_the_page_says() -> None:
+    for line in run_page("theorem_a.md")["found"].lines:
+        assert f"    {line}\n" in PAGE
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_the_table_of_the_page_is_that_of_the_runs(row: str) -> None:
+    make, period = ROWS[row]
+    found = dissipation(make().simulate(0.3, 1e-3, control_period=period))
+    numbers = (found.D, found.V0, found.X, found.X_bound, found.rest, found.rest_bound)
+    told = next(line for line in PAGE.splitlines() if line.startswith(f"| {row} |")).split("|")[2:-1]
+    np.testing.assert_allclose(numbers, [float(number) for number in told], rtol=6e-3, atol=1e-9)
+
+
+def test_the_figure_has_the_sum_below_its_bound_and_no_bound_where_there_is_none() -> None:
+    pytest.importorskip("matplotlib", reason="figures are an extra: pip install 'synctrl[plot]'")
+    from synctrl.show.dissipation_figures import dissipation_figure
+
+    found = dissipation(experiment(coupling("pair", 2, 1), joints=1).simulate(0.02, 1e-3))
+    lines = {line.get_label(): line for line in dissipation_figure(found).axes[0].get_lines()}
+    total = found.V + found.damped + found.lost
+    np.testing.assert_array_equal(lines["sum"].get_ydata(), total)
+    assert (lines["at most"].get_ydata() >= total * (1 - ROUNDING)).all()
+    without = dissipation_figure(replace(found, reason="no law"))
+    assert "at most" not in [line.get_label() for panel in without.axes for line in panel.get_lines()]
