@@ -32,8 +32,8 @@ def pair(network, gains=GAINS, weight: str = "moving", **options) -> Experiment:
     return replace(experiment(coupling("pair", 2, 2, weight), gains, **options), network=network)
 
 
-def certificate(network, gains=GAINS, **options) -> Certificate:
-    return certify(pair(network, gains, **options).simulate(0.05, 1e-3))
+def certificate(network, gains=GAINS, dt=1e-3, **options) -> Certificate:
+    return certify(pair(network, gains, **options).simulate(0.05, dt))
 
 
 # -- theorems ---------------------------------------------------------------------------------------------
@@ -49,7 +49,8 @@ def certificate(network, gains=GAINS, **options) -> Certificate:
     ids=["delays", "delays and K_eps", "filter"],
 )
 def test_a_run_that_a_theorem_covers_is_certified_and_says_which(network, gains, theorem):
-    found = certificate(network, gains)
+    dt = 1.25e-4 if network is FILTER else 1e-3  # what is filtered has kinks at messages
+    found = certificate(network, gains, dt)
     assert found.certified and found.delay_condition.theorem == theorem
     assert found.delay_condition.needed == bool(gains.K_eps.any())
     assert theorem in str(found)
@@ -70,7 +71,7 @@ def test_a_run_that_a_theorem_covers_is_certified_and_says_which(network, gains,
 )
 def test_a_run_that_no_theorem_covers_is_outside_and_says_why(network, gains, options, reason):
     found = certificate(network, gains, **options)
-    assert found.verdict == "outside the theorem" and found.delay_condition.theorem is None
+    assert not found.certified and found.delay_condition.theorem is None
     assert reason in found.delay_condition.reason
     assert any(found.delay_condition.reason in words for words in found.outside)
 
@@ -159,7 +160,7 @@ def test_v_does_not_jump_at_messages_of_the_filter_and_of_delays(network):
     ids=["delays", "filter", "hold", "extrapolate"],
 )
 def test_with_integrals_that_leak_v_changes_by_its_powers_too(network, bound):
-    record = lyapunov(pair(network, GAINS.replace(leak=2.0)).simulate(0.05, 5e-4))
+    record = lyapunov(pair(network, GAINS.replace(leak=2.0)).simulate(0.03, 2.5e-4))
     assert (np.abs(record.power["other"]) <= record.rounding).all()
     assert record.largest_drift < bound
 
