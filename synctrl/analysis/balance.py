@@ -50,3 +50,13 @@ def _halving(t: np.ndarray, rate: np.ndarray) -> float:
     """How much the integral of a rate changes when every second instant is left out."""
     half = np.unique(np.append(np.arange(0, len(t), 2), len(t) - 1))
     return float(np.abs(_integral(t[half], rate[half]) - _integral(t, rate)[half]).max())
+
+
+def accumulated(run: Replay, rate: np.ndarray) -> np.ndarray:
+    """Integral of a rate, (R, ...), from the start to every logged instant, (T, ...), across jumps too."""
+    t, at = run.result.t, run.logged
+    shape = (-1, *[1] * (rate.ndim - 1))
+    gained = 0.5 * np.diff(t).reshape(shape) * (rate[at[:-1]] + rate[at[:-1] + 1])
+    for first, last, rows in run.pieces:
+        gained[first:last] = np.diff(_integral(t[first : last + 1], rate[rows]), axis=0)
+    return np.concatenate((np.zeros((1, *rate.shape[1:])), np.cumsum(gained, axis=0)))

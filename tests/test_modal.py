@@ -1,0 +1,178 @@
+"""Theorem B: from r to w, mode by mode of S^T S: the filters' norms, and the bounds along runs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import simpson, solve_ivp
+from scipy.interpolate import CubicSpline
+from scipy.linalg import solve_continuous_lyapunov
+from theory_cells import GAINS, coupling, experiment, planar_arm
+
+from synctrl import (
+    Cell,
+    Coupling,
+    Disturbance,
+    Experiment,
+    Friction,
+    FunctionTrajectory,
+    Gains,
+    Member,
+    Network,
+)
+from synctrl.analysis import modal_bounds
+from synctrl.analysis.modal_filter import ModalFilter
+from synctrl.analysis.replay import replay
+from synctrl.control.laws import ChungSlotine, ComputedTorque, SlotineLi
+from synctrl.experiments import a460_pair, ur5_payload
+
+RING = Coupling.signed_ring(4).matrix
+#: by how much a bound may be missed for the quadrature's sake
+QUADRATURE = 1e-5
+
+
+# -- the filter -------------------------------------------------------------------------------------------
+
+
+def filters(Lambda: float, beta: float, leak: float, S: np.ndarray = RING) -> ModalFilter:
+    return ModalFilter.from_matrix(S, *(np.array([gain]) for gain in (Lambda, beta, leak)))
+
+
+def of_the_law(Lambda: float, beta: float, leak: float, eigenvalue: float) -> np.ndarray:
+    """The rates of (w_j, E_j) without r, from r = w' + Lambda w + beta sigma + (Lambda - l) beta E."""
+    return np.array([[-Lambda - beta * eigenvalue, -(Lambda - leak) * beta], [eigenvalue, -leak]])
+
+
+gains_of_filters = st.tuples(st.floats(0.5, 50), st.floats(0.1, 50), st.sampled_from([0.0, 0.1, 0.7, 1.0]))
+
+
+@settings(max_examples=25, deadline=None)
+@given(gains_of_filters)
+def test_the_gain_is_the_largest_value_on_the_imaginary_axis(gains):
+    Lambda, beta, share = gains
+    modes = filters(Lambda, beta, share * Lambda)
+    places = 1j * Lambda * np.geomspace(1e-4, 1e4, 4001)[:, None, None] * np.eye(2)
+    for eigenvalue, gain in zip(modes.eigenvalues, modes.gain[:, 0], strict=True):
+        values = np.abs(np.linalg.inv(places - of_the_law(Lambda, beta, share * Lambda, eigenvalue))[:, 0, 0])
+        assert values.max() == pytest.approx(gain, rel=1e-4)
+        assert (values <= gain * (1 + 1e-12)).all()
+
+
+@settings(max_examples=25, deadline=None)
+@given(gains_of_filters)
+def test_the_h2_norm_is_that_of_the_lyapunov_equation(gains):
+    Lambda, beta, share = gains
+    modes = filters(Lambda, beta, share * Lambda)
+    driven = np.diag([-1.0, 0.0])  # by r, which is white noise
+    for eigenvalue, h2 in zip(modes.eigenvalues, modes.h2[:, 0], strict=True):
+        A = of_the_law(Lambda, beta, share * Lambda, eigenvalue)
+        A[1, 1] -= eigenvalue == 0  # E is 0 there, and may as well die out
+        assert h2**2 == pytest.approx(solve_continuous_lyapunov(A, driven)[0, 0], rel=1e-9)
+
+
+@pytest.mark.parametrize("leak", [0.0, 1.5, 4.0])
+@pytest.mark.parametrize("beta", [0.0, 2.0, 3.0])
+def test_modes_make_what_the_law_makes_of_any_r_from_any_start(leak, beta):
+    """All robots at once, by the law's differential equation, against free response and convolution."""
+    Lambda, n, t = 4.0, 4, np.linspace(0.0, 1.5, 1501)
+    modes, rng = filters(Lambda, beta, leak), np.random.default_rng(3)
+    w0, I0, size = rng.normal(size=n), rng.normal(size=4), rng.normal(size=n)
+    E0, L = RING.T @ I0, RING.T @ RING
+
+    def r(time):
+        return size[:, None] * np.cos(np.arange(1, n + 1)[:, None] * 2.0 * time)
+
+    def rate(time, y):
+        w, E = y[:n], y[n:]
+        w_dot = r(time)[:, 0] - Lambda * w - beta * L @ w - (Lambda - leak) * beta * E
+        return np.concatenate((w_dot, L @ w - leak * E))
+
+    law = solve_ivp(rate, (0, 1.5), np.concatenate((w0, E0)), rtol=1e-10, atol=1e-12, t_eval=[0.4, 1.5])
+    free = modes.free(t, modes.to_modes(w0[:, None]), modes.to_modes(E0[:, None]))[:, :, 0]
+    impulse = modes.free(t, np.ones((n, 1)), np.zeros((n, 1)))[:, :, 0]
+    for k, row in zip((400, 1500), law.y[:n].T, strict=True):
+        pushed = simpson(impulse[k::-1] * (modes.vectors.T @ r(t[: k + 1])).T, x=t[: k + 1], axis=0)
+        np.testing.assert_allclose(modes.vectors @ (free[k] + pushed), row, atol=1e-8)
+
+
+@pytest.mark.parametrize("leak", [0.0, 1.5, 4.0])
+def test_the_norm_of_the_free_response_is_its_norm(leak):
+    modes, rng = filters(4.0, 3.0, leak), np.random.default_rng(4)
+    w0, E0 = rng.normal(size=(4, 1)), modes.to_modes(RING.T @ rng.normal(size=(4, 1)))
+    t = np.linspace(0.0, 12.0, 24001)
+    norm = np.sqrt(simpson(modes.free(t, w0, E0) ** 2, x=t, axis=0))
+    np.testing.assert_allclose(modes.free_norm(w0, E0), norm, rtol=1e-6)
+    np.testing.assert_array_equal(modes.free(np.zeros(1), w0, E0)[0], w0)
+
+
+@pytest.mark.parametrize("leak", [0.0, 1.5])
+def test_an_r_that_is_made_for_it_reaches_each_norm(leak):
+    modes = filters(4.0, 3.0, leak)
+    t = np.linspace(0.0, 30.0, 30001)
+    impulse = modes.free(t, np.ones((4, 1)), np.zeros((4, 1)))[:, :, 0]
+    for j in range(4):
+        a, b = 4.0, leak + 3.0 * modes.eigenvalues[j]
+        slow = leak**2 - np.sqrt((a**2 - leak**2) * (b**2 - leak**2)) if modes.eigenvalues[j] else 0.0
+        tone = np.cos(np.sqrt(max(0.0, -slow)) * t)
+        answer = np.convolve(impulse[:, j], tone)[: t.size] * t[1]
+        assert np.linalg.norm(answer) >= 0.95 * modes.gain[j, 0] * np.linalg.norm(tone)
+        backwards = impulse[::-1, j]
+        peak = simpson(impulse[:, j] ** 2, x=t)
+        assert peak >= 0.99 * modes.h2[j, 0] * np.sqrt(simpson(backwards**2, x=t))
+
+
+def test_what_a_constant_r_leaves_is_what_the_filter_tells():
+    for leak in (0.0, 1.5):
+        modes, t = filters(4.0, 3.0, leak), np.linspace(0.0, 12.0, 12001)
+        impulse = modes.free(t, np.ones((4, 1)), np.zeros((4, 1)))
+        np.testing.assert_allclose(simpson(impulse, x=t, axis=0), modes.static, atol=1e-6)
+        assert (modes.static[1:] == 0).all() == (leak == 0)
+        assert modes.static[0, 0] == 1 / 4.0
+
+
+# -- runs -------------------------------------------------------------------------------------------------
+
+
+def holds(bounds) -> bool:
+    """No bound is violated, with the r of the run or a priori."""
+    for bounded in (bounds.l2, bounds.peak, bounds.errors):
+        room = QUADRATURE * bounded.bound.max()
+        if (bounded.actual > bounded.bound + room).any():
+            return False
+        if bounded.a_priori is not None and (bounded.bound > bounded.a_priori + room).any():
+            return False
+    return True
+
+
+@st.composite
+def cells(draw):
+    """Any coupling, weights, gains, and what acts from outside, on arms that are square or redundant."""
+    cartesian = draw(st.booleans())
+    joints = draw(st.sampled_from([2, 3])) if cartesian else 2
+    kind = draw(st.sampled_from(["pair", "ring", "signed graph", "all-to-all"]))
+    n = 2 if kind == "pair" else draw(st.sampled_from([3, 4]))
+    link = coupling(kind, n, 2, draw(st.sampled_from(["scalar", "constant", "moving"])))
+    gains = GAINS.replace(
+        Lambda=draw(st.floats(2, 8)),
+        beta=draw(st.sampled_from([0.0, 0.5, 6.0])),
+        K_eps=draw(st.sampled_from([0.0, 2.0])),
+        Gamma=draw(st.sampled_from([0.0, 0.02])),
+        leak=draw(st.sampled_from([0.0, 1.0])),
+    )
+    push = [(), (Disturbance(0, 3.0, 0.05, 0.1),)][draw(st.booleans())]
+    rubs = [None, Friction(viscous=0.5, coulomb=0.5)][draw(st.booleans())]
+    task = draw(st.sampled_from(["joint", "task"])) if joints == 2 else "joint"
+    return experiment(
+        link, gains, joints=joints, cartesian=cartesian, friction=rubs, disturbances=push, k_r_space=task
+    )
+
+
+@pytest.mark.filterwarnings("ignore::synctrl.errors.CouplingWarning")
+@settings(max_examples=15, deadline=None)
+@given(cells())
+def test_no_bound_is_violated_whatever_the_coupling_and_whatever_acts(cell):
+    bounds = modal_bounds(cell.simulate(0.15, dt=1e-3))
+    assert holds(bounds) and bounds.reason is None
+    assert bounds.gap.max() <= 1e-9 * bounds.rho.max()
