@@ -7,26 +7,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import simpson, solve_ivp
-from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_continuous_lyapunov
-from theory_cells import GAINS, coupling, experiment, planar_arm
+from theory_cells import GAINS, coupling, experiment
 
 from synctrl import (
-    Cell,
     Coupling,
     Disturbance,
-    Experiment,
     Friction,
-    FunctionTrajectory,
-    Gains,
-    Member,
-    Network,
 )
 from synctrl.analysis import modal_bounds
 from synctrl.analysis.modal_filter import ModalFilter
-from synctrl.analysis.replay import replay
-from synctrl.control.laws import ChungSlotine, ComputedTorque, SlotineLi
-from synctrl.experiments import a460_pair, ur5_payload
 
 RING = Coupling.signed_ring(4).matrix
 #: by how much a bound may be missed for the quadrature's sake
