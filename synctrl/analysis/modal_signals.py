@@ -71,14 +71,14 @@ def _told_all(run: Replay) -> bool:
 
 
 def _integral(run: Replay, sigma: np.ndarray, sigma_dot: np.ndarray) -> np.ndarray:
-    """E of E' = sigma - l E, (R, n, m), from what was told of it at the start.
+    """E of E' = sigma - l E, (R, n, m), from the integrals at the start.
 
     Between logged instants sigma is the cubic with its values and rates at both; Simpson's rule does
     the rest.
     """
     t, at, leak = run.result.t, run.logged, run.loop.controller.leak
     E = np.empty((len(t), *sigma.shape[1:]))
-    E[0] = run.rows.E[0]
+    E[0] = run.loop.cell.coupling.distribute(run.result.sync_integral[0])
     for k, h in enumerate(np.diff(t)):
         (a, b), (a_dot, b_dot) = (rate[[at[k], at[k] + 1]] for rate in (sigma, sigma_dot))
         middle = 0.5 * (a + b) + h / 8 * (a_dot - b_dot)
