@@ -164,7 +164,7 @@ def cells(draw):
     )
 
 
-@pytest.mark.filterwarnings("ignore::synctrl.errors.CouplingWarning")
+@pytest.mark.filterwarnings("ignore::synctrl.errors.CouplingWarning", "ignore::synctrl.errors.StepWarning")
 @settings(max_examples=12, deadline=None)
 @given(cells())
 def test_no_bound_is_violated_whatever_the_coupling_and_whatever_acts(cell):

@@ -23,8 +23,9 @@ import numpy as np
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .balance import accumulated
+from .dissipation import dissipation
 from .modal_filter import ModalFilter
-from .modal_signals import damped_size, run_signals, slip_matrices
+from .modal_signals import run_signals, slip_matrices
 from .replay import Replay, replay
 
 #: share of the largest bound below which another says nothing
@@ -68,17 +69,18 @@ class ModalBounds:
         unit: of w.
         w: modal errors of the run, (T, n, m).
         r: modal coupled velocity errors, of true sigma and E, (T, n, m), in the unit of w per s.
-        free: what they would be without r, (T, n, m).
+        free: what the modal errors would be without r, (T, n, m).
         rho: |r_j| over [0, t], (T, n, m).
         kappa: sup |c_i J_i K_r^-1/2| over robots and run.
         kappas: the same for one mode and axis, (n, m).
         X: sqrt(int sum s_q^T K_r s_q), or with J s_q for s_q where K_r acts in task space.
-        X_bound: bound of X, or None where none is known.
+        X_bound: bound of X by Theorem A, see `dissipation.py`, or None where it does not reach the run.
         gap: L2 norm of what r_j has beyond c J s_q, (n, m); rounding if `reason` is None.
         l2: L2 norm of w_j over the run, (n, m).
         peak: sup |w_j|, (n, m).
         errors: sup |e_i|, (n,).
         reason: why r is not c J s_q, in words, or None.
+        unbounded: why Theorem A does not reach the run, in words, or None.
     """
 
     title: str
@@ -100,6 +102,7 @@ class ModalBounds:
     peak: Bounded
     errors: Bounded
     reason: str | None
+    unbounded: str | None
 
     @property
     def differences(self) -> np.ndarray:
@@ -125,6 +128,7 @@ class ModalBounds:
             "X_bound": self.X_bound,
             **{name: getattr(self, name).as_dict() for name in ("l2", "peak", "errors")},
             "reason": self.reason,
+            "unbounded": self.unbounded,
             "sentence": self.sentence,
         }
 
@@ -137,6 +141,8 @@ class ModalBounds:
         lines += [f"  {name}: sup |e| {_row(self.errors, (i,))}" for i, name in enumerate(self.names)]
         if self.reason is not None:
             lines.append(f"  r is more than c J s_q, by what was measured: {self.reason}")
+        if self.unbounded is not None:
+            lines.append(f"  nothing is known a priori: {self.unbounded}")
         return "\n".join(lines)
 
 
@@ -151,28 +157,30 @@ def modal_bounds(result: Result | Replay, experiment: Experiment | None = None) 
         InputError: no experiment, or another than the one that made the result.
     """
     run = replay(result, experiment)
-    signals, controller, result = run_signals(run), run.loop.controller, run.result
-    gains = controller.Lambda, controller.beta, controller.leak
-    modes = ModalFilter.from_matrix(run.loop.cell.coupling.matrix, *gains)
+    signals, slip, modes, result = run_signals(run), dissipation(run), modal_filter(run), run.result
     w, E, r, driven = (modes.to_modes(rows) for rows in signals[:4])
     free = modes.free(result.t - result.t[0], w[0], E[0])
     rho, gap = np.sqrt(_grown(run, r**2)), np.sqrt(_grown(run, (r - driven) ** 2)[-1])
-    X = float(np.sqrt(_grown(run, damped_size(run))[-1]))
-    X_bound: float | None = X
     kappa, kappas = _kappas(run, modes)
+    X_bound = slip.X_bound if slip.reason is None else None
     ahead = None if X_bound is None else kappas * X_bound + gap
-    rest, most = modes.free_norm(w[0], E[0]), np.abs(free)
+    norm, peak = modes.free_norm(w[0], E[0]), np.abs(free)
+    l2 = Bounded(
+        np.sqrt(_grown(run, w**2)[-1]), norm + modes.gain * rho[-1], _sum(norm, modes.gain, ahead)
+    )
+    largest = (peak + modes.h2 * rho).max(axis=0), _sum(peak.max(axis=0), modes.h2, ahead)
     return ModalBounds(
         str(result.info["title"]), result.t, modes, tuple(result.info["axes"]), tuple(result.names),
-        result.unit("coupled_error"), w[run.logged], r[run.logged], free, rho, kappa, kappas, X, X_bound, gap,
-        Bounded(np.sqrt(_grown(run, w**2)[-1]), rest + modes.gain * rho[-1], _sum(rest, modes.gain, ahead)),
-        Bounded(
-            np.abs(w).max(axis=0), (most + modes.h2 * rho).max(axis=0),
-            _sum(most.max(axis=0), modes.h2, ahead),
-        ),
-        _errors(run, modes, free, rho, ahead),
-        signals.reason,
+        result.unit("coupled_error"), w[run.logged], r[run.logged], free, rho, kappa, kappas,
+        slip.X, X_bound, gap, l2, Bounded(np.abs(w).max(axis=0), *largest),
+        _errors(run, modes, free, rho, ahead), signals.reason, slip.reason,
     )  # fmt: skip
+
+
+def modal_filter(run: Replay) -> ModalFilter:
+    """The filters of the cell and the gains of a run."""
+    controller, S = run.loop.controller, run.loop.cell.coupling.matrix
+    return ModalFilter.from_matrix(S, controller.Lambda, controller.beta, controller.leak)
 
 
 def _sum(free: np.ndarray, gain: np.ndarray, rho: np.ndarray | None) -> np.ndarray | None:

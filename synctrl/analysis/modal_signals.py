@@ -50,13 +50,6 @@ def run_signals(run: Replay) -> RunSignals:
     return RunSignals(w, E, r, driven, _reason(run, told, r, driven))
 
 
-def damped_size(run: Replay) -> np.ndarray:
-    """sum s_q^T K_r s_q, (R,), N·m/s, or with J s_q for s_q where K_r acts in task space."""
-    x, controller = run.rows, run.loop.controller
-    s = x.s_q if controller.k_r_space == "joint" else np.matvec(x.J, x.s_q)
-    return (s * controller.K_r * s).sum(axis=(1, 2))
-
-
 def slip_matrices(run: Replay) -> np.ndarray:
     """c_i J_i K_r^-1/2, (R, n, m, nv), or c_i K_r^-1/2, (R, n, m, m), where K_r acts in task space."""
     x, controller = run.rows, run.loop.controller
