@@ -18,9 +18,10 @@ from synctrl.analysis import modal_bounds
 from synctrl.analysis.modal import ModalBounds
 from synctrl.analysis.modal_filter import ModalFilter
 from synctrl.analysis.replay import replay
-from synctrl.control.laws import ChungSlotine, ComputedTorque, SlotineLi
+from synctrl.control.laws import ChungSlotine, ComputedTorque, SlotineLi, SunMills
 from synctrl.control.network import Ideal
 from synctrl.experiments import a460_pair, ur5_payload
+from synctrl.show.modal_figures import modal_figure
 from synctrl.simulation.devices import Bias
 
 RING = Coupling.signed_ring(4).matrix
@@ -100,6 +101,7 @@ def test_the_norm_of_the_free_response_is_its_norm(leak):
     norm = np.sqrt(simpson(modes.free(t, w0, E0) ** 2, x=t, axis=0))
     np.testing.assert_allclose(modes.free_norm(w0, E0), norm, rtol=1e-6)
     np.testing.assert_array_equal(modes.free(np.zeros(1), w0, E0)[0], w0)
+    assert (np.abs(modes.free(t, w0, 0 * E0)) <= np.abs(w0)).all()
 
 
 @pytest.mark.parametrize("leak", [0.0, 1.5])
@@ -252,6 +254,11 @@ def test_laws_whose_r_is_that_of_tracking_are_covered(law):
     assert (bounds.filter.gain == 1 / GAINS.Lambda).all() and bounds.sentence.startswith("without beta")
 
 
+def test_damping_of_r_beside_the_force_changes_r_and_no_bound():
+    bounds = modal_bounds(experiment(coupling("pair", 2, 2), law=SunMills(injection=True)).simulate(0.1))
+    assert holds(bounds) and bounds.reason is None and bounds.unbounded is None
+
+
 def test_another_law_is_named_as_the_reason():
     gains = GAINS.independent()
     cell = experiment(coupling("pair", 2, 2), gains, law=ComputedTorque())
@@ -279,11 +286,13 @@ def frozen_pair(Lambda: float, beta: float, K_r: float, known: tuple[float, floa
 
 @pytest.mark.parametrize(
     ("name", "mode", "cell", "duration"),
-    [
+    [  # a long push, one that begins slowly, one that swings at sqrt(a b), and one that begins fast
         ("l2", 0, lambda: frozen_pair(20.0, 3.0, 20.0, (0.5, 0.5)), 0.8),
         ("peak", 0, lambda: frozen_pair(4.0, 3.0, 2.0, (0.5, 0.5)), 0.3),
         ("l2", 1, lambda: frozen_pair(20.0, 10.0, 10.0, (0.5, 1.5), 0.1, 20.0), 1.0),
+        ("peak", 1, lambda: frozen_pair(4.0, 1.0, 1.0, (1.0, 0.5)), 0.25),
     ],
+    ids=["energy of the common mode", "its peak", "energy of the differences", "their peak"],
 )
 def test_a_run_from_rest_reaches_nine_tenths_of_the_bound(name, mode, cell, duration):
     bounds = modal_bounds(cell().simulate(duration, dt=1e-3, engine="compiled"))
@@ -328,3 +337,18 @@ def test_bounds_are_plain_data_and_words():
     told = json.loads(json.dumps(bounds.as_dict(), allow_nan=False))
     assert np.shape(told["peak"]["bound"]) == (2, 2) and told["reason"] is None
     assert bounds.sentence in str(bounds) and all(name in str(bounds) for name in bounds.names)
+
+
+@pytest.mark.parametrize("known", [0.6, 1.0])
+def test_the_figure_has_a_panel_for_each_eigenvalue_with_the_run_inside_the_bands(known):
+    run = experiment(coupling("signed graph", 4, 2), known=known).simulate(0.05, dt=1e-3)
+    bounds = modal_bounds(run)
+    panels = modal_figure(bounds).axes
+    assert [panel.get_title(loc="left").partition(":")[0] for panel in panels] == [
+        "common mode, λ = 0", "differences, λ = 2", "differences, λ = 4",
+    ]  # fmt: skip
+    for panel in panels:
+        inner, outer = (band.get_paths()[0].vertices[:, 1].max() for band in panel.collections)
+        line = panel.lines[0].get_ydata()
+        assert line.max() <= inner <= outer
+        assert panel.get_ylim() == panels[0].get_ylim() and panel.get_ylim()[0] < line.max()

@@ -105,6 +105,11 @@ class ModalBounds:
     unbounded: str | None
 
     @property
+    def rho_a_priori(self) -> np.ndarray | None:
+        """Bound of |r_j| that knows X_bound instead of r, (n, m), where one is known."""
+        return None if self.X_bound is None else self.kappas * self.X_bound + self.gap
+
+    @property
     def differences(self) -> np.ndarray:
         """sqrt(lambda_j), (n,): |eps_j| is that times |w_j|."""
         return np.sqrt(self.filter.eigenvalues)
@@ -165,9 +170,7 @@ def modal_bounds(result: Result | Replay, experiment: Experiment | None = None) 
     X_bound = slip.X_bound if slip.reason is None else None
     ahead = None if X_bound is None else kappas * X_bound + gap
     norm, peak = modes.free_norm(w[0], E[0]), np.abs(free)
-    l2 = Bounded(
-        np.sqrt(_grown(run, w**2)[-1]), norm + modes.gain * rho[-1], _sum(norm, modes.gain, ahead)
-    )
+    l2 = Bounded(np.sqrt(_grown(run, w**2)[-1]), norm + modes.gain * rho[-1], _sum(norm, modes.gain, ahead))
     largest = (peak + modes.h2 * rho).max(axis=0), _sum(peak.max(axis=0), modes.h2, ahead)
     return ModalBounds(
         str(result.info["title"]), result.t, modes, tuple(result.info["axes"]), tuple(result.names),
