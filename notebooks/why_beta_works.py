@@ -13,12 +13,13 @@
 # %% [markdown]
 # # Why beta works
 #
-# The law adds β times the integral of the synchronization errors to every robot's error. Why does that hold robots
-# together? Because of what it does to the coupled velocity error r on its way to the errors: it is a filter, and
-# β moves one of its poles. Two A460 show it, with friction that their model does not know.
+# The law adds β times the integral of the synchronization errors to every robot's error. Why does that
+# hold robots together? Because of what it does to the coupled velocity error r on its way to the errors:
+# it is a filter, and β moves one of its poles. Two A460 show it, with friction that their model does not
+# know.
 #
-# The proof is in `docs/theorem_b.md`. **Masses, inertias and friction of the A460 are invented**, see the notebook
-# about the two arms.
+# The proof is in `docs/theorem_b.md`. **Masses, inertias and friction of the A460 are invented**, see the
+# notebook about the two arms.
 
 # %%
 # %matplotlib inline
@@ -39,13 +40,13 @@ DURATION = 4.0  # s
 # %% [markdown]
 # ## The filter
 #
-# Two robots have two modes. In the common one both are wrong alike, and ε is 0; in the other they differ. With
-# λ the eigenvalue of SᵀS, 0 for the first and 2 for the second, every axis of a mode obeys
+# Two robots have two modes. In the common one both are wrong alike, and ε is 0; in the other they differ.
+# With λ the eigenvalue of SᵀS, 0 for the first and 2 for the second, every axis of a mode obeys
 #
 # $$w = \frac{p}{(p + \Lambda)(p + \beta\lambda)}\, r$$
 #
-# Without β one factor p cancels: 1/(p + Λ), whatever the mode. With it the gain of the differences is at most
-# 1/(Λ + βλ), and 0 where r is constant.
+# Without β one factor p cancels: 1/(p + Λ), whatever the mode. With it the gain of the differences is at
+# most 1/(Λ + βλ), and 0 where r is constant.
 
 # %%
 S, Lambda = np.array([[1.0, -1.0]]), np.array([8.0])
@@ -64,8 +65,8 @@ figure
 # %% [markdown]
 # ## The two arms
 #
-# The same controller, with β and without; K_ε goes with it, but is in none of the gains. Friction near rest is
-# faster than the step, of which runs warn; see the notebook about the two arms.
+# The same controller, with β and without; K_ε goes with it, but is in none of the gains. Friction near
+# rest is faster than the step, of which runs warn; see the notebook about the two arms.
 
 # %%
 together = a460_pair().simulate(DURATION, log_dt=1e-2)
@@ -76,8 +77,9 @@ display(sync_errors(together, limits), sync_errors(alone, limits))
 # %% [markdown]
 # ## Bounds, and the runs inside
 #
-# What a run may do at most, given the r that it had, is the dark band. The light band knows no r, only what is
-# stored at first and how much torque the model lacks. The common mode is the same in both figures.
+# What a run may do at most, given the r that it had, is the dark band. The light band knows no r, only
+# what is stored at first and how much torque the model lacks. The common mode is the same in both
+# figures.
 
 # %%
 bounds = {"synchronized": modal_bounds(together), "independent": modal_bounds(alone)}
@@ -88,8 +90,8 @@ for name, found in bounds.items():
 # %% [markdown]
 # ## Residual offsets
 #
-# At the end friction holds the arms, and r hardly changes. A filter shows then what it does to constants: in the
-# common mode r/Λ stays, with β and without. In the difference it stays only without.
+# At the end friction holds the arms, and r hardly changes. A filter shows then what it does to constants:
+# in the common mode r/Λ stays, with β and without. In the difference it stays only without.
 
 # %%
 for name, found in bounds.items():
