@@ -10,8 +10,8 @@ from synctrl.analysis.certify import certify
 from synctrl.analysis.convergence import convergence, identify
 from synctrl.analysis.gain_condition import gain_condition
 from synctrl.analysis.lyapunov import lyapunov
-from synctrl.analysis.modal import modal_bounds
 from synctrl.analysis.metrics import as_data, metrics, row_names, settling_bands
+from synctrl.analysis.modal import modal_bounds
 from synctrl.errors import SynctrlError
 from synctrl.paper.judge import compare_runs, differences
 from synctrl.paper.plant_sections import step_section
