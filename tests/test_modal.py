@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 from scipy.integrate import simpson, solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_continuous_lyapunov
@@ -17,12 +19,15 @@ from synctrl import Cell, Coupling, Disturbance, Experiment, Friction, FunctionT
 from synctrl.analysis import modal_bounds
 from synctrl.analysis.modal import ModalBounds
 from synctrl.analysis.modal_filter import ModalFilter
+from synctrl.analysis.modal_signals import true_integral
 from synctrl.analysis.replay import replay
 from synctrl.control.laws import ChungSlotine, ComputedTorque, SlotineLi, SunMills
 from synctrl.control.network import Ideal
+from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, ur5_payload
 from synctrl.show.modal_figures import modal_figure
 from synctrl.simulation.devices import Bias
+from synctrl.simulation.plant import Plant
 
 RING = Coupling.signed_ring(4).matrix
 #: by how much a bound may be missed for the quadrature's sake
@@ -223,6 +228,31 @@ def test_integrals_that_do_not_start_at_zero_are_treated_exactly(leak):
     assert np.abs(start).min() > 0 and holds(bounds)
     np.testing.assert_allclose(filtered(bounds, start), bounds.w[-1], atol=1e-6 * np.abs(bounds.w).max())
     assert not np.allclose(filtered(bounds, 0 * start), bounds.w[-1], atol=1e-3 * np.abs(bounds.w).max())
+
+
+@pytest.mark.parametrize("leak", [0.0, 1.0, 4.0])
+def test_integrals_of_the_true_sigma_are_those_of_a_law_that_is_told_it(leak):
+    run = replay(experiment(coupling("pair", 2, 2), GAINS.replace(leak=leak)).simulate(0.1, dt=1e-3))
+    x, link = run.rows, run.loop.cell.coupling
+    E = true_integral(run, x.sigma, link.distribute(x.epsilon_dot))
+    np.testing.assert_allclose(E, x.E, rtol=0, atol=1e-7 * np.abs(x.E).max())
+
+
+def kicked(q_jump: float, v_jump: float) -> Experiment:
+    class Kicked(Plant):
+        events = (0.0503,)
+
+        def meet(self, t, q, v, hidden):
+            return q + q_jump, v + v_jump, hidden
+
+    return replace(experiment(coupling("pair", 2, 2)), plant_type=Kicked)
+
+
+def test_a_jump_of_velocities_is_in_r_and_one_of_positions_is_refused():
+    assert holds(modal_bounds(kicked(0.0, 0.5).simulate(0.1, dt=1e-3)))
+    run = kicked(0.01, 0.0).simulate(0.1, dt=1e-3)
+    with refused(InputError, "result", found=run.t[run.t > 0.0503][0]):
+        modal_bounds(run)
 
 
 OTHERS = {

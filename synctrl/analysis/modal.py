@@ -159,7 +159,8 @@ def modal_bounds(result: Result | Replay, experiment: Experiment | None = None) 
         experiment: what made it; needed for a result loaded from a file.
 
     Raises:
-        InputError: no experiment, or another than the one that made the result.
+        InputError: no experiment, or another than the one that made the result; an event that moves
+            positions at once.
     """
     run = replay(result, experiment)
     signals, slip, modes, result = run_signals(run), dissipation(run), modal_filter(run), run.result

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..errors import InputError
 from .lyapunov import is_ideal
 from .replay import Replay
 
@@ -37,13 +38,18 @@ class RunSignals(NamedTuple):
 
 
 def run_signals(run: Replay) -> RunSignals:
-    """Weighted errors, integrals and coupled velocity errors along a run."""
+    """Weighted errors, integrals and coupled velocity errors along a run.
+
+    Raises:
+        InputError: an event moves positions, so that w jumps.
+    """
     x, coupling, controller = run.rows, run.loop.cell.coupling, run.loop.controller
     w, w_dot = x.weighted.swapaxes(0, 1)
+    _check_continuous(run, w, w_dot)
     sigma, sigma_dot = (coupling.distribute(coupling.compare(rows)) for rows in (w, w_dot))
     at_once = controller.Lambda * w + w_dot
     spring = (controller.Lambda - controller.leak) * controller.beta
-    E = x.E if _told_all(run) else _integral(run, sigma, sigma_dot)
+    E = x.E if _told_all(run) else true_integral(run, sigma, sigma_dot)
     told = at_once + controller.beta * x.sigma + spring * x.E
     r = at_once + controller.beta * sigma + spring * E
     driven = np.matvec(x.c, np.matvec(x.J, x.s_q))
@@ -63,7 +69,7 @@ def _told_all(run: Replay) -> bool:
     return is_ideal(run.loop.controller.network) and run.result.info.get("control_period") is None
 
 
-def _integral(run: Replay, sigma: np.ndarray, sigma_dot: np.ndarray) -> np.ndarray:
+def true_integral(run: Replay, sigma: np.ndarray, sigma_dot: np.ndarray) -> np.ndarray:
     """E of E' = sigma - l E, (R, n, m), from the integrals at the start.
 
     Between logged instants sigma is the cubic with its values and rates at both; Simpson's rule does
@@ -78,6 +84,17 @@ def _integral(run: Replay, sigma: np.ndarray, sigma_dot: np.ndarray) -> np.ndarr
         half = np.exp(-0.5 * h * leak)
         E[k + 1] = half * (half * (E[k] + h / 6 * a) + h / 1.5 * middle) + h / 6 * b
     return E[np.searchsorted(at, np.arange(len(sigma)))]
+
+
+def _check_continuous(run: Replay, w: np.ndarray, w_dot: np.ndarray) -> None:
+    """Refuse a run in which an event of the plant moves w at once: then w is not r filtered."""
+    for k in run.events:
+        ends, h = run.logged[k] + np.arange(2), run.result.t[k + 1] - run.result.t[k]
+        moved, passed = np.abs(w[ends[1]] - w[ends[0]]).max(), h * np.abs(w_dot[ends]).max()
+        if moved > 2 * passed + ROUNDING * np.abs(w).max():
+            time = float(run.result.t[k + 1])
+            text = f"expected errors that do not jump, found an event that moves them at t = {time:g} s"
+            raise InputError(text, subject="result", found=time)
 
 
 def _reason(run: Replay, told: np.ndarray, r: np.ndarray, driven: np.ndarray) -> str | None:
