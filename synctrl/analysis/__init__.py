@@ -5,6 +5,7 @@ from .comparison import Comparison, compare, side_by_side
 from .delay_map import DelayMap, delay_map
 from .delay_margin import DelayMargin, delay_margin
 from .dissipation import Dissipation, dissipation
+from .modal import ModalBounds, modal_bounds
 from .period_margin import period_margin
 from .resolution import resolution_error
 
@@ -14,11 +15,13 @@ __all__ = [
     "DelayMap",
     "DelayMargin",
     "Dissipation",
+    "ModalBounds",
     "certify",
     "compare",
     "delay_map",
     "delay_margin",
     "dissipation",
+    "modal_bounds",
     "period_margin",
     "resolution_error",
     "side_by_side",

@@ -198,7 +198,7 @@ def outside(network: BoundNetwork) -> str | None:
     return "no proof is known" if ask is None else ask()
 
 
-def _is_ideal(network: BoundNetwork) -> bool:
+def is_ideal(network: BoundNetwork) -> bool:
     """Whether the proof holds with a network as it stands, without a theorem of its own."""
     return outside(network) is None and getattr(network, "theorem", None) is None
 
@@ -223,7 +223,7 @@ def proof_along(run: Replay) -> Proof:
 
 def inside_of(run: Replay, proof: Proof) -> tuple[str, ...]:
     """Names of the powers that the theorem knows: diffusive coupling only where all is heard at once."""
-    ideal = _is_ideal(run.loop.controller.network)
+    ideal = is_ideal(run.loop.controller.network)
     known = (name for name in proof.powers if ideal or name != DIFFUSION)
     return ("damping", *known, "friction in Y", *GIVING)
 
@@ -262,7 +262,7 @@ def _power(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
     pushed = _sum(s * x.force)  # the rates of the proof less its powers, where it holds
     if not hasattr(controller.law, "proof"):
         power["law"] = -pushed
-    elif not _is_ideal(controller.network):
+    elif not is_ideal(controller.network):
         rates, powers = (sum(map(_sum, terms.values())) for terms in (proof.rates, proof.powers))
         power["network"] = rates - powers - pushed + _sum(x.s_q * np.matvec(x.M, x.gap))
     power["other"] = np.sum(_rates(run, proof), axis=0) - np.sum(list(power.values()), axis=0)
