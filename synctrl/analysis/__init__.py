@@ -6,12 +6,14 @@ from .delay_map import DelayMap, delay_map
 from .delay_margin import DelayMargin, delay_margin
 from .period_margin import period_margin
 from .resolution import resolution_error
+from .tube import Tube, tube
 
 __all__ = [
     "Certificate",
     "Comparison",
     "DelayMap",
     "DelayMargin",
+    "Tube",
     "certify",
     "compare",
     "delay_map",
@@ -19,4 +21,5 @@ __all__ = [
     "period_margin",
     "resolution_error",
     "side_by_side",
+    "tube",
 ]

@@ -1,0 +1,164 @@
+"""Whether a tube of errors stays clear of singular configurations, so that J^-1 exists all along a run.
+
+Three ways, none of which assumes what it shows:
+
+- in joint space J is the identity;
+- the tip of two parallel axes with links l_1 and l_2 is singular only at the distances |l_1 - l_2| and
+  l_1 + l_2 from the first: the tube has to stay between them;
+- any other arm with as many joints as coordinates: let x(q_d) = x_d with the smallest singular value s of J
+  there, and H the bound of its derivative by lengths of links. With d = |q - q_d| the error is at least
+  s d - H/2 d^2, so that one of at most R < s^2 / (2 H) leaves d either below the first root of
+  s d - H/2 d^2 = R or above the second. A robot that starts below the first stays there, and the singular
+  values of J are at least s - H d >= (s^2 - 2 H R)^1/2.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..coupling.cell import Cell
+from ..robots.link_lengths import column_bounds
+from ..robots.model import subspace
+from ..robots.robot import Robot
+from ..tasks.inverse_kinematics import find_anywhere
+from ..tasks.pose import PoseSpace
+from ..tasks.spaces import CartesianSpace, JointSpace
+
+#: lengths by which metres are compared with radians, as shares of an arm's reach
+SCALES = 0.1, 0.2, 0.4, 0.8
+#: |Jl^-1(phi) - 1| <= 0.6 |phi| up to half a turn
+LOG = 0.6
+#: axes are parallel, and positions the same, to this
+PARALLEL = 1e-9
+
+
+class Clearance(NamedTuple):
+    """Whether a tube excludes singular configurations.
+
+    Attributes:
+        excluded: True, or False; None if there is no way to tell.
+        reason: why, in words.
+        share: the largest share of the room there is that the tube takes up, below 1 if they are excluded.
+    """
+
+    excluded: bool | None
+    reason: str
+    share: float
+
+
+def clearance(cell: Cell, times: np.ndarray, radius: np.ndarray) -> Clearance:
+    """Whether the tubes of all robots exclude singular configurations.
+
+    Args:
+        cell: the robots.
+        times: instants of the run, (T,), s.
+        radius: bounds of the errors there part by part, (T, n, parts).
+    """
+    if type(cell.space) is JointSpace:
+        return Clearance(True, "in joint space J is the identity", 0.0)
+    found = [_clearance(cell, i, times, radius[:, i]) for i in range(cell.n)]
+    worst = max(found, key=lambda one: (one.excluded is None, one.share))
+    return worst
+
+
+def _clearance(cell: Cell, i: int, times: np.ndarray, radius: np.ndarray) -> Clearance:
+    """The same for one robot."""
+    robot, name, space = cell.robots[i], cell.names[i], cell.space
+    if type(space) not in (CartesianSpace, PoseSpace):
+        return Clearance(None, f"of {type(space).__name__} it is not known where J is singular", np.inf)
+    if robot.nv > cell.m:
+        free = f"{name} has joints that the task leaves free, of which errors say nothing"
+        return Clearance(None, free, np.inf)
+    if space.damping is not None:  # type: ignore[attr-defined]
+        return Clearance(None, "a damped inverse is outside the theorem", np.inf)
+    lengths = two_links(robot, space)
+    if lengths is not None:
+        return _between(cell, i, times, radius[:, 0], lengths)
+    return _near(cell, i, times, radius)
+
+
+# -- two links -----------------------------------------------------------------------------------------------
+
+
+def two_links(robot: Robot, space: Any) -> tuple[float, float] | None:
+    """Lengths of the links of an arm of two parallel axes that moves in the plane of the task; else None."""
+    model, tip = robot.model, robot.model.frames[robot.tip_id]
+    chain = list(model.supports[tip.parentJoint])
+    if robot.nv != 2 or not isinstance(space, CartesianSpace) or chain != [0, 1, 2]:
+        return None
+    first, second = (subspace(model, joint)[3:] for joint in (1, 2))
+    place, base = model.jointPlacements[2], model.jointPlacements[1]
+    up = base.rotation @ first
+    flat = np.abs(up[space.rows]).max() < PARALLEL and first.any() and second.any()
+    if not flat or np.linalg.norm(np.cross(first, place.rotation @ second)) > PARALLEL:
+        return None
+    offsets = zip((first, second), (place.translation, tip.placement.translation), strict=True)
+    l_1, l_2 = (float(np.linalg.norm(np.cross(axis, offset))) for axis, offset in offsets)
+    return l_1, l_2
+
+
+def _between(
+    cell: Cell, i: int, times: np.ndarray, radius: np.ndarray, lengths: tuple[float, float]
+) -> Clearance:
+    """Whether a tip stays between the circles on which two links are stretched or folded."""
+    axis = cell.robots[i].model.jointPlacements[1].translation[cell.space.rows]  # type: ignore[attr-defined]
+    distance = np.linalg.norm(cell.motion(i, times).x - axis, axis=-1)
+    inner, outer = abs(lengths[0] - lengths[1]), sum(lengths)
+    room = np.minimum(distance - inner, outer - distance)
+    k = int(np.argmin(room - radius))
+    share = float(radius[k] / room[k]) if room[k] > 0 else np.inf
+    words = f"{cell.names[i]} is singular {inner:.4g} and {outer:.4g} m from its first axis"
+    return Clearance(
+        share < 1, f"{words}, and its tube of {radius[k]:.4g} m has {room[k]:.4g} m of room", share
+    )
+
+
+# -- any arm -------------------------------------------------------------------------------------------------
+
+
+def _near(cell: Cell, i: int, times: np.ndarray, radius: np.ndarray) -> Clearance:
+    """Whether joints stay so near those of the desired path that J keeps its inverse."""
+    robot, name = cell.robots[i], cell.names[i]
+    path = _followed(cell, i, times)
+    if path is None:
+        return Clearance(None, f"no joint positions were found along the path of {name}", np.inf)
+    q, J = path
+    reach = column_bounds(robot).linear.max()
+    tried = [_room(robot, J, radius, scale * reach) for scale in SCALES]
+    room, size, H, s = max(tried, key=lambda found: float((found[0] / found[1]).min()))
+    k, away = int(np.argmin(room / size)), float(np.linalg.norm(cell.q0[i, : robot.nv] - q[0]))
+    share = float(size[k] / room[k]) if room[k] > 0 else np.inf
+    if share < 1 and away * H >= s[0] + np.sqrt(s[0] ** 2 - 2 * H * size[0]):
+        return Clearance(None, f"{name} starts on another branch than its path, {away:.3g} rad away", np.inf)
+    words = f"{name} may be singular from errors of {room[k]:.3g} on, at t = {times[k]:.3g} s"
+    return Clearance(share < 1, f"{words}, and its tube allows {size[k]:.3g}", share)
+
+
+def _room(
+    robot: Robot, J: np.ndarray, radius: np.ndarray, scale: float
+) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
+    """s^2 / (2 H) and R at all instants, H, and s at all instants, with positions in units of `scale`."""
+    columns = column_bounds(robot)
+    scales = np.array([scale, 1.0])[: radius.shape[-1]]
+    bending = columns.bending / scale
+    if len(scales) == 2:
+        bending = np.hypot(bending, columns.turning + LOG * np.outer(columns.angular, columns.angular))
+    H = float(np.linalg.norm(bending, 2))
+    rows = np.repeat(scales, 3)[: J.shape[1]] if len(scales) == 2 else np.full(J.shape[1], scale)
+    s = np.linalg.svd(J / rows[:, None], compute_uv=False)[:, -1]
+    return s**2 / (2 * H), np.linalg.norm(radius / scales, axis=-1), H, s
+
+
+def _followed(cell: Cell, i: int, times: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Joint positions along the desired path, from the start on, (T, nv), and J there, (T, m, nv)."""
+    robot, space = cell.robots[i], cell.space
+    q, found = cell.q0[i, : robot.nv], []
+    for target in cell.motion(i, times).x:
+        moved = find_anywhere(robot, target, q, space)  # type: ignore[arg-type]
+        if moved is None:
+            return None
+        q = moved
+        found.append((q, space.miss(robot, target, q)[1]))  # type: ignore[attr-defined]
+    return np.array([q for q, _ in found]), np.array([J for _, J in found])
