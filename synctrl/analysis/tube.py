@@ -27,9 +27,12 @@ from ..tasks.pose import MAX_ANGLE
 from ..tasks.spaces import JointSpace
 from .clearance import clearance
 from .jacobian_size import sizes_of
-from .tube_radius import Known, radii, radii_with
+from .tube_radius import Known, Radii, radii, radii_with
 from .tube_start import check_velocities, read_instants, start
 from .unmodelled import torque_norm, unmodelled_friction
+
+#: what has to be true where kappa is given
+KAPPA_GIVEN = "kappa is as given"
 
 
 class Part(NamedTuple):
@@ -148,32 +151,38 @@ def tube(
     instance("cell", cell, Cell, "a Cell")
     instance("gains", gains, Gains, "Gains")
     controller, end = Controller(cell, gains), positive_number("duration", duration)
-    instants = read_instants(times, end)
     check_velocities(cell, end)
     energy, w = start(controller, cell.references(np.array([0.0]))[0])
     acting = finite_array("torque", torque) + unmodelled_friction(cell, speed)
     D = torque_norm(cell, controller.K_r, acting, disturbances, end)
-    X = D / 2 + float(np.sqrt(D**2 / 4 + sum(energy.values())))
-    known = Known(controller, instants, cell.reference_table(instants), w, X)
-    given = None if kappa is None else finite_array("kappa", kappa, (cell.n, len(known.parts)))
-    found = radii(known) if given is None else radii_with(known, given)
-    clear = clearance(cell, instants, found.radius)
+    instants = read_instants(times, end)
+    known = Known(controller, instants, cell.reference_table(instants), w, energy, D)
+    if kappa is not None:
+        given = finite_array("kappa", kappa, (cell.n, len(known.parts)))
+        return _tube(known, radii_with(known, given), [KAPPA_GIVEN], speed is not None)
+    return _tube(known, radii(known), [], speed is not None)
+
+
+def _tube(known: Known, found: Radii, given: list[str], slow: bool) -> Tube:
+    """A tube of what was found, with what has to be true because of what was given."""
+    cell = known.controller.cell
+    clear = clearance(cell, known.instants, found.radius)
     return Tube(
         cell=cell.name,
         names=cell.names,
         parts=tuple(_part(cell, part) for part in known.parts),
-        t=instants,
+        t=known.instants,
         radius=found.radius,
-        energy=energy,
-        D=D,
-        X=X,
+        energy=known.energy,
+        D=known.D,
+        X=known.X,
         kappa=found.kappa,
         plain=_plain(known, found.kappa),
         sampled=found.sampled,
         excludes_singularities=clear.excluded,
         excludes_half_turns=found.turned,
         reason=clear.reason,
-        assumed=_assumed(cell, given is not None, speed is not None, found.sampled),
+        assumed=(*_assumed(cell, slow, found.sampled), *given),
     )
 
 
@@ -192,14 +201,13 @@ def _plain(known: Known, kappa: np.ndarray) -> np.ndarray:
 # -- in words ----------------------------------------------------------------------------------------------
 
 
-def _assumed(cell: Cell, given: bool, slow: bool, sampled: bool) -> tuple[str, ...]:
+def _assumed(cell: Cell, slow: bool, sampled: bool) -> tuple[str, ...]:
     """What has to be true beside what a cell says, in words."""
     slides = any("m" in robot.joint_units for robot in cell.robots) and not isinstance(cell.space, JointSpace)
     said = {
         "no other torque acts": True,
         "joints are no faster than stated": slow,
         "slides stay within their limits": slides,
-        "kappa is as given": given,
         "kappa is no larger than where it was sampled": sampled,
         "weights and paths do nothing new between these instants": True,
     }
@@ -208,7 +216,7 @@ def _assumed(cell: Cell, given: bool, slow: bool, sampled: bool) -> tuple[str, .
 
 def in_words(tube: Tube) -> list[str]:
     """What a tube says, in sentences, a line each."""
-    given = "kappa is as given" in tube.assumed
+    given = KAPPA_GIVEN in tube.assumed
     by = "what is given" if given else "sampled positions" if tube.sampled else "lengths of links"
     lines = [
         f"{tube.cell}, {tube.t[-1]:g} s: V(0) = {tube.V0:.4g}, and torque outside the model of D <= "

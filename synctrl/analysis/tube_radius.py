@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -25,14 +26,21 @@ class Known(NamedTuple):
         instants: at which they are wanted, (T,), s.
         told: what the robots are told then.
         w: w(0), (n, m).
-        X: bound of the damping, sqrt(N·m).
+        energy: terms of V(0) by name.
+        D: bound of the torque outside the model, sqrt(N·m).
     """
 
     controller: Controller
     instants: np.ndarray
     told: Reference
     w: np.ndarray
-    X: float
+    energy: Mapping[str, float]
+    D: float
+
+    @property
+    def X(self) -> float:  # noqa: N802
+        """D/2 + (D^2/4 + V(0))^1/2, sqrt(N·m)."""
+        return self.D / 2 + float(np.sqrt(self.D**2 / 4 + sum(self.energy.values())))
 
     @property
     def parts(self) -> list[slice]:
