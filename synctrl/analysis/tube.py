@@ -27,9 +27,9 @@ from ..tasks.pose import MAX_ANGLE
 from ..tasks.spaces import JointSpace
 from .clearance import clearance
 from .jacobian_size import sizes_of
+from .torque_bound import torque_norm, unmodelled_friction
 from .tube_radius import Known, Radii, radii, radii_with
 from .tube_start import check_velocities, read_instants, start
-from .unmodelled import torque_norm, unmodelled_friction
 
 #: what has to be true where kappa is given
 KAPPA_GIVEN = "kappa is as given"
@@ -151,19 +151,24 @@ def tube(
     instance("cell", cell, Cell, "a Cell")
     instance("gains", gains, Gains, "Gains")
     controller, end = Controller(cell, gains), positive_number("duration", duration)
-    check_velocities(cell, end)
-    energy, w = start(controller, cell.references(np.array([0.0]))[0])
     acting = finite_array("torque", torque) + unmodelled_friction(cell, speed)
     D = torque_norm(cell, controller.K_r, acting, disturbances, end)
-    instants = read_instants(times, end)
-    known = Known(controller, instants, cell.reference_table(instants), w, energy, D)
-    if kappa is not None:
-        given = finite_array("kappa", kappa, (cell.n, len(known.parts)))
-        return _tube(known, radii_with(known, given), [KAPPA_GIVEN], speed is not None)
-    return _tube(known, radii(known), [], speed is not None)
+    known, slow = _known(controller, read_instants(times, end), D, end), speed is not None
+    if kappa is None:
+        return _tube(known, radii(known), slow)
+    given = finite_array("kappa", kappa, (cell.n, len(known.parts)))
+    return _tube(known, radii_with(known, given), slow, KAPPA_GIVEN)
 
 
-def _tube(known: Known, found: Radii, given: list[str], slow: bool) -> Tube:
+def _known(controller: Controller, instants: np.ndarray, D: float, end: float) -> Known:
+    """What is known of a cell before a run that ends at a time, s."""
+    cell = controller.cell
+    check_velocities(cell, end)
+    energy, w = start(controller, cell.references(np.array([0.0]))[0])
+    return Known(controller, instants, cell.reference_table(instants), w, energy, D)
+
+
+def _tube(known: Known, found: Radii, slow: bool, *given: str) -> Tube:
     """A tube of what was found, with what has to be true because of what was given."""
     cell = known.controller.cell
     clear = clearance(cell, known.instants, found.radius)
