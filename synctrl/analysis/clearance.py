@@ -130,25 +130,40 @@ def _near(cell: Cell, i: int, times: np.ndarray, radius: np.ndarray) -> Clearanc
     room, size, H, s = max(tried, key=lambda found: float((found[0] / found[1]).min()))
     k, away = int(np.argmin(room / size)), float(np.linalg.norm(cell.q0[i, : robot.nv] - q[0]))
     share = float(size[k] / room[k]) if room[k] > 0 else np.inf
+    if share < 1 and (np.linalg.norm(np.diff(q, axis=0), axis=-1) * H >= s[1:]).any():
+        return Clearance(None, f"the joint positions found along the path of {name} jump", np.inf)
     if share < 1 and away * H >= s[0] + np.sqrt(s[0] ** 2 - 2 * H * size[0]):
         return Clearance(None, f"{name} starts on another branch than its path, {away:.3g} rad away", np.inf)
     words = f"{name} may be singular from errors of {room[k]:.3g} on, at t = {times[k]:.3g} s"
     return Clearance(share < 1, f"{words}, and its tube allows {size[k]:.3g}", share)
 
 
+def bend(robot: Robot, scale: float, m: int) -> tuple[np.ndarray, float]:
+    """Units of the m coordinates, (m,), and H: by how much a tip's way bends at most, in these units.
+
+    H is the norm of a matrix of bounds of second derivatives. Of an orientation, phi' differs from the
+    angular velocity by at most `LOG` |phi| times it, and |phi| is at most what the joints have turned.
+
+    Args:
+        robot: the robot.
+        scale: unit of positions, m; that of orientations is 1 rad.
+        m: number of coordinates, 6 of poses.
+    """
+    columns = column_bounds(robot)
+    bending = columns.bending / scale
+    if m > 3:
+        turning = columns.turning + LOG * np.outer(columns.angular, columns.angular)
+        bending = np.hypot(bending, turning)
+    return np.repeat([scale, 1.0], 3)[:m], float(np.linalg.norm(bending, 2))
+
+
 def _room(
     robot: Robot, J: np.ndarray, radius: np.ndarray, scale: float
 ) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
     """s^2 / (2 H) and R at all instants, H, and s at all instants, with positions in units of `scale`."""
-    columns = column_bounds(robot)
-    scales = np.array([scale, 1.0])[: radius.shape[-1]]
-    bending = columns.bending / scale
-    if len(scales) == 2:
-        bending = np.hypot(bending, columns.turning + LOG * np.outer(columns.angular, columns.angular))
-    H = float(np.linalg.norm(bending, 2))
-    rows = np.repeat(scales, 3)[: J.shape[1]] if len(scales) == 2 else np.full(J.shape[1], scale)
-    s = np.linalg.svd(J / rows[:, None], compute_uv=False)[:, -1]
-    return s**2 / (2 * H), np.linalg.norm(radius / scales, axis=-1), H, s
+    units, H = bend(robot, scale, J.shape[1])
+    s = np.linalg.svd(J / units[:, None], compute_uv=False)[:, -1]
+    return s**2 / (2 * H), np.linalg.norm(radius / units[::3], axis=-1), H, s
 
 
 def _followed(cell: Cell, i: int, times: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, instance, positive_number
+from ..checks import finite_array, positive_number
 from ..control.controller import Controller
 from ..control.gains import Gains
 from ..coupling.cell import Cell
@@ -128,36 +128,32 @@ def tube(
 ) -> Tube:
     """Bounds of all errors of a cell under the paper's law, before any run.
 
-    It is about `SunMills` with the exact reference acceleration and damping in joint space, the adaptation
-    (14), robots that hear each other at once and that nothing connects, and continuous control.
+    It is about `SunMills` with the exact reference acceleration and damping in joint space, (14), robots that
+    hear each other at once and that nothing connects, and continuous control.
 
     Args:
         cell: the robots and where they start.
         gains: the gains.
-        torque: bound of the torque that may act on each joint beside friction and disturbances and that the
-            model does not have, a number, (nv,) or (n, nv), N·m.
+        torque: bound of torque that is not in the model, on each joint and beside friction and disturbances,
+            a number, (nv,) or (n, nv), N·m.
         duration: how long, s.
         disturbances: torques from outside that are known.
-        speed: bound of joint speeds, for viscous friction that is not adapted, a number, (nv,) or (n, nv),
-            rad/s.
-        kappa: bounds of |c_i J_i K_r^-1/2| that are known in another way, (n, parts), such as along a run.
-        times: instants at which the tube is wanted, from 0 to the duration, (T,), s; by default 201.
+        speed: bound of joint speeds, for viscous friction that is not adapted, as `torque`, rad/s.
+        kappa: bounds of |c_i J_i K_r^-1/2| that are known otherwise, (n, parts), such as along a run.
+        times: instants at which it is wanted, from 0 to the duration, (T,), s; by default 201.
 
     Raises:
-        InputError: gains or numbers of another size or sign, viscous friction without a bound of speeds,
-            errors of parameters that are never learned, a desired velocity that jumps, or slides without
-            limits behind joints that turn.
+        InputError: gains or numbers of another size or sign, viscous friction without a bound of speeds, an
+            error that is never learned, a desired velocity that jumps, or slides without limits on an arm.
     """
-    instance("cell", cell, Cell, "a Cell")
-    instance("gains", gains, Gains, "Gains")
     controller, end = Controller(cell, gains), positive_number("duration", duration)
     acting = finite_array("torque", torque) + unmodelled_friction(cell, speed)
     D = torque_norm(cell, controller.K_r, acting, disturbances, end)
-    known, slow = _known(controller, read_instants(times, end), D, end), speed is not None
+    known = _known(controller, read_instants(times, end), D, end)
     if kappa is None:
-        return _tube(known, radii(known), slow)
+        return _tube(known, radii(known), speed is not None)
     given = finite_array("kappa", kappa, (cell.n, len(known.parts)))
-    return _tube(known, radii_with(known, given), slow, KAPPA_GIVEN)
+    return _tube(known, radii_with(known, given), speed is not None, KAPPA_GIVEN)
 
 
 def _known(controller: Controller, instants: np.ndarray, D: float, end: float) -> Known:
