@@ -134,9 +134,10 @@ def test_a_start_on_another_branch_is_seen() -> None:
     stay, known = Hold(tip_of(robot, q, space)), {"theta_hat0": robot.inertial_parameters}
     for start, excluded in ((q, True), (q + 2 * np.pi * np.eye(3)[2], True)):
         members = [Member(robot, stay, start, name=f"arm {i}", **known) for i in (1, 2)]
-        cell, times = Cell(members, Coupling.pair(), space), np.array([0.0, 1.0])
-        assert clearance(cell, times, np.full((2, 2, 1), 1e-6)).excluded is excluded
-        assert clearance(cell, times, np.full((2, 2, 1), 1e3)).excluded is False
+        cell = Cell(members, Coupling.pair(), space)
+        told = cell.reference_table(np.array([0.0, 1.0]))
+        assert clearance(cell, told, np.full((2, 2, 1), 1e-6)).excluded is excluded
+        assert clearance(cell, told, np.full((2, 2, 1), 1e3)).excluded is False
 
 
 def test_of_free_joints_and_damped_inverses_nothing_is_said() -> None:

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..coupling.cell import Cell
+from ..coupling.cell import Cell, Reference
 from ..robots.link_lengths import column_bounds
 from ..robots.model import subspace
 from ..robots.robot import Robot
@@ -28,6 +28,8 @@ from ..tasks.spaces import CartesianSpace, JointSpace
 
 #: lengths by which metres are compared with radians, as shares of an arm's reach
 SCALES = 0.1, 0.2, 0.4, 0.8
+#: instants at which joints are followed along a path that leaves room
+FOLLOWED = 1001
 #: |Jl^-1(phi) - 1| <= 0.6 |phi| up to half a turn
 LOG = 0.6
 #: axes are parallel, and positions the same, to this
@@ -48,22 +50,22 @@ class Clearance(NamedTuple):
     share: float
 
 
-def clearance(cell: Cell, times: np.ndarray, radius: np.ndarray) -> Clearance:
+def clearance(cell: Cell, told: Reference, radius: np.ndarray) -> Clearance:
     """Whether the tubes of all robots exclude singular configurations.
 
     Args:
         cell: the robots.
-        times: instants of the run, (T,), s.
+        told: what is desired at some instants.
         radius: bounds of the errors there part by part, (T, n, parts).
     """
     if type(cell.space) is JointSpace:
         return Clearance(True, "in joint space J is the identity", 0.0)
-    found = [_clearance(cell, i, times, radius[:, i]) for i in range(cell.n)]
+    found = [_clearance(cell, i, told, radius[:, i]) for i in range(cell.n)]
     worst = max(found, key=lambda one: (one.excluded is None, one.share))
     return worst
 
 
-def _clearance(cell: Cell, i: int, times: np.ndarray, radius: np.ndarray) -> Clearance:
+def _clearance(cell: Cell, i: int, told: Reference, radius: np.ndarray) -> Clearance:
     """The same for one robot."""
     robot, name, space = cell.robots[i], cell.names[i], cell.space
     if type(space) not in (CartesianSpace, PoseSpace):
@@ -75,8 +77,8 @@ def _clearance(cell: Cell, i: int, times: np.ndarray, radius: np.ndarray) -> Cle
         return Clearance(None, "a damped inverse is outside the theorem", np.inf)
     lengths = two_links(robot, space)
     if lengths is not None:
-        return _between(cell, i, times, radius[:, 0], lengths)
-    return _near(cell, i, times, radius)
+        return _between(cell, i, told.xd[:, i], radius[:, 0], lengths)
+    return _near(cell, i, told, radius)
 
 
 # -- two links -----------------------------------------------------------------------------------------------
@@ -100,11 +102,11 @@ def two_links(robot: Robot, space: Any) -> tuple[float, float] | None:
 
 
 def _between(
-    cell: Cell, i: int, times: np.ndarray, radius: np.ndarray, lengths: tuple[float, float]
+    cell: Cell, i: int, path: np.ndarray, radius: np.ndarray, lengths: tuple[float, float]
 ) -> Clearance:
     """Whether a tip stays between the circles on which two links are stretched or folded."""
     axis = cell.robots[i].model.jointPlacements[1].translation[cell.space.rows]  # type: ignore[attr-defined]
-    distance = np.linalg.norm(cell.motion(i, times).x - axis, axis=-1)
+    distance = np.linalg.norm(path - axis, axis=-1)
     inner, outer = abs(lengths[0] - lengths[1]), sum(lengths)
     room = np.minimum(distance - inner, outer - distance)
     k = int(np.argmin(room - radius))
@@ -118,24 +120,53 @@ def _between(
 # -- any arm -------------------------------------------------------------------------------------------------
 
 
-def _near(cell: Cell, i: int, times: np.ndarray, radius: np.ndarray) -> Clearance:
+class Along(NamedTuple):
+    """An arm along its desired path, where it is nearest to a singular configuration.
+
+    Attributes:
+        room, size: s^2 / (2 H) there and R, in units of the scale that is best.
+        time: of that instant, s.
+        jumps: whether joint positions from instant to instant may be on different branches.
+        elsewhere: whether the start is beyond the second root.
+    """
+
+    room: float
+    size: float
+    time: float
+    jumps: bool
+    elsewhere: bool
+
+
+def _near(cell: Cell, i: int, told: Reference, radius: np.ndarray) -> Clearance:
     """Whether joints stay so near those of the desired path that J keeps its inverse."""
-    robot, name = cell.robots[i], cell.names[i]
-    path = _followed(cell, i, times)
-    if path is None:
+    name, times = cell.names[i], told.t
+    found = _along(cell, i, times, told.xd[:, i], radius)
+    if found is not None and found.size < found.room:  # only then does it matter what is in between
+        times = np.union1d(times, np.linspace(times[0], times[-1], FOLLOWED))
+        between = np.array([np.interp(times, told.t, part) for part in radius.T]).T
+        found = _along(cell, i, times, cell.motion(i, times).x, between)
+    if found is None:
         return Clearance(None, f"no joint positions were found along the path of {name}", np.inf)
-    q, J = path
-    reach = column_bounds(robot).linear.max()
+    if found.size < found.room and (found.jumps or found.elsewhere):
+        words = "joint positions jump along the path" if found.jumps else "the start is on another branch"
+        return Clearance(None, f"{words} of {name}", np.inf)
+    words = f"{name} may be singular from errors of {found.room:.3g} on, at t = {found.time:.3g} s"
+    share = found.size / found.room if found.room > 0 else np.inf
+    return Clearance(share < 1, f"{words}, and its tube allows {found.size:.3g}", share)
+
+
+def _along(cell: Cell, i: int, times: np.ndarray, path: np.ndarray, radius: np.ndarray) -> Along | None:
+    """The same at some instants, in the unit of positions in which it has most room."""
+    robot, followed = cell.robots[i], _followed(cell, i, path)
+    if followed is None:
+        return None
+    (q, J), reach = followed, column_bounds(robot).linear.max()
     tried = [_room(robot, J, radius, scale * reach) for scale in SCALES]
     room, size, H, s = max(tried, key=lambda found: float((found[0] / found[1]).min()))
     k, away = int(np.argmin(room / size)), float(np.linalg.norm(cell.q0[i, : robot.nv] - q[0]))
-    share = float(size[k] / room[k]) if room[k] > 0 else np.inf
-    if share < 1 and (np.linalg.norm(np.diff(q, axis=0), axis=-1) * H >= s[1:]).any():
-        return Clearance(None, f"the joint positions found along the path of {name} jump", np.inf)
-    if share < 1 and away * H >= s[0] + np.sqrt(s[0] ** 2 - 2 * H * size[0]):
-        return Clearance(None, f"{name} starts on another branch than its path, {away:.3g} rad away", np.inf)
-    words = f"{name} may be singular from errors of {room[k]:.3g} on, at t = {times[k]:.3g} s"
-    return Clearance(share < 1, f"{words}, and its tube allows {size[k]:.3g}", share)
+    jumps = bool((np.linalg.norm(np.diff(q, axis=0), axis=-1) * H >= s[1:]).any())
+    beyond = away * H >= s[0] + float(np.sqrt(max(s[0] ** 2 - 2 * H * size[0], 0.0)))
+    return Along(float(room[k]), float(size[k]), float(times[k]), jumps, beyond)
 
 
 def bend(robot: Robot, scale: float, m: int) -> tuple[np.ndarray, float]:
@@ -166,11 +197,11 @@ def _room(
     return s**2 / (2 * H), np.linalg.norm(radius / units[::3], axis=-1), H, s
 
 
-def _followed(cell: Cell, i: int, times: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+def _followed(cell: Cell, i: int, path: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """Joint positions along the desired path, from the start on, (T, nv), and J there, (T, m, nv)."""
     robot, space = cell.robots[i], cell.space
     q, found = cell.q0[i, : robot.nv], []
-    for target in cell.motion(i, times).x:
+    for target in path:
         moved = find_anywhere(robot, target, q, space)  # type: ignore[arg-type]
         if moved is None:
             return None

@@ -59,6 +59,11 @@ class ErrorModes:
         g = np.exp(-a * t) - (b - l) * t * np.exp(-slow * t) * met  # (T, m, n)
         return np.einsum("ij,taj,kj,ka->tia", self.vectors, g, self.vectors, w)
 
+    def free_rates(self) -> np.ndarray:
+        """Bounds of |w'|_L2 / |w(0)| on every axis if r is 0, (m,), 1/s^1/2: norms of p G_j - 1."""
+        a, b, l = self.Lambda[:, None], self.rates, self.leak[:, None]
+        return np.asarray(np.sqrt(((a + b - l) ** 2 + a * b) / (2 * (a + b))).max(-1))
+
     def spread(self, axis: int) -> np.ndarray:
         """h^2, (n, n), s: |w_i| on an axis is at most sum_k h_ik |r_k|_L2, beside the free motion."""
         a, l, b = self.Lambda[axis], self.leak[axis], np.maximum(self.rates[axis], NEAR_ZERO)

@@ -27,7 +27,7 @@ from ..tasks.pose import MAX_ANGLE
 from ..tasks.spaces import JointSpace
 from .clearance import clearance
 from .jacobian_size import sizes_of
-from .torque_bound import torque_norm, unmodelled_friction
+from .torque_bound import Outside, largest_norm, outside
 from .tube_radius import Known, Radii, radii, radii_with
 from .tube_start import check_velocities, read_instants, start
 
@@ -138,7 +138,8 @@ def tube(
             a number, (nv,) or (n, nv), N·m.
         duration: how long, s.
         disturbances: torques from outside that are known.
-        speed: bound of joint speeds, for viscous friction that is not adapted, as `torque`, rad/s.
+        speed: bound of joint speeds, where there is viscous friction that is not adapted, as `torque`, rad/s;
+            not needed in joint space with constant diagonal weights.
         kappa: bounds of |c_i J_i K_r^-1/2| that are known otherwise, (n, parts), such as along a run.
         times: instants at which it is wanted, from 0 to the duration, (T,), s; by default 201.
 
@@ -147,27 +148,27 @@ def tube(
             error that is never learned, a desired velocity that jumps, or slides without limits on an arm.
     """
     controller, end = Controller(cell, gains), positive_number("duration", duration)
-    acting = finite_array("torque", torque) + unmodelled_friction(cell, speed)
-    D = torque_norm(cell, controller.K_r, acting, disturbances, end)
-    known = _known(controller, read_instants(times, end), D, end)
+    acting = outside(cell, torque, disturbances, speed)
+    known = _known(controller, read_instants(times, end), acting, end)
     if kappa is None:
         return _tube(known, radii(known), speed is not None)
     given = finite_array("kappa", kappa, (cell.n, len(known.parts)))
     return _tube(known, radii_with(known, given), speed is not None, KAPPA_GIVEN)
 
 
-def _known(controller: Controller, instants: np.ndarray, D: float, end: float) -> Known:
+def _known(controller: Controller, instants: np.ndarray, acting: Outside, end: float) -> Known:
     """What is known of a cell before a run that ends at a time, s."""
     cell = controller.cell
     check_velocities(cell, end)
     energy, w = start(controller, cell.references(np.array([0.0]))[0])
+    D = largest_norm(controller, acting, sum(energy.values()), w, end)
     return Known(controller, instants, cell.reference_table(instants), w, energy, D)
 
 
 def _tube(known: Known, found: Radii, slow: bool, *given: str) -> Tube:
     """A tube of what was found, with what has to be true because of what was given."""
     cell = known.controller.cell
-    clear = clearance(cell, known.instants, found.radius)
+    clear = clearance(cell, known.told, found.radius)
     return Tube(
         cell=cell.name,
         names=cell.names,

@@ -75,12 +75,12 @@ def read_instants(times: ArrayLike | None, end: float) -> np.ndarray:
     """Instants of a tube, (T,), s, by default `INSTANTS` of them from 0 to the end.
 
     Raises:
-        InputError: none, or some that are outside.
+        InputError: none, not in order, or some that are outside.
     """
     if times is None:
         return np.linspace(0.0, end, INSTANTS)
     found = finite_array("times", times, (None,))
-    if not found.size or found.min() < 0 or found.max() > end * (1 + 1e-9):
-        shown = f"{found.min():g} to {found.max():g} s" if found.size else "none"
-        raise InputError.expected(f"instants from 0 to {end:g} s", found, "times", shown=shown)
+    if not found.size or found[0] < 0 or found[-1] > end * (1 + 1e-9) or (np.diff(found) < 0).any():
+        shown = f"{found[0]:g} to {found[-1]:g} s" if found.size else "none"
+        raise InputError.expected(f"ascending instants from 0 to {end:g} s", found, "times", shown=shown)
     return found
