@@ -8,6 +8,7 @@ from .dissipation import Dissipation, dissipation
 from .modal import ModalBounds, modal_bounds
 from .period_margin import period_margin
 from .resolution import resolution_error
+from .tube import Tube, tube
 
 __all__ = [
     "Certificate",
@@ -16,6 +17,7 @@ __all__ = [
     "DelayMargin",
     "Dissipation",
     "ModalBounds",
+    "Tube",
     "certify",
     "compare",
     "delay_map",
@@ -25,4 +27,5 @@ __all__ = [
     "period_margin",
     "resolution_error",
     "side_by_side",
+    "tube",
 ]
