@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -31,6 +32,15 @@ def drift(
         missed[first : last + 1] = missed[first] + missing
         bound += sum(_halving(t, rate[rows]) for rate in rates)
     return missed, bound
+
+
+def jumped(run: Replay, V: np.ndarray) -> float:
+    """What V gained between the smooth parts of a run, at jumps of the desired velocity or of the state.
+
+    Of a jump that falls between two logged instants it has what V did from one to the other.
+    """
+    parts = [rows for _, _, rows in run.pieces]
+    return float(sum(V[b.start] - V[a.stop - 1] for a, b in pairwise(parts)))
 
 
 def supplied(run: Replay, rate: np.ndarray) -> float:

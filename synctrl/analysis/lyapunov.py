@@ -33,7 +33,7 @@ from ..renamed import names_elsewhere
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .balance import drift, supplied
+from .balance import drift, jumped, supplied
 from .replay import Replay, replay
 
 #: energies of the paper's law; those of another law stand in place of the last two
@@ -47,6 +47,10 @@ GIVING = ("admittance",)
 #: the powers of the paper's law; those of the adaptation come beside them
 POWERS = THEOREM + OUTSIDE
 EPS = float(np.finfo(float).eps)
+#: share of the range of V that the numerical error of its balance may have
+RESOLVED = 1e-3
+#: share of V itself that is rounding
+ROUNDED = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +72,8 @@ class Lyapunov:
         supplied: integral of every power over the run, by name; together the change of V.
         inside: names of the powers that the theorem knows.
         events: instants between which and the next one V jumps, because plant or network move the state.
+        jumped: what V gained at jumps, of the state or of the desired velocity, in all: V(T) - V(0) is the
+            sum of `supplied`, of this, and of the drift at the end.
     """
 
     t: np.ndarray
@@ -79,6 +85,7 @@ class Lyapunov:
     supplied: Mapping[str, float]
     inside: tuple[str, ...] = THEOREM
     events: tuple[int, ...] = ()
+    jumped: float = 0.0
 
     @property
     def V(self) -> np.ndarray:  # noqa: N802
@@ -99,6 +106,12 @@ class Lyapunov:
     def closes(self) -> bool:
         """Whether the balance of V closes: all power that enters or leaves V has been accounted for."""
         return self.largest_drift <= self.drift_bound
+
+    @property
+    def resolved(self) -> bool:
+        """Whether numerical errors are small beside what V did, so that `closes` says something."""
+        V = self.V
+        return self.drift_bound <= max(RESOLVED * float(np.ptp(V)), ROUNDED * float(V.max()))
 
 
 @dataclass(frozen=True)
@@ -150,6 +163,7 @@ def lyapunov(result: Result | Replay, experiment: Experiment | None = None) -> L
         {name: supplied(run, term) for name, term in power.items()},
         _inside(run, proof),
         run.events,
+        jumped(run, V),
     )
 
 
@@ -227,7 +241,9 @@ def _power(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
     """Terms of V', one value per row; "other" is what the chain rule has beyond those with a name."""
     x, controller = run.rows, run.loop.controller
     K_r, s, moved = controller.K_r, np.matvec(x.c_inv, x.r), np.matvec(x.J, x.s_q)
-    damping = x.s_q * K_r * x.s_q if controller.k_r_space == "joint" else moved * K_r * s
+    in_task = controller.k_r_space == "task"
+    damping = moved * K_r * moved if in_task else x.s_q * K_r * x.s_q
+    unfollowed = x.force - K_r * moved if in_task else x.force  # what acts on s where J s_q is meant
     terms = {
         "damping": -damping,
         **proof.powers,
@@ -236,7 +252,7 @@ def _power(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
         "disturbance": -x.s_q * x.disturbance,
         "saturation": x.s_q * x.cut_off,
         "weight rate": x.s_q * np.matvec(x.M, _reference_gap(run)),
-        "damped inverse": (s - moved) * x.force,
+        "damped inverse": (s - moved) * unfollowed,
     }
     power = {name: _sum(term) for name, term in terms.items()}
     power |= dict(zip((*run.learning, *run.chained), (*x.learning.T, *x.chained.T), strict=True))

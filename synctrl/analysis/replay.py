@@ -51,6 +51,7 @@ class Moment(NamedTuple):
         c, c_dot, c_inv: (n, m, m).
         slips: what the network told of r, see `Received`, (2, n, m); nothing where nobody asks.
         J, J_inv: (n, m, nv) and (n, nv, m); identities in joint space.
+        inverse_damping: lambda of a damped inverse near singular configurations, (n,); 0 without one.
         M: mass matrices, (n, nv, nv).
         C_s: C(q, v) s_q, (n, nv).
         Y_size: |Y| (|theta| + |theta_hat|), the magnitude of the model's torque, (n, nv).
@@ -89,6 +90,7 @@ class Moment(NamedTuple):
     slips: np.ndarray
     J: np.ndarray
     J_inv: np.ndarray
+    inverse_damping: np.ndarray
     M: np.ndarray
     C_s: np.ndarray
     Y_size: np.ndarray
@@ -202,7 +204,7 @@ def _row(
         np.array([*adaptation.powers(z, theta, s.seen).values()]), *_chain(loop, y, y_dot, s),
         s.epsilon, s.epsilon_dot, s.E, s.sigma, s.sigma_dot, s.e_star, s.u, s.r, s.force, s.reference.c,
         s.reference.c_dot, s.reference.c_inv, np.array([] if s.errors.slips is None else s.errors.slips),
-        J, J_inv, M, C_s,
+        J, J_inv, s.task.inverse_damping, M, C_s,
         np.matvec(np.abs(s.Y), np.abs(s.theta_hat) + np.abs(theta)),
     )  # fmt: skip
 
