@@ -48,10 +48,18 @@ def broken(run: Replay, record: Lyapunov, condition: GainCondition, heard: Delay
     acting = {name: _in_words(run, record, name) for name in _acting(run, record, heard)}
     bounded = [*_held(run), *_devices(run), *_told(run, heard)]
     bounded += [words for name, words in acting.items() if name not in UNBOUNDED]
-    unbounded = [*_ended(run), *_events(run), *_desired_jumps(run), *_law(run), *_damped(run)]
-    unbounded += [words for name, words in acting.items() if name == "law"]
-    unbounded += [*_gains(run, condition), *_undamped(run), *getattr(run.loop.chain, "outside", ())]
-    return Broken(tuple(bounded), tuple(unbounded))
+    beyond = [words for name, words in acting.items() if name == "law"]
+    return Broken(tuple(bounded), (*unbounded(run, condition), *beyond))
+
+
+def unbounded(run: Replay, condition: GainCondition) -> tuple[str, ...]:
+    """Why Theorem A says nothing of a run; empty if it does.
+
+    Args:
+        run, condition: as of `broken`.
+    """
+    found = [*_ended(run), *_events(run), *_desired_jumps(run), *_law(run), *_damped(run)]
+    return (*found, *_gains(run, condition), *_undamped(run), *getattr(run.loop.chain, "outside", ()))
 
 
 def covers(heard: DelayCondition | None, term: str) -> bool:

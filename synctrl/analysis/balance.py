@@ -49,6 +49,21 @@ def supplied(run: Replay, rate: np.ndarray) -> float:
     return sum(float(_integral(t[first : last + 1], rate[rows])[-1]) for first, last, rows in run.pieces)
 
 
+def accumulated(run: Replay, rates: np.ndarray) -> np.ndarray:
+    """Integrals of rates, (R, ...), from the first instant to each, (T, ...).
+
+    Where nothing jumps they are those of `supplied`. An interval of the log in which something does, and one
+    that is a piece of its own, get the mean of their two ends.
+    """
+    t, start = run.result.t, run.logged[:-1]
+    steps = np.diff(t).reshape(-1, *[1] * (rates.ndim - 1))
+    gained = 0.5 * steps * (rates[start] + rates[start + 1])
+    for first, last, rows in run.pieces:
+        if last > first + 1:
+            gained[first:last] = np.diff(_integral(t[first : last + 1], rates[rows]), axis=0)
+    return np.concatenate((np.zeros_like(rates[:1]), np.cumsum(gained, axis=0)))
+
+
 def _integral(t: np.ndarray, rate: np.ndarray) -> np.ndarray:
     """Integral of a smooth rate from the first instant to each."""
     from scipy.interpolate import make_interp_spline

@@ -15,6 +15,7 @@ from .assumptions import broken, covers, proven
 from .consistency import Consistency, physical_consistency
 from .convergence import Convergence, convergence
 from .delay_condition import DelayCondition, delay_condition
+from .dissipation import Dissipation, balanced
 from .gain_condition import GainCondition, gain_condition
 from .lyapunov import RESOLVED, Growth, Lyapunov, first_growth, lyapunov
 from .metrics import finite_or_none
@@ -55,6 +56,7 @@ class Certificate:
         theorem: of robots that hold one object together, which theorem covers the run, in words; else None.
         delay_condition: of robots that hear each other late, which theorem covers the run, with its margin;
             else None.
+        dissipation: what unmodelled torque did, beside the most that it can do by Theorem A.
         every: steps of the run per logged instant. With more than one the log is thinned: what V did between
             two instants, and whether its balance closes, cannot be seen.
     """
@@ -73,6 +75,7 @@ class Certificate:
     theorem: str | None = None
     delay_condition: DelayCondition | None = None
     unbounded: tuple[str, ...] = ()
+    dissipation: Dissipation | None = None
 
     @property
     def certified(self) -> bool:
@@ -110,6 +113,7 @@ class Certificate:
                 "bound": record.drift_bound,
                 "jumped": record.jumped,
             },
+            "dissipation": None if self.dissipation is None else self.dissipation.as_dict(),
             "steps_per_instant": self.every,
             "gain_condition": {**condition, "holds": self.gain_condition.holds},
             "convergence": asdict(self.convergence),
@@ -133,6 +137,7 @@ class Certificate:
             f"  by term: {supplied or 'no change'}",
             f"  V' is at most {record.V_dot.max():.3g} (rounding {record.rounding.max():.1g})",
             f"  balance: {_balance(self)}",
+            *([] if self.dissipation is None else [f"  {line}" for line in self.dissipation.lines]),
             f"  gain condition: {_state(self.gain_condition)}",
             *([] if self.delay_condition is None else [f"  network: {self.delay_condition}"]),
             f"  at the end: {final}",
@@ -171,7 +176,7 @@ def certify(result: Result, experiment: Experiment | None = None) -> Certificate
         str(run.result.info["title"]), verdict, found.bounded + found.unbounded, doubts, growth, record,
         condition, errors, _every(run.result), _consistency(run),
         getattr(run.loop.controller.law, "statement", None), getattr(run.loop.chain, "theorem", None), heard,
-        found.unbounded,
+        found.unbounded, balanced(run, found.unbounded),
     )  # fmt: skip
 
 

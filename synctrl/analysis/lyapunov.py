@@ -146,7 +146,7 @@ def lyapunov(result: Result | Replay, experiment: Experiment | None = None) -> L
         InputError: no experiment, or another than the one that made the result.
     """
     run = replay(result, experiment)
-    proof = _proof(run)
+    proof = proof_along(run)
     x, power = run.rows, _power(run, proof)
     energy = {"kinetic": 0.5 * _sum(x.s_q * np.matvec(x.M, x.s_q)), "parameter": x.storage}
     energy |= {name: _sum(term) for name, term in proof.energies.items()}
@@ -161,7 +161,7 @@ def lyapunov(result: Result | Replay, experiment: Experiment | None = None) -> L
         missed,
         bound + operations(run.loop) * EPS * float(np.max(V)),
         {name: supplied(run, term) for name, term in power.items()},
-        _inside(run, proof),
+        inside_of(run, proof),
         run.events,
         jumped(run, V),
     )
@@ -208,7 +208,7 @@ def operations(loop: ClosedLoop) -> int:
 # -- terms ------------------------------------------------------------------------------------------------
 
 
-def _proof(run: Replay) -> Proof:
+def proof_along(run: Replay) -> Proof:
     """The law's part in V and V'; nothing of a law that has no proof."""
     x, law = run.rows, cast(Any, run.loop.controller.law)
     along = Along(x.epsilon, x.epsilon_dot, x.E, x.sigma, x.sigma_dot, x.e_star, x.r, x.c, x.slips)
@@ -218,7 +218,7 @@ def _proof(run: Replay) -> Proof:
     return proof._replace(rates=law.proof(moves).rates)
 
 
-def _inside(run: Replay, proof: Proof) -> tuple[str, ...]:
+def inside_of(run: Replay, proof: Proof) -> tuple[str, ...]:
     """Names of the powers that the theorem knows: diffusive coupling only where all is heard at once."""
     ideal = _is_ideal(run.loop.controller.network)
     known = (name for name in proof.powers if ideal or name != DIFFUSION)
@@ -233,7 +233,7 @@ def _rates(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
 def _summands(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
     """The same but for the adaptation's, before they are added up over robots and axes."""
     x = run.rows
-    s_q_dot = x.a_ref + x.gap + _reference_gap(run) - x.v_dot
+    s_q_dot = x.a_ref + x.gap + reference_gap(run) - x.v_dot
     return x.s_q * (np.matvec(x.M, s_q_dot) + x.C_s), *proof.rates.values()
 
 
@@ -251,7 +251,7 @@ def _power(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
         "friction": x.s_q * x.friction,
         "disturbance": -x.s_q * x.disturbance,
         "saturation": x.s_q * x.cut_off,
-        "weight rate": x.s_q * np.matvec(x.M, _reference_gap(run)),
+        "weight rate": x.s_q * np.matvec(x.M, reference_gap(run)),
         "damped inverse": (s - moved) * unfollowed,
     }
     power = {name: _sum(term) for name, term in terms.items()}
@@ -266,7 +266,7 @@ def _power(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
     return power
 
 
-def _reference_gap(run: Replay) -> np.ndarray:
+def reference_gap(run: Replay) -> np.ndarray:
     """v_ref' - a_ref, (R, n, nv): 0 when exact, J^-1 d(c^-1)/dt r with the paper's reference acceleration."""
     x = run.rows
     if run.loop.controller.reference_acceleration == "exact":
