@@ -1,4 +1,4 @@
-"""Every statement of docs/theory.md names a test, and every test that it names exists."""
+"""Every statement of docs/theory.md names a test, and every test that a document names exists."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 TESTS = Path(__file__).parent
-PAGE = (TESTS.parent / "docs" / "theory.md").read_text("utf-8")
+PAGES = {path.name: path.read_text("utf-8") for path in sorted((TESTS.parent / "docs").glob("*.md"))}
+PAGE = PAGES["theory.md"]
 #: sections without statements of their own
 PLAIN = {"", "Where the equations are", "References"}
 #: where a statement begins, beside headings and paragraphs that begin with bold words: items of a list
@@ -24,7 +25,7 @@ def statements() -> dict[str, str]:
         bare = block.startswith("#") and len(block.strip().splitlines()) == 1
         assumed = section == "The theorem" and re.match(r"\d|#", block)  # each has a row in the table
         if section not in PLAIN and not bare and not assumed and not block.startswith("# "):
-            found[" ".join(block.split()[:6])] = block
+            found[f"{section}: {' '.join(block.split()[:5])}"] = block
     return found
 
 
@@ -63,9 +64,11 @@ def test_every_assumption_of_the_theorem_has_a_row_that_says_where_it_is_checked
     assert all(named(where) for *_, where in rows)
 
 
-def test_every_test_that_the_page_names_exists() -> None:
-    assert not [(file, name) for file, name in named(PAGE) if name and not exists(file, name)]
-    assert all((TESTS / file).exists() for file, _ in named(PAGE))
+@pytest.mark.parametrize("page", PAGES)
+def test_every_test_that_a_page_names_exists(page: str) -> None:
+    tests = named(PAGES[page])
+    assert not [(file, name) for file, name in tests if name and not exists(file, name)]
+    assert all((TESTS / file).exists() for file, _ in tests)
 
 
 def test_the_checks_find_what_is_missing() -> None:
