@@ -21,7 +21,7 @@ from ..errors import InputError
 from ..experiments.a460_pair import a460_pair
 from ..experiments.planar_four import planar_four
 from ..simulation.simulate import Experiment
-from .claims import Claim, Finding
+from .claims import OURS_OF_THE_PAPER, Claim, Finding
 from .law_sections import comparison_section, rows_table
 from .report import Points, Section, Text
 from .reproduction import fastest_engine
@@ -108,7 +108,7 @@ def another_law_does_better(comparison: Comparison, law: str) -> Claim:
     return Claim(
         f"At equal quiet peak torque, {law} has smaller tracking and synchronization errors under the "
         "disturbance than the paper's law.",
-        "ours, not the paper's",
+        OURS_OF_THE_PAPER,
         _better(row, ours),
         _figures(row, ours, comparison.units),
         f"{comparison.title}, {comparison.duration:g} s, {gain_text(row)}. Asked: RMS of e and of ε both "

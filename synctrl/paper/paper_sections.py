@@ -15,7 +15,7 @@ from ..show.plots import common_limits, joint_trajectories, sync_errors, trackin
 from ..show.style import display
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .claims import Claim
+from .claims import Claim, tally
 from .claims import kind as kind_of
 from .claims_of_cells import a460_claims, planar_four_claims
 from .report import (
@@ -61,8 +61,7 @@ LAW = (
 def introduction(claims: Sequence[Claim]) -> Section:
     """What this page is, the law, and how many of the claims hold."""
     failed = [claim.text for claim in claims if not claim.holds]
-    held = f"{len(claims) - len(failed)} of {len(claims)} claims that are checked below hold."
-    verdict = " ".join([held, *(f"Does not hold: “{text}”" for text in failed)])
+    verdict = " ".join([tally(claims), *(f"Does not hold: “{text}”" for text in failed)])
     words = (_ABOUT, Formulas(LAW), _SYMBOLS, _COMPUTED, Text(verdict))
     return Section("What is shown here", words)
 
