@@ -25,7 +25,7 @@ from synctrl.paper.carry_task import CARRY
 from synctrl.paper.claims import Claim, tally
 from synctrl.paper.claims_of_cells import a460_claims, own_findings, planar_four_claims
 from synctrl.paper.edge_task import EDGE
-from synctrl.paper.fairness import another_law_does_better, fair_section
+from synctrl.paper.fairness import another_law_does_better, fair_section, what_parts_do
 from synctrl.paper.judge import judge_section
 from synctrl.paper.margin_section import margin_section
 from synctrl.paper.network_section import NETWORK
@@ -120,7 +120,7 @@ def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun], limit:
         *sections,
         *tasks,
         margin_section(out),
-        honesty_section(own),
+        honesty_section(own, what_parts_do(compared["planar_four"][1])),
         bodies_section(bodies, BODIES, out / "figures" / "bodies"),
         identification_section(learned),
         *(fair_section(*pair, out / "figures" / f"fair_{name}") for name, pair in compared.items()),

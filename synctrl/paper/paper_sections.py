@@ -169,16 +169,21 @@ _DISTURBANCE = Text(
 )
 
 
-def honesty_section(findings: Sequence[Claim]) -> Section:
-    """What the paper leaves unsaid."""
-    return Section("Said honestly", (_UNSAID, Verdicts(tuple(findings))))
+def honesty_section(findings: Sequence[Claim], parts: str) -> Section:
+    """What the paper leaves unsaid.
+
+    Args:
+        findings: ours, with their verdicts.
+        parts: what each part of the law does, in words made from the numbers.
+    """
+    return Section("Said honestly", (_UNSAID, Text(parts), Verdicts(tuple(findings))))
 
 
 _UNSAID = Text(
-    "Without synchronization the paper sets β = K_ε = 0 and leaves all other gains as they are. That takes "
-    "gain away, so part of what synchronization seems to achieve is achieved by more gain. Of the gains that "
-    "synchronization adds, β does the work. Checked as well: whether estimates stay those of bodies, and "
-    "whether a law of others does better under the push."
+    "Without synchronization the paper sets β = K_ε = 0 and leaves all other gains as they are, which takes "
+    "gain away. So it is asked what each part does, and what as much gain does without synchronization. "
+    "Checked as well: whether estimates stay those of bodies, and whether a law of others does better under "
+    "the push."
 )
 
 
