@@ -20,6 +20,7 @@ from synctrl.analysis.consistency import Consistency
 from synctrl.analysis.convergence import Identification, identify
 from synctrl.analysis.metrics import as_data, metrics, settling_bands, write_metrics
 from synctrl.errors import SynctrlError
+from synctrl.experiments.a460_pair import DURATION
 from synctrl.paper.bodies import bodies_are_left, bodies_of, bodies_section
 from synctrl.paper.carry_task import CARRY
 from synctrl.paper.claims import Claim, tally
@@ -47,6 +48,7 @@ from synctrl.paper.report import Links, Section, write_page
 from synctrl.paper.reproduction import PLANNED, PlannedRun, judge_runs, judged, run_all
 from synctrl.paper.tasks import planned_runs, runs_of, task_section
 from synctrl.paper.theory import certificate_section, examine
+from synctrl.paper.value_grid import grid_section, judge_grid
 from synctrl.show.animation import payload_pair_scene, planar_scene
 from synctrl.show.style import display
 from synctrl.simulation.result import Result
@@ -111,6 +113,8 @@ def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun], limit:
     with ThreadPoolExecutor(1) as background:
         examined = background.submit(examine, out / "runs", out / "figures", workers, limit=limit)
         sections, bodies, learned = drawn(runs, out), bodies_of(runs), identified(runs)
+        tried = min(DURATION, limit)
+        grid = judge_grid(tried)
         certificates, compared = examined.result()
     claims, own = papers_claims(runs), our_findings(runs, bodies[BODIES], compared["planar_four"][0])
     found, tasks = of_tasks(every, out)
@@ -121,6 +125,7 @@ def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun], limit:
         *tasks,
         margin_section(out),
         honesty_section(own, what_parts_do(compared["planar_four"][1])),
+        grid_section(grid, tried),
         bodies_section(bodies, BODIES, out / "figures" / "bodies"),
         identification_section(learned),
         *(fair_section(*pair, out / "figures" / f"fair_{name}") for name, pair in compared.items()),
@@ -162,10 +167,10 @@ def our_findings(runs: Mapping[str, Result], bodies: Consistency, laws: Comparis
 def drawn(runs: Mapping[str, Result], out: Path) -> list[Section]:
     """The sections of the experiments."""
     a460, planar = select(runs, "a460_pair_"), select(runs, "planar_four_")
-    layout, figures = PLANNED["planar_four_synchronized"].make(), out / "figures"
+    (pair, four), figures = (PLANNED[f"{cell}_synchronized"].make() for cell in SCENES), out / "figures"
     return [
-        a460_section(a460, figures, animations(runs, out, "a460_pair")),
-        planar_section(planar, layout, figures, animations(runs, out, "planar_four")),
+        a460_section(a460, pair, figures, animations(runs, out, "a460_pair")),
+        planar_section(planar, four, figures, animations(runs, out, "planar_four")),
         full_a460_section(a460, figures),
         friction_section(a460, figures),
     ]

@@ -82,8 +82,7 @@ def _held(found: Collection[Claim]) -> str:
 
 def sync_error_is_much_smaller(synchronized: Result, independent: Result, source: str) -> Claim:
     """Peak and RMS of every synchronization error fall by at least `MUCH` through synchronization."""
-    ours, theirs = metrics(synchronized).sync_error, metrics(independent).sync_error
-    peak, rms = theirs.peak / ours.peak, theirs.rms / ours.rms
+    peak, rms = factors_of_sync_errors(synchronized, independent)
     figures = [
         Finding(f"{name} of {error_name(synchronized, *at)}, independent / synchronized", value)
         for name, ratios in (("peak", peak), ("RMS", rms))
@@ -97,6 +96,12 @@ def sync_error_is_much_smaller(synchronized: Result, independent: Result, source
         f"Asked: peak and RMS of each synchronization error smaller by a factor of at least {MUCH:g}. Shown "
         "are the smallest and the largest factor.",
     )
+
+
+def factors_of_sync_errors(synchronized: Result, independent: Result) -> tuple[np.ndarray, np.ndarray]:
+    """Factors by which peak and RMS of each synchronization error are smaller, each (pairs, m)."""
+    ours, theirs = metrics(synchronized).sync_error, metrics(independent).sync_error
+    return theirs.peak / ours.peak, theirs.rms / ours.rms
 
 
 def errors_converge(run: Result, source: str) -> Claim:

@@ -15,8 +15,7 @@ from .offsets import offsets_are_due_to_friction_and_gravity
 
 def arms_reach_their_targets(run: Result) -> Claim:
     """Every joint ends within `claims.REACHED` of the way it travels."""
-    way = np.abs(run.x_desired[-1] - run.x_desired[0])
-    share = np.abs(run.tracking_error[-1]) / way
+    share = share_of_way(run)
     row, joint = claims.worst(share)
     return Claim(
         f"Both arms reach their targets with small residual offsets ({claims.kind(run)} control).",
@@ -29,6 +28,12 @@ def arms_reach_their_targets(run: Result) -> Claim:
         f"Asked: on every joint at most {claims.REACHED:.0%} of the desired way left after {run.t[-1]:g} s. "
         f"Largest share: {run.names[row]}, {run.info['axes'][joint]}.",
     )
+
+
+def share_of_way(run: Result) -> np.ndarray:
+    """What is left at the end of the way that each joint is to travel, (n, m)."""
+    share: np.ndarray = np.abs(run.tracking_error[-1] / (run.x_desired[-1] - run.x_desired[0]))
+    return share
 
 
 def a460_claims(runs: Mapping[str, Result]) -> list[Claim]:

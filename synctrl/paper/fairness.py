@@ -169,8 +169,8 @@ def what_parts_do(parts: Comparison) -> str:
     gains = [f"{name.partition(',')[0]} {_share(sizes[name], ours)}" for name in STIFFER if name in sizes]
     return (
         f"Of what ε is with none of the law's parts ({parts.title}, {parts.duration:g} s), each part alone "
-        f"leaves, RMS and peak: {each}. Most is done by {most}. An independent controller leaves, of what the whole law "
-        f"does: {'; '.join(gains)}."
+        f"leaves, RMS and peak: {each}. Most is done by {most}. An independent controller has, of what the "
+        f"whole law leaves: {'; '.join(gains)}."
     )
 
 

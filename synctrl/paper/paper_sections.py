@@ -18,6 +18,7 @@ from ..simulation.simulate import Experiment
 from .claims import Claim, tally
 from .claims import kind as kind_of
 from .claims_of_cells import a460_claims, planar_four_claims
+from .offsets import offsets_picture
 from .report import (
     Block,
     Formulas,
@@ -31,6 +32,7 @@ from .report import (
     as_picture,
     number,
 )
+from .wrists import about_wrists
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -92,11 +94,14 @@ def trial_section(duration: float) -> Section:
     return Section("A trial", (Text(words, "note"),))
 
 
-def a460_section(runs: Mapping[str, Result], folder: Path, animations: Links) -> Section:
+def a460_section(
+    runs: Mapping[str, Result], experiment: Experiment, folder: Path, animations: Links
+) -> Section:
     """Section V-A with figures 2 to 7.
 
     Args:
-        runs: `synchronized`, `independent` and `frictionless`.
+        runs: `synchronized`, `independent`, `frictionless`, and those of `offsets_picture`.
+        experiment: the synchronized cell, for its wrists.
         folder: where figures go.
         animations: links to those of this cell.
     """
@@ -107,9 +112,9 @@ def a460_section(runs: Mapping[str, Result], folder: Path, animations: Links) ->
         "Joint angles of robot 2": lambda run: joint_trajectories(run, 1),
         "Synchronization errors of the joints": lambda run: sync_errors(run, limits),
     }
-    blocks: list[Block] = [_A460, _SYNTHETIC, animations]
+    blocks: list[Block] = [_A460, _SYNTHETIC, Text(about_wrists(pair, experiment.cell)), animations]
     blocks += [*_compared(folder, 2, pair, drawings), *metrics_tables(*pair.values())]
-    blocks.append(Verdicts(tuple(a460_claims(runs))))
+    blocks += [Verdicts(tuple(a460_claims(runs))), offsets_picture(runs, folder / "offsets")]
     return Section("Two CRS A460 robots (section V-A)", tuple(blocks))
 
 
