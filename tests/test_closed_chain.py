@@ -15,7 +15,7 @@ from refusals import refused
 
 from synctrl.analysis import certify
 from synctrl.analysis.lyapunov import lyapunov
-from synctrl.analysis.replay import _state
+from synctrl.analysis.replay import state_at
 from synctrl.assembly.body import with_share
 from synctrl.assembly.grasp import Fixture, grasp_matrix
 from synctrl.assembly.theorems import THEOREMS, shares
@@ -80,7 +80,7 @@ def test_of_the_independent_controller_fixtures_lose_what_the_theorem_says():
     result = made.simulate(0.03, dt=1e-3)
     loop, record = made.closed_loop(), lyapunov(result)
     for k in (10, 20, 30):
-        y = loop.state(_state(result, k))
+        y = loop.state(state_at(result, k))
         signals = loop.look(loop.cell.references(result.t[k : k + 1])[0], y)
         d, d_dot = loop.chain.energies._deflections(y, signals)
         G = grasp_matrix(loop.plant._levers(y.hidden))
@@ -92,7 +92,7 @@ def test_of_the_independent_controller_fixtures_lose_what_the_theorem_says():
 def with_changed(made: Experiment, memory: np.ndarray, gave: np.ndarray) -> tuple:
     """Power of the fixtures after 30 ms, with other integrals and arms that gave way; and of what it is."""
     loop, result = made.closed_loop(), made.simulate(0.03, dt=1e-3)
-    y = loop.state(_state(result, -1))
+    y = loop.state(state_at(result, -1))
     y.memory[...], y.z[:, -12:] = memory, gave
     signals = loop.look(loop.cell.references(result.t[-1:])[0], y)
     terms = loop.chain.energies.terms(y, np.zeros_like(y.q), signals)

@@ -1,8 +1,8 @@
 """Sampled control, gone through again with the torque that acted between samples.
 
 A replay has what the law would ask for in the true state at every instant. A digital controller asks for it
-at samples only, of a motion that is measured, and torque, and rates of the estimates and of the integrals, are
-held until the next sample. So every interval of the log becomes a piece of its own here, with two ends at
+at samples only, of a motion that is measured; torque, and the rates of estimates and of integrals, are held
+until the next sample. So every interval of the log becomes a piece of its own here, with two ends at
 which the plant is asked how it moves under the torque that acted.
 """
 
