@@ -44,6 +44,7 @@ from synctrl.paper.plant_sections import (
     identification_section,
     step_section,
 )
+from synctrl.paper.promises_section import promises_section
 from synctrl.paper.report import Links, Section, write_page
 from synctrl.paper.reproduction import PLANNED, PlannedRun, judge_runs, judged, run_all
 from synctrl.paper.tasks import planned_runs, runs_of, task_section
@@ -129,6 +130,7 @@ def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun], limit:
         bodies_section(bodies, BODIES, out / "figures" / "bodies"),
         identification_section(learned),
         *(fair_section(*pair, out / "figures" / f"fair_{name}") for name, pair in compared.items()),
+        promises_section(certificates),
         certificate_section(certificates, out / "figures"),
         judge_section(judged(every), out / "figures"),
         step_section(runs),

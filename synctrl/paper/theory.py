@@ -93,13 +93,15 @@ def draw_certificate(name: str, certificate: Certificate, folder: Path) -> Path:
 
 _INTRODUCTION = (
     "The function of the convergence proof, computed along every run, and its derivative by the chain rule "
-    "with the accelerations of the plant. A run is certified if every assumption of the theorem holds along "
-    "it, V' ≤ 0 to rounding at every logged instant, and V changes by no more and no less than the integral "
-    "of V'. Friction and disturbances are outside the theorem; their power has a name, and the balance "
-    "closes with it as well. Friction among the adapted parameters is inside. The arms with six joints are "
-    "left out: with the step of these runs friction of a joint at rest is at the limit of what the method "
-    "follows, and their balance does not close. With half the step it does; their certificate then names the "
-    "friction, and the forces of wrists that the model takes for locked."
+    "with the accelerations of the plant. A run is covered by the theorem if nothing outside it acted, "
+    "V' ≤ 0 to rounding at every logged instant, and V changes by no more and no less than the integral of "
+    "V'. Where all terms of V' have a name, V' ≤ 0 is algebra; that the balance closes is what is found. "
+    "That J⁻¹ and its like stay bounded between instants, and that motions are smooth, is not checked. "
+    "Friction and disturbances are outside the theorem; their power has a name, the balance closes with it "
+    "as well, and Theorem A bounds what they do. Friction among the adapted parameters is inside. The arms "
+    "with six joints are left out: with the step of these runs friction of a joint at rest is at the limit "
+    "of what the method follows, and their balance does not close. With half the step it does; their "
+    "certificate then names the friction, and the forces of wrists that the model takes for locked."
 )
 
 
