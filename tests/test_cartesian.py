@@ -98,10 +98,10 @@ def posture(q: np.ndarray) -> list[np.ndarray]:
 @pytest.mark.parametrize("weights", [None, [np.ones(2), np.array([4.0, 1.0, 0.2])]])
 def test_a_mixed_redundant_cell_converges_and_is_certified(weights):
     space = CartesianSpace("xy", redundancy=Redundancy(posture(POSTURE), weights=weights))
-    result = mixed_planar(space).simulate(dt=5e-3)
+    result = mixed_planar(space).simulate(dt=2.5e-3)
     e = np.linalg.norm(result.tracking_error, axis=2)
     assert (e[-1] < 0.1 * e[0]).all()
-    assert certify(result).verdict == "certified"
+    assert certify(result).verdict == "covered by the theorem"
     assert not result.q[:, 0, 2].any(), "the joint that robot 1 does not have moved"
 
 
@@ -173,12 +173,12 @@ def test_the_report_of_damping_is_saved_with_the_result(tmp_path):
 
 def test_far_from_singular_configurations_damping_changes_nothing():
     redundancy = Redundancy(posture(POSTURE))
-    plain = mixed_planar(CartesianSpace("xy", redundancy=redundancy)).simulate(1.0, dt=5e-3)
+    plain = mixed_planar(CartesianSpace("xy", redundancy=redundancy)).simulate(1.0, dt=2.5e-3)
     space = CartesianSpace("xy", singularity=Damping(1e-3, 0.1), redundancy=redundancy)
-    damped = mixed_planar(space).simulate(1.0, dt=5e-3)
+    damped = mixed_planar(space).simulate(1.0, dt=2.5e-3)
     assert damped.info["damping"] == plain.info["damping"] == []
     np.testing.assert_allclose(damped.q, plain.q, atol=1e-9)
-    assert certify(damped).verdict == "certified"
+    assert certify(damped).verdict == "covered by the theorem"
 
 
 def test_a_redundant_arm_at_the_border_of_its_workspace_stops_the_run():

@@ -41,7 +41,7 @@ def test_every_ready_cell_converges(cell):
 @pytest.mark.parametrize("cell", CELLS)
 def test_every_ready_cell_is_certified(cell):
     certificate = certify(run(cell))
-    assert certificate.verdict == "certified", str(certificate)
+    assert certificate.verdict == "covered by the theorem", str(certificate)
 
 
 @pytest.mark.parametrize("cell", CELLS)

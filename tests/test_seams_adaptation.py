@@ -76,7 +76,7 @@ def test_natural_adaptation_is_certified_and_stays_physical(run):
 
 def test_a_power_that_feeds_v_is_named_in_the_certificate(run):
     certificate = certify(run("leaky"))
-    assert certificate.verdict == "outside the theorem"
+    assert certificate.verdict == "bounded by Theorem A"
     assert any("leakage" in found for found in certificate.outside)
 
 

@@ -401,7 +401,7 @@ def test_a_network_with_memory_is_logged_replayed_and_outside_the_theorem_by_nam
     loaded = Result.load(result.save(tmp_path / "lag.npz"))
     np.testing.assert_array_equal(loaded.outputs["network_state"], result.outputs["network_state"])
     for certificate in (certify(result), certify(loaded, run)):
-        assert certificate.verdict == "outside the theorem"
+        assert certificate.verdict == "bounded by Theorem A"
         assert any("the network Lagging" in text for text in certificate.outside)
         assert certificate.closes, "what it changes is named"
         assert (np.abs(certificate.lyapunov.power["other"]) <= certificate.lyapunov.rounding).all()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -33,10 +34,34 @@ def drift(
     return missed, bound
 
 
+def jumped(run: Replay, V: np.ndarray) -> float:
+    """What V gained between the smooth parts of a run, at jumps of the desired velocity or of the state.
+
+    Of a jump that falls between two logged instants it has what V did from one to the other.
+    """
+    parts = [rows for _, _, rows in run.pieces]
+    return float(sum(V[b.start] - V[a.stop - 1] for a, b in pairwise(parts)))
+
+
 def supplied(run: Replay, rate: np.ndarray) -> float:
     """Integral of a power, (R,), over all pieces of the run."""
     t = run.result.t
     return sum(float(_integral(t[first : last + 1], rate[rows])[-1]) for first, last, rows in run.pieces)
+
+
+def accumulated(run: Replay, rates: np.ndarray) -> np.ndarray:
+    """Integrals of rates, (R, ...), from the first instant to each, (T, ...).
+
+    Where nothing jumps they are those of `supplied`. An interval of the log in which something does, and one
+    that is a piece of its own, get the mean of their two ends.
+    """
+    t, start = run.result.t, run.logged[:-1]
+    steps = np.diff(t).reshape(-1, *[1] * (rates.ndim - 1))
+    gained = 0.5 * steps * (rates[start] + rates[start + 1])
+    for first, last, rows in run.pieces:
+        if last > first + 1:
+            gained[first:last] = np.diff(_integral(t[first : last + 1], rates[rows]), axis=0)
+    return np.concatenate((np.zeros_like(rates[:1]), np.cumsum(gained, axis=0)))
 
 
 def _integral(t: np.ndarray, rate: np.ndarray) -> np.ndarray:

@@ -9,19 +9,27 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..simulation.plant import Plant
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
+from .assumptions import broken, covers, proven
 from .consistency import Consistency, physical_consistency
 from .convergence import Convergence, convergence
 from .delay_condition import DelayCondition, delay_condition
+from .dissipation import Dissipation, balanced
 from .gain_condition import GainCondition, gain_condition
-from .jumps import jumps_at_messages
-from .lyapunov import Growth, Lyapunov, first_growth, lyapunov, outside
+from .lyapunov import RESOLVED, Growth, Lyapunov, first_growth, lyapunov
 from .metrics import finite_or_none
 from .replay import Replay, replay
 
-VERDICTS = ("certified", "outside the theorem", "not certified")
+VERDICTS = ("covered by the theorem", "bounded by Theorem A", "outside the theorem")
+#: what each verdict says, in a sentence
+MEANINGS = (
+    "along this run the proof's inequality held and nothing outside the theorem acted; it does not say that "
+    "errors are small",
+    "something outside the theorem acted; Theorem A bounds what it can do to velocity and synchronization "
+    "errors in the mean; it does not say that they go to zero",
+    "nothing is promised of this run, for one of the reasons named",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,12 +38,14 @@ class Certificate:
 
     Attributes:
         title: of the run.
-        verdict: "certified": every assumption of the theorem holds along the run, V' <= 0 to rounding at
-            every logged instant, and the balance of V closes. "outside the theorem": some assumption does not
-            hold, and nothing else is wrong. "not certified": V grows although every assumption holds, or the
-            run is not accurate enough to tell, or its log is thinned.
+        verdict: one of `VERDICTS`. "covered by the theorem": nothing outside the theorem acted along the run,
+            V' <= 0 to rounding at every logged instant, and the balance of V closes. "bounded by Theorem A":
+            what acted outside are torques that nothing models, or energies that are measured. "outside the
+            theorem": something else acted, or there are doubts.
         outside: the assumptions that do not hold, each with what was found.
-        doubts: what speaks against the run itself.
+        unbounded: those among them of which Theorem A says nothing either.
+        doubts: what speaks against the run itself: its balance does not close or is too coarse to tell, V
+            grows although every assumption holds, or the log is thinned.
         growth: the first instant at which V grows, and the term that did it, or None.
         lyapunov: V and V' with their terms.
         gain_condition: where the gain condition is tightest; it matters only if `gain_condition.needed`.
@@ -46,6 +56,7 @@ class Certificate:
         theorem: of robots that hold one object together, which theorem covers the run, in words; else None.
         delay_condition: of robots that hear each other late, which theorem covers the run, with its margin;
             else None.
+        dissipation: what unmodelled torque did, beside the most that it can do by Theorem A.
         every: steps of the run per logged instant. With more than one the log is thinned: what V did between
             two instants, and whether its balance closes, cannot be seen.
     """
@@ -63,11 +74,18 @@ class Certificate:
     statement: str | None = None
     theorem: str | None = None
     delay_condition: DelayCondition | None = None
+    unbounded: tuple[str, ...] = ()
+    dissipation: Dissipation | None = None
 
     @property
     def certified(self) -> bool:
-        """Whether the verdict is "certified"."""
-        return self.verdict == "certified"
+        """Whether the verdict is "covered by the theorem"."""
+        return self.verdict == VERDICTS[0]
+
+    @property
+    def meaning(self) -> str:
+        """What the verdict says, and what it does not, in a sentence."""
+        return MEANINGS[VERDICTS.index(self.verdict)]
 
     @property
     def closes(self) -> bool | None:
@@ -81,13 +99,21 @@ class Certificate:
         return {
             "title": self.title,
             "verdict": self.verdict,
+            "meaning": self.meaning,
             "outside": list(self.outside),
+            "unbounded": list(self.unbounded),
             "doubts": list(self.doubts),
             "growth": None if self.growth is None else asdict(self.growth),
             "V": _ends(record.V) | {name: _ends(term) for name, term in record.energy.items()},
             "V_dot": {"largest": float(record.V_dot.max()), "rounding": float(record.rounding.max())},
             "energy": {name: float(value) for name, value in record.supplied.items()},
-            "balance": {"closes": self.closes, "drift": record.largest_drift, "bound": record.drift_bound},
+            "balance": {
+                "closes": self.closes,
+                "drift": record.largest_drift,
+                "bound": record.drift_bound,
+                "jumped": record.jumped,
+            },
+            "dissipation": None if self.dissipation is None else self.dissipation.as_dict(),
             "steps_per_instant": self.every,
             "gain_condition": {**condition, "holds": self.gain_condition.holds},
             "convergence": asdict(self.convergence),
@@ -104,12 +130,14 @@ class Certificate:
         final = ", ".join(f"{name} {value:.3g}" for name, value in errors.final.items())
         lines = [
             f"{self.title}: {self.verdict}",
+            f"  that is: {self.meaning}",
             *(f"  outside: {text}" for text in self.outside),
             *(f"  doubt: {text}" for text in self.doubts),
             f"  V goes from {record.V[0]:.5g} to {record.V[-1]:.5g}",
             f"  by term: {supplied or 'no change'}",
             f"  V' is at most {record.V_dot.max():.3g} (rounding {record.rounding.max():.1g})",
             f"  balance: {_balance(self)}",
+            *([] if self.dissipation is None else [f"  {line}" for line in self.dissipation.lines]),
             f"  gain condition: {_state(self.gain_condition)}",
             *([] if self.delay_condition is None else [f"  network: {self.delay_condition}"]),
             f"  at the end: {final}",
@@ -139,16 +167,16 @@ def certify(result: Result, experiment: Experiment | None = None) -> Certificate
     run = replay(result, experiment)
     record, condition, errors = lyapunov(run), gain_condition(run), convergence(run)
     growth, heard = first_growth(record), delay_condition(run)
-    unproven = _unproven(run, heard)
-    found = (*_outside(run, record, condition, heard), *unproven)
-    excused = found or (growth is not None and _covers(heard, growth.term))
-    known = not unproven and heard is None
+    found = broken(run, record, condition, heard)
+    excused = any(found) or (growth is not None and covers(heard, growth.term))
+    known = proven(run) and heard is None
     doubts = tuple(_doubts(run, record, errors, None if excused else growth, known))
-    verdict = VERDICTS[2] if doubts else VERDICTS[1] if found else VERDICTS[0]
+    verdict = VERDICTS[2 if doubts or found.unbounded else 1 if found.bounded else 0]
     return Certificate(
-        str(result.info["title"]), verdict, found, doubts, growth, record, condition, errors, _every(result),
-        _consistency(run), getattr(run.loop.controller.law, "statement", None),
-        getattr(run.loop.chain, "theorem", None), heard,
+        str(run.result.info["title"]), verdict, found.bounded + found.unbounded, doubts, growth, record,
+        condition, errors, _every(run.result), _consistency(run),
+        getattr(run.loop.controller.law, "statement", None), getattr(run.loop.chain, "theorem", None), heard,
+        found.unbounded, balanced(run, found.unbounded),
     )  # fmt: skip
 
 
@@ -163,90 +191,6 @@ def _every(result: Result) -> int:
     """How many steps lie between two logged instants."""
     dt = result.info.get("dt")
     return max(1, round(float(np.diff(result.t).max(initial=0.0)) / dt)) if dt else 1
-
-
-def _covers(heard: DelayCondition | None, term: str) -> bool:
-    """Whether a term of V' is what a theorem for networks covers; V may grow by it and is not its storage."""
-    return term == "network" and heard is not None and heard.theorem is not None
-
-
-def _outside(
-    run: Replay, record: Lyapunov, condition: GainCondition, heard: DelayCondition | None
-) -> list[str]:
-    """Assumptions of the theorem that do not hold along the run."""
-    found = []
-    if run.result.status != "completed":
-        found.append(f"the run {run.result.status}")
-    period = run.result.info.get("control_period")
-    if period is not None:
-        found.append(f"torque and adaptation are held for {period:g} s at a time")
-    found += [*_devices(run), *_events(run), *getattr(run.loop.chain, "outside", ())]
-    for name in (name for name in record.power if name not in record.inside):
-        power = record.power[name]
-        only_takes = power.max() <= record.rounding.max()  # at rest nothing that cancels shows in the bound
-        if only_takes and (name == "fixtures" or (name in run.learning and name not in _WORDS)):
-            continue
-        if name != "weight rate" and not _covers(heard, name) and (np.abs(power) > record.rounding).any():
-            words = _in_words(run, name)
-            found.append(f"{words}: power from {power.min():.3g} to {power.max():.3g}")
-    if condition.needed and not condition.holds:
-        name = run.loop.cell.names[condition.robot]
-        found.append(f"the gain condition fails: {name} {condition.in_words()}")
-    return found
-
-
-def _devices(run: Replay) -> list[str]:
-    """Sensors and actuators between robots and controller, in words."""
-    settings = run.loop.devices.settings
-    named = {role: ", ".join(part["name"] for part in parts) for role, parts in settings.items()}
-    words = {"sensors": "the controller knows the motion by", "actuators": "its torque acts through"}
-    return [f"{words[role]} {role}: {names}" for role, names in named.items()]
-
-
-def _events(run: Replay) -> list[str]:
-    """What plant and network do to the state at once, in words."""
-    if not run.events:
-        return []
-    loop, t = run.loop, run.result.t[run.events[0] + 1]
-    parts = {f"the plant {type(loop.plant).__qualname__}": loop.events.size > 0}
-    parts[f"the network {loop.controller.network_settings['name']}"] = jumps_at_messages(loop)
-    names = " and ".join(name for name, has_events in parts.items() if has_events)
-    share = f"{len(run.events)} of {len(run.result.t) - 1} intervals of the log"
-    return [f"events of {names} move the state in {share}, first until t = {t:g} s: V jumps there"]
-
-
-def _unproven(run: Replay, heard: DelayCondition | None) -> list[str]:
-    """Parts of the controller for which no proof is known, by name."""
-    controller, found = run.loop.controller, []
-    if not hasattr(controller.law, "proof"):
-        found.append(f"the law {controller.law_settings['name']}: it has no energies, and no proof is known")
-    if (words := outside(controller.network) if heard is None else heard.reason) is not None:
-        found.append(f"the network {controller.network_settings['name']}: {words}")
-    return found
-
-
-def _in_words(run: Replay, name: str) -> str:
-    """A power that the theorem does not know, with the plant that it comes from if that is a special one."""
-    plant = type(run.loop.plant)
-    special = name == "other" and plant is not Plant
-    return _WORDS.get(name, f"the adaptation's {name}") + (
-        f", of the plant {plant.__qualname__}" if special else ""
-    )
-
-
-_WORDS = {
-    "law": "the force of a law without a proof",
-    "network": "what the network keeps robots from knowing",
-    "diffusion": "power of diffusive coupling, whose storage is not in V",
-    "friction": "friction that the model does not contain",
-    "disturbance": "torque from outside",
-    "saturation": "torque that saturation takes away, for which no adaptation makes up while it lasts",
-    "model error": "parameters that are wrong and not adapted",
-    "damped inverse": "a reference that damped inverse kinematics do not follow",
-    "fixtures": "fixtures that give, of which the theorem is to the first order",
-    "object": "an object that does not move as the hands do",
-    "other": "forces that the model does not contain",
-}
 
 
 def _doubts(
@@ -267,6 +211,12 @@ def _doubts(
         found.append(
             f"the balance of V does not close: V - V(0) - integral of V' reaches {record.largest_drift:.3g}, "
             f"numerical errors explain {record.drift_bound:.3g}; the step is too long to follow this motion"
+            + _advice(run.result)
+        )
+    elif not record.resolved and not sampled:
+        found.append(
+            f"numerical errors of {record.drift_bound:.3g} may hide in the balance of V, expected at most "
+            f"{RESOLVED:g} of the {np.ptp(record.V):.3g} by which V changes; the step is too long to tell"
             + _advice(run.result)
         )
     if growth is not None:

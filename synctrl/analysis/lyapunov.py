@@ -33,7 +33,7 @@ from ..renamed import names_elsewhere
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .balance import drift, supplied
+from .balance import drift, jumped, supplied
 from .replay import Replay, replay
 
 #: energies of the paper's law; those of another law stand in place of the last two
@@ -47,6 +47,10 @@ GIVING = ("admittance",)
 #: the powers of the paper's law; those of the adaptation come beside them
 POWERS = THEOREM + OUTSIDE
 EPS = float(np.finfo(float).eps)
+#: share of the range of V that the numerical error of its balance may have
+RESOLVED = 1e-3
+#: share of V itself that is rounding
+ROUNDED = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +72,9 @@ class Lyapunov:
         supplied: integral of every power over the run, by name; together the change of V.
         inside: names of the powers that the theorem knows.
         events: instants between which and the next one V jumps, because plant or network move the state.
+        jumped: what V gained at jumps, of the state or of the desired velocity, in all: V(T) - V(0) is the
+            sum of `supplied`, of this, and of the drift at the end.
+        kinked: whether rates of terms jump at messages and their sum does not: `drift_bound` is too large.
     """
 
     t: np.ndarray
@@ -79,6 +86,8 @@ class Lyapunov:
     supplied: Mapping[str, float]
     inside: tuple[str, ...] = THEOREM
     events: tuple[int, ...] = ()
+    jumped: float = 0.0
+    kinked: bool = False
 
     @property
     def V(self) -> np.ndarray:  # noqa: N802
@@ -99,6 +108,12 @@ class Lyapunov:
     def closes(self) -> bool:
         """Whether the balance of V closes: all power that enters or leaves V has been accounted for."""
         return self.largest_drift <= self.drift_bound
+
+    @property
+    def resolved(self) -> bool:
+        """Whether numerical errors are small beside what V did, so that `closes` says something."""
+        V, error = self.V, self.largest_drift if self.kinked else self.drift_bound
+        return error <= max(RESOLVED * float(np.ptp(V)), ROUNDED * float(V.max()))
 
 
 @dataclass(frozen=True)
@@ -133,7 +148,7 @@ def lyapunov(result: Result | Replay, experiment: Experiment | None = None) -> L
         InputError: no experiment, or another than the one that made the result.
     """
     run = replay(result, experiment)
-    proof = _proof(run)
+    proof = proof_along(run)
     x, power = run.rows, _power(run, proof)
     energy = {"kinetic": 0.5 * _sum(x.s_q * np.matvec(x.M, x.s_q)), "parameter": x.storage}
     energy |= {name: _sum(term) for name, term in proof.energies.items()}
@@ -148,8 +163,10 @@ def lyapunov(result: Result | Replay, experiment: Experiment | None = None) -> L
         missed,
         bound + operations(run.loop) * EPS * float(np.max(V)),
         {name: supplied(run, term) for name, term in power.items()},
-        _inside(run, proof),
+        inside_of(run, proof),
         run.events,
+        jumped(run, V),
+        run.loop.messages.sent and not run.events,
     )
 
 
@@ -181,7 +198,7 @@ def outside(network: BoundNetwork) -> str | None:
     return "no proof is known" if ask is None else ask()
 
 
-def _is_ideal(network: BoundNetwork) -> bool:
+def is_ideal(network: BoundNetwork) -> bool:
     """Whether the proof holds with a network as it stands, without a theorem of its own."""
     return outside(network) is None and getattr(network, "theorem", None) is None
 
@@ -194,7 +211,7 @@ def operations(loop: ClosedLoop) -> int:
 # -- terms ------------------------------------------------------------------------------------------------
 
 
-def _proof(run: Replay) -> Proof:
+def proof_along(run: Replay) -> Proof:
     """The law's part in V and V'; nothing of a law that has no proof."""
     x, law = run.rows, cast(Any, run.loop.controller.law)
     along = Along(x.epsilon, x.epsilon_dot, x.E, x.sigma, x.sigma_dot, x.e_star, x.r, x.c, x.slips)
@@ -204,9 +221,9 @@ def _proof(run: Replay) -> Proof:
     return proof._replace(rates=law.proof(moves).rates)
 
 
-def _inside(run: Replay, proof: Proof) -> tuple[str, ...]:
+def inside_of(run: Replay, proof: Proof) -> tuple[str, ...]:
     """Names of the powers that the theorem knows: diffusive coupling only where all is heard at once."""
-    ideal = _is_ideal(run.loop.controller.network)
+    ideal = is_ideal(run.loop.controller.network)
     known = (name for name in proof.powers if ideal or name != DIFFUSION)
     return ("damping", *known, "friction in Y", *GIVING)
 
@@ -219,7 +236,7 @@ def _rates(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
 def _summands(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
     """The same but for the adaptation's, before they are added up over robots and axes."""
     x = run.rows
-    s_q_dot = x.a_ref + x.gap + _reference_gap(run) - x.v_dot
+    s_q_dot = x.a_ref + x.gap + reference_gap(run) - x.v_dot
     return x.s_q * (np.matvec(x.M, s_q_dot) + x.C_s), *proof.rates.values()
 
 
@@ -227,7 +244,9 @@ def _power(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
     """Terms of V', one value per row; "other" is what the chain rule has beyond those with a name."""
     x, controller = run.rows, run.loop.controller
     K_r, s, moved = controller.K_r, np.matvec(x.c_inv, x.r), np.matvec(x.J, x.s_q)
-    damping = x.s_q * K_r * x.s_q if controller.k_r_space == "joint" else moved * K_r * s
+    in_task = controller.k_r_space == "task"
+    damping = moved * K_r * moved if in_task else x.s_q * K_r * x.s_q
+    unfollowed = x.force - K_r * moved if in_task else x.force  # what acts on s where J s_q is meant
     terms = {
         "damping": -damping,
         **proof.powers,
@@ -235,22 +254,22 @@ def _power(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
         "friction": x.s_q * x.friction,
         "disturbance": -x.s_q * x.disturbance,
         "saturation": x.s_q * x.cut_off,
-        "weight rate": x.s_q * np.matvec(x.M, _reference_gap(run)),
-        "damped inverse": (s - moved) * x.force,
+        "weight rate": x.s_q * np.matvec(x.M, reference_gap(run)),
+        "damped inverse": (s - moved) * unfollowed,
     }
     power = {name: _sum(term) for name, term in terms.items()}
     power |= dict(zip((*run.learning, *run.chained), (*x.learning.T, *x.chained.T), strict=True))
     pushed = _sum(s * x.force)  # the rates of the proof less its powers, where it holds
     if not hasattr(controller.law, "proof"):
         power["law"] = -pushed
-    elif not _is_ideal(controller.network):
+    elif not is_ideal(controller.network):
         rates, powers = (sum(map(_sum, terms.values())) for terms in (proof.rates, proof.powers))
         power["network"] = rates - powers - pushed + _sum(x.s_q * np.matvec(x.M, x.gap))
     power["other"] = np.sum(_rates(run, proof), axis=0) - np.sum(list(power.values()), axis=0)
     return power
 
 
-def _reference_gap(run: Replay) -> np.ndarray:
+def reference_gap(run: Replay) -> np.ndarray:
     """v_ref' - a_ref, (R, n, nv): 0 when exact, J^-1 d(c^-1)/dt r with the paper's reference acceleration."""
     x = run.rows
     if run.loop.controller.reference_acceleration == "exact":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ from ..checks import instance
 from ..control.controller import Signals
 from ..coupling.cell import Reference
 from ..errors import InputError
-from ..robots.forest import Forest, Selection, forests
+from ..robots.forest import forests
 from ..simulation.clock import before
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.recorder import ADAPTATION_STATE, NETWORK_STATE, PLANT_STATE
@@ -20,15 +20,11 @@ from ..simulation.result import Result
 from ..simulation.schedules import DisturbanceSchedule
 from ..simulation.simulate import Experiment
 from .jumps import SmoothPart, jumps_in, pieces, tolerance
+from .model_torques import Bodies, dynamics, friction_torques, frozen_error
 from .origin import check_numbers, check_same, check_settings, check_sizes
 
 #: instants whose references are evaluated together
 BLOCK = 256
-#: share of the model's torque from which something in Y theta counts as friction, and not as rounding
-KNOWN = 1e-9
-
-Bodies = Sequence[tuple[Selection, Forest]]
-"""The robots of a cell as `forests` groups them."""
 
 
 class Moment(NamedTuple):
@@ -41,16 +37,19 @@ class Moment(NamedTuple):
         friction: torque of friction that is not in Y, (n, nv).
         friction_damping: torque by which friction in Y damps, F_v s_q, (n, nv).
         cut_off: torque that saturation takes from tau, (n, nv).
+        lacking, frozen: torque that the model lacks, Y tilde, and the part of it with Gamma = 0, (n, nv).
         storage, storage_rate: V_th of the adaptation, and its rate by the chain rule, N·m and N·m/s.
         learning: what V_th' has beside -s_q^T Y tilde, in the order of `Replay.learning`, N·m/s.
         stored, stored_rate: energies of a closed chain, in the order of `Replay.stored`, and their rates.
         chained: its powers, in the order of `Replay.chained`, N·m/s.
         epsilon, epsilon_dot: (p, m).
         E, sigma, sigma_dot, e_star, u, r: (n, m).
+        weighted: w = c e and its rate, as the law takes them, (2, n, m).
         force: what the law asks for in task space, (n, m).
         c, c_dot, c_inv: (n, m, m).
         slips: what the network told of r, see `Received`, (2, n, m); nothing where nobody asks.
         J, J_inv: (n, m, nv) and (n, nv, m); identities in joint space.
+        inverse_damping: lambda of a damped inverse near singular configurations, (n,); 0 without one.
         M: mass matrices, (n, nv, nv).
         C_s: C(q, v) s_q, (n, nv).
         Y_size: |Y| (|theta| + |theta_hat|), the magnitude of the model's torque, (n, nv).
@@ -68,6 +67,8 @@ class Moment(NamedTuple):
     friction: np.ndarray
     friction_damping: np.ndarray
     cut_off: np.ndarray
+    lacking: np.ndarray
+    frozen: np.ndarray
     storage: np.ndarray
     storage_rate: np.ndarray
     learning: np.ndarray
@@ -82,6 +83,7 @@ class Moment(NamedTuple):
     e_star: np.ndarray
     u: np.ndarray
     r: np.ndarray
+    weighted: np.ndarray
     force: np.ndarray
     c: np.ndarray
     c_dot: np.ndarray
@@ -89,6 +91,7 @@ class Moment(NamedTuple):
     slips: np.ndarray
     J: np.ndarray
     J_inv: np.ndarray
+    inverse_damping: np.ndarray
     M: np.ndarray
     C_s: np.ndarray
     Y_size: np.ndarray
@@ -188,21 +191,22 @@ def _rows(
 def _row(
     result: Result, loop: ClosedLoop, bodies: Bodies, k: int, reference: Reference, disturbance: np.ndarray
 ) -> Moment:
-    q, v, y = result.q[k], result.v[k], _state(result, k)
+    q, v, y = result.q[k], result.v[k], state_at(result, k)
     y_dot, s = loop.evaluate(reference, y, disturbance)
     theta, adaptation, z = loop.cell.theta, loop.controller.adaptation, loop.state(y).z
     J, J_inv = _jacobians(loop, s)
-    M, C_s = _dynamics(bodies, q, v, s.s_q)
-    friction, friction_damping = _friction(loop, bodies, q, v, s)
+    M, C_s = dynamics(bodies, q, v, s.s_q)
+    friction, friction_damping = friction_torques(loop, bodies, q, v, s)
     return Moment(
         v, loop.split(y_dot)[1], s.v_ref, s.a_ref - _given_up(adaptation, z, s), *_gaps(loop, y, s, J_inv),
         s.s_q, s.tau, disturbance, friction, friction_damping,
-        s.tau - loop.plant.applied(s.tau), np.array(adaptation.storage(z, theta)),
+        s.tau - loop.plant.applied(s.tau), np.matvec(s.Y, theta - s.theta_hat),
+        np.matvec(s.Y, frozen_error(adaptation, theta - s.theta_hat)), np.array(adaptation.storage(z, theta)),
         np.array(adaptation.storage_rate(z, s.z_dot, theta)),
         np.array([*adaptation.powers(z, theta, s.seen).values()]), *_chain(loop, y, y_dot, s),
-        s.epsilon, s.epsilon_dot, s.E, s.sigma, s.sigma_dot, s.e_star, s.u, s.r, s.force, s.reference.c,
-        s.reference.c_dot, s.reference.c_inv, np.array([] if s.errors.slips is None else s.errors.slips),
-        J, J_inv, M, C_s,
+        s.epsilon, s.epsilon_dot, s.E, s.sigma, s.sigma_dot, s.e_star, s.u, s.r, s.errors.weighted, s.force,
+        s.reference.c, s.reference.c_dot, s.reference.c_inv,
+        np.array([] if s.errors.slips is None else s.errors.slips), J, J_inv, s.task.inverse_damping, M, C_s,
         np.matvec(np.abs(s.Y), np.abs(s.theta_hat) + np.abs(theta)),
     )  # fmt: skip
 
@@ -226,7 +230,7 @@ def _gaps(loop: ClosedLoop, y: np.ndarray, s: Signals, J_inv: np.ndarray) -> tup
     return np.matvec(J_inv, moved.xref_dot - s.asked.xref_dot), gap[0]
 
 
-def _state(result: Result, k: int) -> np.ndarray:
+def state_at(result: Result, k: int) -> np.ndarray:
     """The state of the loop at logged instant k."""
     z = result.outputs.get(ADAPTATION_STATE, result.theta_hat)[k]
     memory = result.outputs.get(NETWORK_STATE, result.sync_integral)[k]
@@ -263,34 +267,3 @@ def _jacobians(loop: ClosedLoop, s: Signals) -> tuple[np.ndarray, np.ndarray]:
         return s.task.J, s.task.J_inv
     identities = np.broadcast_to(np.eye(loop.cell.m), (loop.cell.n, loop.cell.m, loop.cell.m))
     return identities, identities
-
-
-def _dynamics(bodies: Bodies, q: np.ndarray, v: np.ndarray, s_q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mass matrices, (n, nv, nv), and C s_q, (n, nv)."""
-    M, C_s = np.zeros((*q.shape, q.shape[1])), np.zeros(q.shape)
-    for rows, forest in bodies:
-        k = forest.nv
-        M[rows, :k, :k] = forest.mass_matrices(q[rows, :k])
-        C_s[rows, :k] = forest.coriolis_torque(q[rows, :k], v[rows, :k], s_q[rows, :k])
-    return M, C_s
-
-
-def _friction(
-    loop: ClosedLoop, bodies: Bodies, q: np.ndarray, v: np.ndarray, s: Signals
-) -> tuple[np.ndarray, np.ndarray]:
-    """Torque of friction that is not in Y, and torque by which friction in Y damps, each (n, nv).
-
-    What Y theta has beyond M a_ref + C v_ref + g is friction that the controller knows. With the viscous part
-    taken at v_ref, F_v s_q of the plant's friction remains as damping.
-    """
-    unknown, damping = loop.plant.friction(v), np.zeros_like(v)
-    if not loop.plant.rubs:
-        return unknown, damping
-    theta = loop.cell.theta
-    known = np.matvec(s.Y, theta)
-    for rows, forest in bodies:
-        k = forest.nv
-        known[rows, :k] -= forest.torque(*(x[rows, :k] for x in (q, v, s.v_ref, s.a_ref)))
-    knows = (np.abs(known) > KNOWN * np.matvec(np.abs(s.Y), np.abs(theta))).any(axis=1, keepdims=True)
-    damping = np.where(knows, loop.plant.viscous * s.s_q, 0.0)
-    return unknown + damping - np.where(knows, known, 0.0), damping

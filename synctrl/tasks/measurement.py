@@ -119,6 +119,12 @@ class Measurement:
     xd_ddot = property(lambda self: self.rates[1])
 
     @property
+    def inverse_damping(self) -> np.ndarray:
+        """lambda of damped inverse kinematics, (n,), unit of J; 0 where nothing is damped."""
+        lambdas = None if self.inversion is None else self.inversion.damping
+        return np.zeros(self.error.shape[-2]) if lambdas is None else lambdas[..., 0]
+
+    @property
     def orientation(self) -> np.ndarray:
         """Sizes of the orientation errors of poses, (..., 1), rad."""
         return np.sqrt((self.error[0][..., 3:] ** 2).sum(-1, keepdims=True))
