@@ -30,6 +30,7 @@ from synctrl.experiments import a460_pair, carry_ur5, panda_four, planar_four, u
 from synctrl.experiments.planar_four import GAINS as FOUR
 from synctrl.robots.base_parameters import grouping
 from synctrl.robots.parameters import FrictionParameters
+from synctrl.simulation.result import LAYOUT
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::synctrl.errors.CouplingWarning"),  # odd rings are meant
@@ -318,6 +319,17 @@ def test_a_loaded_run_has_the_same_dissipation(tmp_path) -> None:
     with refused(InputError, "experiment"):
         dissipation(loaded)
     assert dissipation(loaded, run).as_dict() == dissipation(result).as_dict()
+
+
+@pytest.mark.parametrize("period", [None, 1e-3])
+def test_a_run_that_came_no_farther_than_its_first_instant_has_a_balance(period: float | None) -> None:
+    run = experiment(coupling("pair", 2, 1), joints=1)
+    result = run.simulate(2e-3, 1e-3, control_period=period)
+    first = replace(result, **{name: getattr(result, name)[:1] for name in LAYOUT})
+    found = dissipation(first)
+    assert found.X == found.D == 0.0
+    assert found.VT == found.V0
+    json.dumps(certify(first).as_dict(), allow_nan=False)
 
 
 def test_a_replay_is_used_as_it_is() -> None:
