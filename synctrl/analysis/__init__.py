@@ -5,9 +5,11 @@ from .comparison import Comparison, compare, side_by_side
 from .delay_map import DelayMap, delay_map
 from .delay_margin import DelayMargin, delay_margin
 from .dissipation import Dissipation, dissipation
+from .exponential_rate import ExponentialRate, RatesOverGamma, exponential_rate, rates_over_gamma
 from .modal import ModalBounds, modal_bounds
 from .period_margin import period_margin
 from .resolution import resolution_error
+from .tube import Tube, tube
 
 __all__ = [
     "Certificate",
@@ -15,14 +17,20 @@ __all__ = [
     "DelayMap",
     "DelayMargin",
     "Dissipation",
+    "ExponentialRate",
     "ModalBounds",
+    "RatesOverGamma",
+    "Tube",
     "certify",
     "compare",
     "delay_map",
     "delay_margin",
     "dissipation",
+    "exponential_rate",
     "modal_bounds",
     "period_margin",
+    "rates_over_gamma",
     "resolution_error",
     "side_by_side",
+    "tube",
 ]
