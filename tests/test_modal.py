@@ -200,6 +200,13 @@ def filtered(bounds: ModalBounds, start: np.ndarray) -> np.ndarray:
     return run.y[:, -1].reshape(2, *shape)[0]
 
 
+def test_synchronization_errors_are_the_differences_of_the_modes():
+    run = experiment(coupling("ring", 4, 2, "constant")).simulate(0.05, dt=1e-3)
+    bounds = modal_bounds(run)
+    of_modes = ((bounds.differences[:, None] * bounds.w) ** 2).sum(axis=1)
+    np.testing.assert_allclose(of_modes, (run.sync_error**2).sum(axis=1), rtol=1e-9)
+
+
 @pytest.mark.parametrize("leak", [0.0, 1.0])
 def test_w_filtered_from_the_r_of_the_law_is_the_w_of_the_run(leak):
     link = coupling("signed graph", 3, 2, "moving")
