@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sysconfig
 from collections.abc import Callable
@@ -36,6 +37,11 @@ def pytest_configure(config):
     config.add_cleanup(patch.undo)
     patch.setattr(checking, "_fault", once_if_installed(checking._fault))
     patch.setattr(drawing, "read_mesh", once_if_installed(drawing.read_mesh))
+
+
+def pytest_collection_finish():
+    """Modules and collected tests stay to the end: garbage is not looked for among them."""
+    gc.freeze()
 
 
 def once_if_installed(look: Callable) -> Callable:
