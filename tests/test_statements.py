@@ -29,11 +29,11 @@ def statements() -> dict[str, str]:
     return found
 
 
-def named(block: str) -> list[tuple[str, str]]:
-    """Tests named in brackets, each with its file: that which was named last, or that of the errata."""
-    found = []
+def named(block: str, page: str = PAGE) -> list[tuple[str, str]]:
+    """Tests named in brackets, each with its file: the one named last, or that of which the page says so."""
+    found, usual = [], re.search(r"in\s+`tests/(test_\w+\.py)`", page)
     for bracket in re.findall(r"\[([^\[\]]*`test_[^\[\]]*)\](?!\()", block):
-        file = "test_errata.py"
+        file = usual[1] if usual else ""
         for name in re.findall(r"`(test_\w+(?:\.py)?(?:\.\.\.)?)`", bracket):
             file = name if name.endswith(".py") else file
             found.append((file, "" if name.endswith(".py") else name))
@@ -44,7 +44,7 @@ def exists(file: str, name: str) -> bool:
     """Whether a test of that name, or one that begins like a name that ends in dots, is in that file."""
     path, end = TESTS / file, "" if name.endswith("...") else r"\("
     pattern = rf"(?m)^def {name.removesuffix('...')}{end}"
-    return path.exists() and re.search(pattern, path.read_text("utf-8")) is not None
+    return path.is_file() and re.search(pattern, path.read_text("utf-8")) is not None
 
 
 STATEMENTS = statements()
@@ -66,9 +66,18 @@ def test_every_assumption_of_the_theorem_has_a_row_that_says_where_it_is_checked
 
 @pytest.mark.parametrize("page", PAGES)
 def test_every_test_that_a_page_names_exists(page: str) -> None:
-    tests = named(PAGES[page])
+    tests = named(PAGES[page], PAGES[page])
     assert not [(file, name) for file, name in tests if name and not exists(file, name)]
-    assert all((TESTS / file).exists() for file, _ in tests)
+    assert all((TESTS / file).is_file() for file, _ in tests)
+
+
+def test_every_citation_has_a_reference_and_every_reference_is_cited() -> None:
+    body, references = PAGE.split("## References")
+    cited = {*re.findall(r"([A-Z]\w+)(?:\]\S*)?\s+\(((?:19|20)\d\d)\)", body)}
+    entries = [" ".join(entry.split()) for entry in references.split("\n- ")[1:]]
+    found = {(name, year) for name, year in cited for entry in entries if name in entry and year in entry}
+    assert found == cited
+    assert all(any(name in entry and year in entry for name, year in cited) for entry in entries)
 
 
 def test_the_checks_find_what_is_missing() -> None:
