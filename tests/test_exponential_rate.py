@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import rod_arm, seeds
 from refusals import refused
+from scipy.linalg import expm
 from theory_cells import planar_arm
 
 from synctrl import (
@@ -258,6 +259,20 @@ def test_the_volume_of_errors_falls_by_the_integral_of_the_trace(name: str) -> N
     Phi, error = monodromy(matrices, [0.0, end])
     assert np.linalg.det(Phi) == pytest.approx(np.exp(trace), rel=1e-6)
     assert error < 1e-8
+
+
+def test_phi_is_that_of_a_system_seen_from_a_turning_frame() -> None:
+    """A = R B R^T with R = exp(W t) has Phi = R(T) exp((B - W) T), within the error that is stated."""
+    rng = np.random.default_rng(0)
+    B, W = rng.normal(size=(4, 4)) - 2 * np.eye(4), 6 * rng.normal(size=(4, 4))
+    W -= W.T
+
+    def matrices(times: np.ndarray) -> np.ndarray:
+        R = expm(times[:, None, None] * W)
+        return R @ B @ R.mT
+
+    Phi, error = monodromy(matrices, [0.0, 0.3, 1.0])
+    assert np.abs(Phi - expm(W) @ expm(B - W)).max() < max(2 * error, 1e-13) < 1e-9
 
 
 @pytest.mark.parametrize("name", ["fast", "moving weights, task damping, leak"])

@@ -53,9 +53,8 @@ def simulated_decay(
     """Start the closed loop from a small error, and see what some periods make of it.
 
     The error is the real part of an eigenvector, without its integrals, which start from zero in every run.
-    How it falls is read off along that direction, which leaves out what it has of others, from half the
-    difference of two runs, with this error and its opposite: the error of the method is the same in both, and
-    so is what grows with the square of the errors.
+    How it falls is read off along that direction, from half the difference of two runs, with this error and
+    its opposite: the error of the method is the same in both, and so is what grows with their square.
 
     Args:
         experiment: what the rate is of.
@@ -72,20 +71,23 @@ def simulated_decay(
     """
     count("periods", periods), positive_number("size", size)
     k = len(rate.unexcited) if direction is None else index("direction", direction, len(rate.multipliers))
-    z, vector, dual = rate.coordinates, rate.right[:, k], rate.left[:, k].conj()
-    before = (vector / vector[np.abs(vector).argmax()]).real
-    before[z.parts["i"][0]] = 0.0
-    before *= size / np.abs(before).max()
-    runs = [
-        _near(experiment, rate, sign * before).simulate(periods * rate.period, dt, engine=engine)
-        for sign in (1.0, -1.0)
-    ]
+    before = size * _along(rate, k)
+    duration, z = periods * rate.period, rate.coordinates
+    runs = [_near(experiment, rate, e).simulate(duration, dt, engine=engine) for e in (before, -before)]
     after = (_last(z, runs[0]) - _last(z, runs[1])) / 2
-    expected = rate.multipliers[k] ** periods
-    share = (dual @ after) / (dual @ before) / expected
-    simulated = rate.multipliers[k] * share ** (1 / periods)  # of all roots the one nearest to the multiplier
-    through = np.linalg.matrix_power(rate.Phi, periods) @ before
-    return Decay(complex(rate.multipliers[k]), complex(simulated), before, after, through)
+    dual, multiplier = rate.left[:, k].conj(), complex(rate.multipliers[k])
+    share = complex(dual @ after) / complex(dual @ before) / multiplier**periods
+    simulated = multiplier * share ** (1 / periods)  # of all roots the one nearest to the multiplier
+    expected = np.linalg.matrix_power(rate.Phi, periods) @ before
+    return Decay(multiplier, simulated, before, after, expected)
+
+
+def _along(rate: ExponentialRate, k: int) -> np.ndarray:
+    """An error along direction k whose largest coordinate is 1, without integrals, (size,)."""
+    vector = rate.right[:, k]
+    error = (vector / vector[np.abs(vector).argmax()]).real
+    error[rate.coordinates.parts["i"][0]] = 0.0
+    return error / np.abs(error).max()
 
 
 def _last(z: Coordinates, result: Result) -> np.ndarray:
