@@ -43,15 +43,21 @@ def sides(one: Experiment, speed: float | None = None) -> tuple[np.ndarray, np.n
 # -- runs --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("cartesian", [False, True], ids=["joint", "cartesian"])
-@pytest.mark.parametrize("weight", ["scalar", "constant", "moving"])
-@pytest.mark.parametrize("kind", ["pair", "ring", "all-to-all"])
-def test_no_run_leaves_its_tube(kind: str, weight: str, cartesian: bool) -> None:
-    n = 2 if kind == "pair" else 3
-    one = experiment(
-        coupling(kind, n, 2, weight), cartesian=cartesian, disturbances=(PUSH,), friction=FRICTION
-    )
-    sizes, radius = sides(one, speed=8.0)
+@pytest.mark.parametrize(
+    ("kind", "weight", "space"),
+    [
+        ("pair", "scalar", "joint"),
+        ("pair", "moving", "cartesian"),
+        ("ring", "constant", "cartesian"),
+        ("ring", "moving", "joint"),
+        ("all-to-all", "scalar", "cartesian"),
+        ("all-to-all", "constant", "joint"),
+    ],
+)
+def test_no_run_leaves_its_tube(kind: str, weight: str, space: str) -> None:
+    link = coupling(kind, 2 if kind == "pair" else 3, 2, weight)
+    acting = {"disturbances": (PUSH,), "friction": FRICTION}
+    sizes, radius = sides(experiment(link, cartesian=space == "cartesian", **acting), speed=8.0)
     assert (sizes <= radius).all()
 
 
@@ -63,7 +69,7 @@ def test_nor_does_one_with_viscous_friction_whether_speeds_are_stated_or_not(wei
     assert (sizes <= radius).all()
 
 
-@pytest.mark.parametrize("leak", [0.0, 1.5, 4.0])
+@pytest.mark.parametrize("leak", [1.5, 4.0])
 def test_nor_does_one_with_a_leak_of_the_integrals(leak: float) -> None:
     one = experiment(coupling("ring", 4, 2), replace(GAINS, leak=leak), cartesian=True)
     sizes, radius = sides(one)
@@ -105,7 +111,7 @@ def test_friction_of_a_run_is_within_what_was_reckoned_with() -> None:
 
 
 @given(seed=st.integers(0, 2**20), kind=st.sampled_from(sorted(EDGES)), leak=st.sampled_from([0.0, 0.7, 1.0]))
-@settings(max_examples=15)
+@settings(max_examples=12)
 def test_modes_are_the_solution_of_the_equation_of_the_errors(seed: int, kind: str, leak: float) -> None:
     """w and E as one linear system, by its matrix exponential; beta lambda = Lambda is among the cases."""
     rng, n = np.random.default_rng(seed), 2 if kind == "pair" else 4
@@ -123,9 +129,12 @@ def test_modes_are_the_solution_of_the_equation_of_the_errors(seed: int, kind: s
     responses = np.empty((len(times), n, n))
     for k in range(len(times)):
         responses[k], moved = moved[:n], flow @ moved
-    assert modes.free(w, times) == pytest.approx(responses @ w, abs=1e-9)
+    np.testing.assert_allclose(modes.free(w, times), responses @ w, atol=1e-9)
+    slopes = np.trapezoid(np.gradient(responses @ modes.vectors, step, axis=0) ** 2, times, axis=0).sum(0)
+    assert np.sqrt(slopes.max()) == pytest.approx(modes.free_rates()[0], rel=0.05)
     if beta == 0 or leak > 0 or beta * np.linalg.eigvalsh(L)[1] > Lambda:  # else slow modes last longer
-        assert modes.spread(0) == pytest.approx(np.trapezoid(responses**2, times, axis=0), rel=0.02, abs=1e-5)
+        found = np.trapezoid(responses**2, times, axis=0)
+        np.testing.assert_allclose(modes.spread(0), found, rtol=0.02, atol=1e-5)
 
 
 def quiet(torque: float = 0.0, duration: float = 2.0, c: float = 1.0, **changes) -> Tube:
