@@ -135,7 +135,7 @@ NOTHING = "nothing outside acted"
 
 
 def reasons(certificate: Certificate) -> tuple[str, ...]:
-    """Why a verdict is what it is, what decides first; without numbers that machines may round differently."""
+    """Why a verdict is what it is, what decides first; without numbers, which machines may round apart."""
     decisive = (*certificate.unbounded, *certificate.doubts)
     found = (*decisive, *(text for text in certificate.outside if text not in decisive))
     return tuple(
