@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -231,6 +234,14 @@ def test_so_it_is_with_all_that_the_theorem_reaches(make: Callable[[], Experimen
     close(*linear_and_differences(make(), 0.13, 0))
 
 
+def test_integrals_that_act_on_nothing_do_not_count() -> None:
+    gains = GAINS.replace(beta=[3.0, 0.0])
+    half, none = (exponential_rate(rods(gains=g), PERIOD) for g in (gains, gains.independent()))
+    assert half.stable and none.stable
+    assert len(none.multipliers) == len(half.multipliers) - 1
+    close(*linear_and_differences(rods(gains=gains), 0.13, 0))
+
+
 @pytest.mark.parametrize("name", CELLS)
 def test_the_volume_of_errors_falls_by_the_integral_of_the_trace(name: str) -> None:
     """Liouville: det Phi = exp(int trace A), in a time after which there is still some volume."""
@@ -270,9 +281,9 @@ def storage(experiment: Experiment, z: Coordinates, t: float) -> np.ndarray:
     e, I, m = slice(z.parts["e*"][0].start, z.parts["e*"][-1].stop), z.parts["i"][0], cell.m
     epsilon = np.zeros((len(S) * m, z.size))
     epsilon[:, e] = np.kron(S, np.eye(m))
-    epsilon[:, I] = -np.kron(S @ S.T @ z.B, np.diag(gains.beta))
+    epsilon[:, I] = -np.kron(S @ S.T @ z.B, np.diag(gains.beta)[:, z.acting])
     E = np.zeros((cell.n * m, z.size))
-    E[:, I] = np.kron(S.T @ z.B, np.eye(m))
+    E[:, I] = np.kron(S.T @ z.B, np.eye(m)[:, z.acting])
     spring = gains.K_eps * (gains.Lambda - gains.leak) * gains.beta
     P += epsilon.T @ (np.tile(gains.K_eps, len(S))[:, None] * epsilon)
     return (P + E.T @ (np.tile(spring, cell.n)[:, None] * E)) / 2
@@ -351,3 +362,19 @@ def test_the_figure_marks_the_best_gamma() -> None:
 def test_factors_that_are_not_above_0_are_refused() -> None:
     with refused(InputError, "factors"):
         rates_over_gamma(rods(), PERIOD, [0.0, 1.0])
+
+
+def test_the_page_of_the_theorem_runs_and_has_the_numbers_that_it_shows() -> None:
+    page = (Path(__file__).parents[1] / "docs" / "theorem_c.md").read_text("utf-8")
+    names: dict[str, Any] = {}
+    for block in re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL):
+        exec(compile(block, "docs/theorem_c.md", "exec"), names)
+    assert str(names["rate"]) in page
+    shown = re.findall(r"^\| rate, 1/s \| (.*) \|$", page, flags=re.MULTILINE)[0].split(" | ")
+    np.testing.assert_allclose(names["rates"].rates, np.array(shown, float), atol=0.006)
+    assert names["check"].misfit < 0.01
+    assert set(re.findall(r"`(test_\w+)`", page)) <= {*globals(), *TESTS_ELSEWHERE}
+
+
+#: that the page names beside those of this file
+TESTS_ELSEWHERE = {"test_what_adaptation_had_the_time_for_is_not_said_to_be_learned"}

@@ -2,6 +2,7 @@
 
 from .certify import Certificate, certify
 from .comparison import Comparison, compare, side_by_side
+from .decay import Decay, simulated_decay
 from .delay_map import DelayMap, delay_map
 from .delay_margin import DelayMargin, delay_margin
 from .dissipation import Dissipation, dissipation
@@ -14,6 +15,7 @@ from .tube import Tube, tube
 __all__ = [
     "Certificate",
     "Comparison",
+    "Decay",
     "DelayMap",
     "DelayMargin",
     "Dissipation",
@@ -32,5 +34,6 @@ __all__ = [
     "rates_over_gamma",
     "resolution_error",
     "side_by_side",
+    "simulated_decay",
     "tube",
 ]

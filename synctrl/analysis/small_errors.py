@@ -6,8 +6,8 @@
     I'   = S e* - (beta S S^T + l) I,    sigma = S^T (S e* - beta S S^T I)
 
 on z = (s, u, e*, i) with t = L u, where L L^T = K Gamma K^T, and I = B i, where B is an orthonormal basis of
-the range of S. In u the adaptation is the transpose of what it learns from, u' = -(Y_b L)^T s, and what is
-not adapted at all is left out.
+the range of S. In u the adaptation is the transpose of what it learns from, u' = -(Y_b L)^T s. What is not
+adapted at all is left out, and so are integrals of axes with beta = 0, which act on nothing.
 """
 
 from __future__ import annotations
@@ -52,11 +52,16 @@ class Coordinates:
             "s": [cell.nv] * cell.n,
             "u": [part.shape[1] for part in self.L],
             "e*": [cell.m] * cell.n,
-            "i": [self.B.shape[1] * cell.m],
+            "i": [self.B.shape[1] * int(self.acting.sum())],
         }
         ends = np.cumsum([0, *(size for part in sizes.values() for size in part)]).tolist()
         slices = iter([slice(a, b) for a, b in pairwise(ends)])
         return {name: [next(slices) for _ in part] for name, part in sizes.items()}
+
+    @cached_property
+    def acting(self) -> np.ndarray:
+        """Which task coordinates have integrals that act, (m,), bool."""
+        return self.controller.beta > 0
 
     @property
     def size(self) -> int:
@@ -80,7 +85,9 @@ class Coordinates:
             np.linalg.pinv(L) @ found.K @ tilde[i, : found.K.shape[1]]
             for i, (L, found) in enumerate(zip(self.L, self.groupings, strict=True))
         ]
-        return np.concatenate([s_q.ravel(), *u, e_star.ravel(), (self.B.T @ integral).ravel()])
+        return np.concatenate(
+            [s_q.ravel(), *u, e_star.ravel(), (self.B.T @ integral)[:, self.acting].ravel()]
+        )
 
     def estimates(self, z: np.ndarray) -> list[np.ndarray]:
         """Estimates of every robot, (P,), with the smallest errors that have this z."""
@@ -131,22 +138,19 @@ def _adapted(Y: np.ndarray, found: Grouping, Gamma: np.ndarray) -> tuple[np.ndar
 def error_matrices(on: OnMotion, z: Coordinates, factor: float = 1.0) -> np.ndarray:
     """A of z' = A z at the instants, (T, size, size), with Gamma times a factor."""
     A = np.zeros((len(on.t), z.size, z.size))
-    parts, controller = z.parts, z.controller
-    whole = {name: slice(part[0].start, part[-1].stop) for name, part in parts.items()}
-    S, m = controller.cell.coupling.matrix, controller.cell.m
-    to_sigma = np.hstack([S.T @ S, -S.T @ S @ S.T @ z.B])  # sigma = S^T S e* - beta S^T S S^T B i
-    beta = np.stack([np.ones(m), controller.beta])[np.repeat([0, 1], [len(S.T), z.B.shape[1]])]
-    for i, (s, u, e) in enumerate(zip(parts["s"], parts["u"], parts["e*"], strict=True)):
-        M_inv = np.linalg.inv(on.M[:, i])
-        Y = np.sqrt(factor) * on.Y[:, i][:, :, z.groupings[i].columns] @ z.L[i]
-        A[:, s, s] = -M_inv @ on.D[:, i]
+    parts, gains, S = z.parts, z.controller, z.controller.cell.coupling.matrix
+    e, (i,), one = slice(parts["e*"][0].start, parts["e*"][-1].stop), parts["i"], np.eye(len(z.acting))
+    to_e, to_i = np.kron(S.T @ S, one), -np.kron(S.T @ S @ S.T @ z.B, np.diag(gains.beta)[:, z.acting])
+    sigma = np.hstack([to_e, to_i]).reshape(len(S.T), len(one), -1)  # S^T S e* - beta S^T S S^T B i
+    for k, (s, u, own) in enumerate(zip(parts["s"], parts["u"], parts["e*"], strict=True)):
+        M_inv = np.linalg.inv(on.M[:, k])
+        Y = np.sqrt(factor) * on.Y[:, k][:, :, z.groupings[k].columns] @ z.L[k]
+        A[:, s, s] = -M_inv @ on.D[:, k]
         A[:, s, u], A[:, u, s] = M_inv @ Y, -Y.mT
-        A[:, e, s] = on.J_c[:, i]
-        force = M_inv @ (on.J_c[:, i].mT * controller.K_eps)  # per axis, from sigma
-        shares = np.einsum("tja,k,ka->tjka", force, to_sigma[i], beta)
-        A[:, s, whole["e*"].start :] = -shares.reshape(len(A), s.stop - s.start, -1)
-    A[:, whole["e*"], whole["e*"]] = np.diag(np.tile(-controller.Lambda, len(S.T)))
-    A[:, whole["i"], whole["e*"]] = np.kron(z.B.T @ S, np.eye(m))
-    A[:, whole["i"], whole["i"]] = -np.kron(z.B.T @ S @ S.T @ z.B, np.diag(controller.beta))
-    A[:, whole["i"], whole["i"]] -= np.diag(np.tile(controller.leak, z.B.shape[1]))
+        A[:, s, e.start :] = -M_inv @ on.J_c[:, k].mT @ (gains.K_eps[:, None] * sigma[k])
+        A[:, own, s] = on.J_c[:, k]
+    A[:, e, e] = -np.diag(np.tile(gains.Lambda, len(S.T)))
+    A[:, i, e] = np.kron(z.B.T @ S, one[z.acting])
+    A[:, i, i] = -np.kron(z.B.T @ S @ S.T @ z.B, np.diag(gains.beta[z.acting]))
+    A[:, i, i] -= np.diag(np.tile(gains.leak[z.acting], z.B.shape[1]))
     return A

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 
 from ..analysis.certify import Certificate
 from ..analysis.dissipation import SEEN, Dissipation
+from ..simulation.result import Result
+from .promised_errors import promised_errors
+from .promised_rates import promised_rates
 from .report import Block, Points, Section, Table, Text, number
+from .reproduction import PLANNED
 
 #: the runs of which it is told
 PROMISED = (
@@ -19,19 +24,37 @@ PROMISED = (
     "planar_four_synchronized_disturbed",
     "planar_four_independent_disturbed",
 )
+#: the cells whose synchronized runs are told in full
+CELLS = "a460_pair", "planar_four"
 TITLE = "What the run's certificate promises"
 
 
-def promises_section(certificates: Mapping[str, Certificate]) -> Section:
-    """What the certificate of each run says, and what Theorem A bounds beside what it was.
+def promises_section(
+    certificates: Mapping[str, Certificate], runs: Mapping[str, Result], folder: Path
+) -> Section:
+    """What certificates and the three theorems say of the runs, beside what they did.
 
     Args:
         certificates: by name of the run; those of `PROMISED` are told.
+        runs: by name, `PLANNED`.
+        folder: where figures go.
     """
+    a460, planar = (
+        {name.removeprefix(cell): run for name, run in runs.items() if name.startswith(cell)}
+        for cell in ("a460_pair_", "planar_four_")
+    )
+    blocks = promised_means(certificates)
+    for cell in CELLS:
+        name = f"{cell}_synchronized"
+        blocks += promised_errors(runs[name], PLANNED[name].make(), folder / f"modal_{cell}")
+    return Section(TITLE, (*blocks, *promised_rates(a460, planar, folder / "rates_over_gamma")))
+
+
+def promised_means(certificates: Mapping[str, Certificate]) -> list[Block]:
+    """What the certificate of each run says, and what Theorem A bounds beside what it was."""
     told = {name: certificates[name] for name in PROMISED if name in certificates}
-    blocks: list[Block] = [Text(_ABOUT), Points(tuple(said(each) for each in told.values()))]
-    blocks += [Text(_THEOREM_A), dissipation_table(told)]
-    return Section(TITLE, tuple(blocks))
+    points = Points(tuple(said(each) for each in told.values()))
+    return [Text(_ABOUT), points, Text(_THEOREM_A), dissipation_table(told)]
 
 
 def said(certificate: Certificate) -> str:
