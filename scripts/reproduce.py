@@ -20,12 +20,13 @@ from synctrl.analysis.consistency import Consistency
 from synctrl.analysis.convergence import Identification, identify
 from synctrl.analysis.metrics import as_data, metrics, settling_bands, write_metrics
 from synctrl.errors import SynctrlError
+from synctrl.experiments.a460_pair import DURATION
 from synctrl.paper.bodies import bodies_are_left, bodies_of, bodies_section
 from synctrl.paper.carry_task import CARRY
-from synctrl.paper.claims import Claim
+from synctrl.paper.claims import Claim, tally
 from synctrl.paper.claims_of_cells import a460_claims, own_findings, planar_four_claims
 from synctrl.paper.edge_task import EDGE
-from synctrl.paper.fairness import another_law_does_better, fair_section
+from synctrl.paper.fairness import another_law_does_better, fair_section, what_parts_do
 from synctrl.paper.judge import judge_section
 from synctrl.paper.margin_section import margin_section
 from synctrl.paper.network_section import NETWORK
@@ -43,10 +44,12 @@ from synctrl.paper.plant_sections import (
     identification_section,
     step_section,
 )
+from synctrl.paper.promises_section import promises_section
 from synctrl.paper.report import Links, Section, write_page
 from synctrl.paper.reproduction import PLANNED, PlannedRun, judge_runs, judged, run_all
 from synctrl.paper.tasks import planned_runs, runs_of, task_section
 from synctrl.paper.theory import certificate_section, examine
+from synctrl.paper.value_grid import grid_section, judge_grid
 from synctrl.show.animation import payload_pair_scene, planar_scene
 from synctrl.show.style import display
 from synctrl.simulation.result import Result
@@ -73,7 +76,11 @@ def main() -> int:
     parser.add_argument("--workers", type=count, default=2, help="number of processes")
     parser.add_argument("--quick", action="store_true", help="no more than a second of every run, as a trial")
     options = parser.parse_args()
-    planned = {**PLANNED, **planned_runs(TASKS), **judge_runs()}
+    planned = {
+        **{name: run.possible() for name, run in PLANNED.items()},
+        **planned_runs(TASKS),
+        **judge_runs(),
+    }
     if options.quick:
         planned = {name: run.shortened(TRIAL) for name, run in planned.items()}
     limit = 0.1 * TRIAL if options.quick else float("inf")
@@ -107,6 +114,8 @@ def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun], limit:
     with ThreadPoolExecutor(1) as background:
         examined = background.submit(examine, out / "runs", out / "figures", workers, limit=limit)
         sections, bodies, learned = drawn(runs, out), bodies_of(runs), identified(runs)
+        tried = min(DURATION, limit)
+        grid = judge_grid(tried)
         certificates, compared = examined.result()
     claims, own = papers_claims(runs), our_findings(runs, bodies[BODIES], compared["planar_four"][0])
     found, tasks = of_tasks(every, out)
@@ -116,10 +125,12 @@ def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun], limit:
         *sections,
         *tasks,
         margin_section(out),
-        honesty_section(own),
+        honesty_section(own, what_parts_do(compared["planar_four"][1])),
+        grid_section(grid, tried),
         bodies_section(bodies, BODIES, out / "figures" / "bodies"),
         identification_section(learned),
         *(fair_section(*pair, out / "figures" / f"fair_{name}") for name, pair in compared.items()),
+        promises_section(certificates, runs, out / "figures"),
         certificate_section(certificates, out / "figures"),
         judge_section(judged(every), out / "figures"),
         step_section(runs),
@@ -127,15 +138,14 @@ def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun], limit:
     write_metrics(
         out / "metrics.json",
         {n: as_data(run, metrics(run, settling_bands(*peers(every, n)))) for n, run in every.items()},
-        [asdict(claim) for claim in checked],
+        [{**asdict(claim), "ours": claim.ours} for claim in checked],
         certificates={name: certificate.as_dict() for name, certificate in certificates.items()},
         comparisons={name: [each.as_dict() for each in pair] for name, pair in compared.items()},
         consistency={name: each.as_dict() for name, each in bodies.items()},
         identification={title: [robot.as_dict() for robot in robots] for title, robots in learned.items()},
     )
     print_table(runs)
-    held = sum(claim.holds for claim in checked)
-    print(f"\n{held} of {len(checked)} claims hold; the page says which do not, and why.")
+    print(f"\n{tally(checked)} The page says which do not, and why.")
     return write(out / "index.html", sections, max(run.t[-1] for run in runs.values()))
 
 
@@ -159,10 +169,10 @@ def our_findings(runs: Mapping[str, Result], bodies: Consistency, laws: Comparis
 def drawn(runs: Mapping[str, Result], out: Path) -> list[Section]:
     """The sections of the experiments."""
     a460, planar = select(runs, "a460_pair_"), select(runs, "planar_four_")
-    layout, figures = PLANNED["planar_four_synchronized"].make(), out / "figures"
+    (pair, four), figures = (PLANNED[f"{cell}_synchronized"].make() for cell in SCENES), out / "figures"
     return [
-        a460_section(a460, figures, animations(runs, out, "a460_pair")),
-        planar_section(planar, layout, figures, animations(runs, out, "planar_four")),
+        a460_section(a460, pair, figures, animations(runs, out, "a460_pair")),
+        planar_section(planar, four, figures, animations(runs, out, "planar_four")),
         full_a460_section(a460, figures),
         friction_section(a460, figures),
     ]

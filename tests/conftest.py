@@ -1,13 +1,19 @@
-"""What all tests share: figures without a display, and repeatable random inputs."""
+"""What all tests share: figures without a display, repeatable random inputs, meshes that are read once."""
 
 from __future__ import annotations
 
+import gc
 import os
+import sysconfig
+from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
+import synctrl.robots.urdf.meshes as checking
+import synctrl.show.meshes as drawing
 from synctrl.experiments import a460_pair, planar_four
 
 os.environ.setdefault("MPLBACKEND", "Agg")
@@ -21,6 +27,26 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("synctrl")
+
+INSTALLED = Path(sysconfig.get_path("purelib"))
+
+
+def pytest_configure(config):
+    """Files of installed packages stay as they are while tests run: each of their meshes is read once."""
+    patch = pytest.MonkeyPatch()
+    config.add_cleanup(patch.undo)
+    patch.setattr(checking, "_fault", once_if_installed(checking._fault))
+    patch.setattr(drawing, "read_mesh", once_if_installed(drawing.read_mesh))
+
+
+def pytest_collection_finish():
+    """Modules and collected tests stay to the end: garbage is not looked for among them."""
+    gc.freeze()
+
+
+def once_if_installed(look: Callable) -> Callable:
+    known = cache(look)
+    return lambda file: (known if file.is_relative_to(INSTALLED) else look)(file)
 
 
 @pytest.fixture(scope="session")

@@ -11,6 +11,7 @@ from synctrl.analysis.convergence import convergence, identify
 from synctrl.analysis.gain_condition import gain_condition
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.analysis.metrics import as_data, metrics, row_names, settling_bands
+from synctrl.analysis.modal import modal_bounds
 from synctrl.errors import SynctrlError
 from synctrl.paper.judge import compare_runs, differences
 from synctrl.paper.plant_sections import step_section
@@ -25,6 +26,7 @@ from synctrl.show.animation import (
 )
 from synctrl.show.layout import cell_layout
 from synctrl.show.lyapunov_plots import lyapunov_figure
+from synctrl.show.modal_figures import modal_figure
 from synctrl.show.plots import common_limits, joint_trajectories, sync_errors, tracking_errors
 from synctrl.show.run_figures import estimates, paths, torques
 
@@ -39,6 +41,7 @@ FIGURES: dict[str, Callable[[Any, Any], Any]] = {
     "paths": lambda r, e: paths(r),
     "estimates": lambda r, e: estimates(r),
     "lyapunov_figure": lambda r, e: lyapunov_figure(lyapunov(r, e)),
+    "modal_figure": lambda r, e: modal_figure(modal_bounds(r, e)),
 }
 SCENES: dict[str, Callable[[Any, Any], Any]] = {
     "planar_scene": planar_scene,
@@ -55,6 +58,7 @@ OTHERS: dict[str, Callable[[Any, Any], Any]] = {
     "row_names": lambda r, e: row_names(r, "sync_error"),
     "error_colors": lambda r, e: error_colors(r),
     "compare_runs": lambda r, e: compare_runs(r, r),
+    "modal_bounds": lambda r, e: str(modal_bounds(r, e)),
     "certify": lambda r, e: str(certify(r, e)),
     "convergence": convergence,
     "gain_condition": gain_condition,

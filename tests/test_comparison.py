@@ -137,13 +137,17 @@ def test_laws_that_are_none_or_have_the_same_name_are_refused() -> None:
 
 def test_the_verdict_follows_the_numbers(found: Comparison) -> None:
     ours, row = found.rows[0], rows(found, "alone")["equal pole"]
-    worse = replace(row.quiet, tracking_rms=4 * ours.quiet.tracking_rms, sync_rms=8 * ours.quiet.sync_rms)
-    better = replace(row.quiet, tracking_rms=ours.quiet.tracking_rms / 4, sync_rms=ours.quiet.sync_rms / 8)
-    for sizes, word in ((worse, "larger"), (better, "smaller")):
-        changed = [ours, replace(row, quiet=sizes)]
+    factors = {"tracking_rms": 4.0, "tracking_peak": 3.0, "sync_rms": 8.0, "sync_peak": 5.0}
+    for power, word in ((1, "larger"), (-1, "smaller")):
+        sizes = {name: factor**power * getattr(ours.quiet, name) for name, factor in factors.items()}
+        changed = [ours, replace(row, quiet=replace(row.quiet, **sizes))]
         (first,) = sentences(changed, ["quiet"])
-        assert f"e 4 times {word}" in first and f"ε 8 times {word}" in first
+        for said in ("RMS e 4", "peak e 3", "RMS ε 8", "peak ε 5"):
+            assert f"{said} times {word}" in first
         assert summary(changed, ["quiet"]).startswith("Better") == (word == "smaller")
+        for peak in ("tracking_peak", "sync_peak"):
+            sizes_with_peak = replace(row.quiet, **sizes | {peak: 2 * getattr(ours.quiet, peak)})
+            assert not summary([ours, replace(row, quiet=sizes_with_peak)], ["quiet"]).startswith("Better")
     missing = [ours, rows(found, "not damped")["equal peak torque"]]
     assert not summary(missing, ["quiet"]).startswith("Better")  # what could not be run is not better
 

@@ -70,7 +70,7 @@ def test_a_run_that_a_theorem_covers_is_certified_and_says_which(network, gains,
 )
 def test_a_run_that_no_theorem_covers_is_outside_and_says_why(network, gains, options, reason):
     found = certificate(network, gains, **options)
-    assert found.verdict == "outside the theorem" and found.delay_condition.theorem is None
+    assert not found.certified and found.delay_condition.theorem is None
     assert reason in found.delay_condition.reason
     assert any(found.delay_condition.reason in words for words in found.outside)
 
@@ -159,7 +159,7 @@ def test_v_does_not_jump_at_messages_of_the_filter_and_of_delays(network):
     ids=["delays", "filter", "hold", "extrapolate"],
 )
 def test_with_integrals_that_leak_v_changes_by_its_powers_too(network, bound):
-    record = lyapunov(pair(network, GAINS.replace(leak=2.0)).simulate(0.05, 5e-4))
+    record = lyapunov(pair(network, GAINS.replace(leak=2.0)).simulate(0.03, 2.5e-4))
     assert (np.abs(record.power["other"]) <= record.rounding).all()
     assert record.largest_drift < bound
 
@@ -195,7 +195,7 @@ def test_injection_makes_the_condition_hold_by_itself():
     without, made = (
         replace(pair(UNEQUAL, WEAK), law=law).simulate(0.03, 1e-3) for law in (SunMills(), INJECTION)
     )
-    assert not delay_condition(without).holds and certify(without).verdict == "outside the theorem"
+    assert not delay_condition(without).holds and certify(without).verdict == "bounded by Theorem A"
     assert delay_condition(made).margin == pytest.approx(0.05) and certify(made).certified
 
 

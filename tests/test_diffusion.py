@@ -157,7 +157,7 @@ def test_v_alone_may_be_given_power_and_the_certificate_says_whose():
     found = certify(pair(Network(delay=UNEQUAL)).simulate(0.03, 1e-3))
     record = found.lyapunov
     assert record.closes and (np.abs(record.power["other"]) <= record.rounding).all()
-    assert found.verdict == "outside the theorem" and DIFFUSION not in record.inside
+    assert found.verdict == "bounded by Theorem A" and DIFFUSION not in record.inside
     assert found.delay_condition.theorem is None and found.doubts == ()
 
 

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from held import carried_along, evaluate_held
+from scipy.integrate import cumulative_simpson
 from scipy.optimize import brentq
 from theory_cells import GAINS, coupling, experiment, planar_arm
 
-from synctrl import Cell, Coupling, Experiment, Friction, FunctionTrajectory, Hold, Member
+from synctrl import Cell, Coupling, Disturbance, Experiment, Friction, FunctionTrajectory, Hold, Member
 from synctrl.analysis import certify
 from synctrl.analysis.gain_condition import margins, rate_matrix
 from synctrl.analysis.lyapunov import first_growth, lyapunov
@@ -22,6 +23,7 @@ from synctrl.errors import SimulationError, SynchronizationError, UnreachableErr
 from synctrl.experiments import a460_pair, carry_ur5, planar_four
 from synctrl.experiments.a460_pair import FINAL, INITIAL
 from synctrl.experiments.carry import GAINS as CARRY
+from synctrl.experiments.mobile_robot import heading, radius
 from synctrl.experiments.planar_four import Q0, TURN, D, R
 from synctrl.experiments.quadratic import quadratic_analysis
 from synctrl.simulation.closed_loop import ClosedLoop
@@ -67,6 +69,18 @@ def test_02_condition_18_compares_with_the_wrong_eigenvalue() -> None:
     assert printed <= 1.0 < corrected  # (18) holds, the quadratic form is positive all the same
     assert margin < 0
     assert margins(B, np.full(2, 1.01 * corrected))[0] > 0
+
+
+@pytest.mark.parametrize("space", ["joint", "task"])
+def test_02_condition_18_is_right_but_for_its_sign_where_c_is_a_number(space: str) -> None:
+    """c = gamma 1: B = -(gamma'/gamma) H is symmetric in the coordinates of H, whichever they are."""
+    gamma, gamma_dot, J = 1.7, -0.8, np.array([[1.2, 0.3], [-0.4, 0.9]])
+    H, identity = np.array([[2.0, 1.9], [1.9, 2.0]]), np.eye(2)
+    maps = (J, np.linalg.inv(J)) if space == "joint" else (identity, identity)
+    B = rate_matrix(H, identity / gamma, gamma_dot * identity, *maps)
+    _, corrected, printed = margins(B, np.ones(2))
+    assert printed == pytest.approx(corrected)
+    assert margins(B, np.full(2, printed))[0] == pytest.approx(0)  # equality, as (18) allows: V' may be 0
 
 
 def test_02_joint_damping_must_be_compared_in_joint_coordinates() -> None:
@@ -152,6 +166,16 @@ def test_06_where_time_enters_zero_is_not_reached_although_v_dot_is_zero_only_th
     assert x[-1] == pytest.approx(1 / np.e)
 
 
+@pytest.mark.parametrize("n", [2, 3, 4, 5])
+@pytest.mark.parametrize("kind", ["ring", "signed graph", "all-to-all"])
+def test_06_the_step_for_which_lasalle_is_called_is_algebra(n: int, kind: str) -> None:
+    """e* = 0 and epsilon = 0 at one instant leave no w, whatever moved before: no invariant set is needed."""
+    S = coupling(kind if n > 2 else "pair", n, 1).matrix
+    beta, reached = 2.0, np.linalg.svd(S)[0][:, : np.linalg.matrix_rank(S)]  # I stays in the range of S
+    system = np.block([[np.eye(n), beta * S.T @ reached], [S, np.zeros((len(S), reached.shape[1]))]])
+    assert np.linalg.matrix_rank(system) == n + reached.shape[1]  # e*, epsilon -> w, I
+
+
 @pytest.mark.parametrize("n", [3, 5, 7, 9])
 def test_07_an_odd_ring_has_no_synchronized_motion_and_a_signed_ring_has(n: int) -> None:
     odd, signed = Coupling.ring(n), Coupling.signed_ring(n)
@@ -192,6 +216,16 @@ def test_09_example_3_has_second_order_coefficients_of_one_and_weights_without_i
     assert expansion.c.shape == (2, 1, 2)  # row vectors
     assert not expansion.invertible
     assert analysis.refusal
+
+
+def test_09_example_3_is_not_linear_and_assumption_1_excludes_it() -> None:
+    one, other = rng.normal(size=(2, 2, 2))
+
+    def f(x: np.ndarray) -> float:
+        return float((x**2).sum()) - 1.0
+
+    middle = f((one + other) / 2) - (f(one) + f(other)) / 2  # 0 for what Assumption 1 calls linear
+    assert middle == pytest.approx(-((one - other) ** 2).sum() / 4)
 
 
 def test_10_scaling_f_scales_epsilon_and_by_its_square_k_eps() -> None:
@@ -249,6 +283,15 @@ def test_11_a_literal_force_is_no_torque_and_takes_power_that_the_proof_does_not
     assert np.vdot(s.s_q, force) != pytest.approx(power, rel=0.1)
 
 
+def test_11_as_forces_along_x_all_of_13_fits_together_and_is_our_law_with_k_r_in_task_space() -> None:
+    run = replace(planar_four(), k_r_space="task")
+    _, s = evaluate(run, q=Q0 + rng.uniform(-0.05, 0.05, (4, 2)))
+    model = np.vecmat(np.matvec(s.Y, s.theta_hat), np.linalg.inv(s.task.J))  # H_x c^-1 (...) + C_x c^-1 u
+    slip = np.matvec(s.reference.c_inv, s.r)
+    along_x = model + run.gains.K_r * slip + np.vecmat(run.gains.K_eps * s.sigma, s.reference.c)
+    np.testing.assert_allclose(np.vecmat(along_x, s.task.J), s.tau, rtol=1e-9)
+
+
 def test_12_the_estimate_does_not_enter_the_kinematics() -> None:
     run = planar_four()
     _, right = evaluate(run, theta_hat=run.cell.theta)
@@ -288,8 +331,8 @@ def in_other_time_unit(a: float, power: int) -> np.ndarray:
 def test_13_k_eps_is_a_torque_per_angle_not_per_angle_and_second() -> None:
     seconds, milliseconds = in_other_time_unit(1.0, 2), in_other_time_unit(1000.0, 2)
     np.testing.assert_allclose(milliseconds, seconds, rtol=1e-10)  # N·m/rad
-    as_printed = in_other_time_unit(1000.0, 3)  # N·m/(rad·s) gives another motion
-    assert np.abs(as_printed - seconds).max() > 1e-6
+    for power in (1, 3):  # the print may be read as N·m·s/rad or as N·m/(rad·s): both give another motion
+        assert np.abs(in_other_time_unit(1000.0, power) - seconds).max() > 1e-6
 
 
 def test_13_with_weights_in_metres_epsilon_is_in_square_metres() -> None:
@@ -316,6 +359,20 @@ def test_14_a_robot_needs_the_errors_of_its_neighbours_and_nothing_else() -> Non
         assert np.abs(shaken(name, [4])[0] - base.tau[0]).max() > 1e-6
 
 
+def test_14_of_its_neighbours_a_robot_needs_the_weights_too() -> None:
+    link = coupling("ring", 5, 2, "constant")
+    c = link.weights(np.zeros(1), 2).c[0]
+
+    def torque(changed: int | None) -> np.ndarray:
+        own = c.copy()
+        own[changed] *= 1.1
+        other = Coupling(5, link.edges, link.signs, c if changed is None else own)
+        return evaluate(experiment(other))[1].tau[0]
+
+    np.testing.assert_array_equal(torque(2), torque(None))
+    assert all(np.abs(torque(i) - torque(None)).max() > 1e-6 for i in (1, 4))
+
+
 def test_15_the_desired_difference_of_the_two_robots_is_not_constant() -> None:
     difference = np.rad2deg([INITIAL[0, 0] - INITIAL[1, 0], FINAL[0, 0] - FINAL[1, 0]])
     np.testing.assert_allclose(difference, [58.1, 93.0], atol=0.05)
@@ -325,14 +382,23 @@ def test_15_the_desired_difference_of_the_two_robots_is_not_constant() -> None:
         same.coupling(paths, 2.0)
 
 
-def at_rest(friction: Friction, duration: float = 2.0):
+def test_15_the_desired_cubics_move_the_wrists_apart_on_the_way() -> None:
+    """Straight in joint space, they carry a payload whose length would have to change by a centimetre."""
+    members = a460_pair().cell.members
+    times = np.linspace(0.0, 2.0, 41)
+    wrists = np.array([[m.robot.tip_position(m.trajectory(t).x) for m in members] for t in times])
+    length = np.linalg.norm(wrists[:, 1] - wrists[:, 0], axis=1)
+    assert np.ptp(length) == pytest.approx(10.5e-3, abs=1e-4)
+
+
+def at_rest(friction: Friction, duration: float = 2.0, **changes: float):
     """A pair that is to hold its place, started off it."""
     arm = planar_arm(1)
     members = [
         Member(arm, Hold([0.3]), [q], theta_hat0=arm.inertial_parameters, friction=friction)
         for q in (0.2, 0.34)
     ]
-    gains = GAINS.replace(K_r=2.0, Gamma=1e-6)
+    gains = GAINS.replace(**{"K_r": 2.0, "Gamma": 1e-6, **changes})
     return Experiment(Cell(members, Coupling.pair()), gains, duration).simulate(dt=2.5e-3)
 
 
@@ -352,6 +418,14 @@ def test_16_the_integral_of_epsilon_vanishes_so_epsilon_changes_its_sign() -> No
     assert np.sign(epsilon[0]) == np.sign(integral[np.abs(integral).argmax()])
     overshoot = -np.sign(epsilon[0]) * epsilon
     assert overshoot.max() > 0.01 * np.abs(epsilon).max()
+
+
+def test_16_without_beta_nothing_forces_epsilon_to_change_its_sign() -> None:
+    result = at_rest(Friction(), 3.0, beta=0.0, K_eps=0.0, K_r=8.0)
+    epsilon = result.sync_error[:, 0, 0]
+    assert np.abs(epsilon[-1]) < 1e-3 * np.abs(epsilon[0])
+    assert (np.sign(epsilon) == np.sign(epsilon[0])).all()
+    assert result.sync_integral[-1, 0, 0] * np.sign(epsilon[0]) > 0.1 * np.abs(epsilon[0])
 
 
 def test_17_table_2_contradicts_the_text_and_its_weights() -> None:
@@ -451,6 +525,57 @@ def test_22_the_integral_turns_an_error_of_the_geometry_into_the_whole_force_of_
 
     added = np.linalg.norm(inside(error) - inside(0.0))
     assert added == pytest.approx(stiffness / 2 * abs(error), rel=0.05)
+
+
+def test_23_the_two_forms_of_example_2_differ_by_a_factor_that_changes_with_time() -> None:
+    """x_1/R_1 - x_2/R_2 = 0 and R_2 x_1 - R_1 x_2 = 0 are one task, with weights R_1 R_2 apart."""
+    R_1, R_2 = (radius(np.linspace(0, 4, 9), wheel)[0] for wheel in (0, 1))
+    fractions, products = np.array([-1 / R_1, 1 / R_2]), np.array([-R_2, R_1])  # c = -df/dx, (5)
+    factor = products / fractions
+    np.testing.assert_allclose(factor, [R_1 * R_2] * 2)
+    assert np.ptp(factor) > 0.5 * factor.min()  # no constant, as in erratum 10: c' and (18) differ too
+
+
+def test_23_displacements_satisfy_example_2_with_mean_radii_and_not_with_radii_of_curvature() -> None:
+    """A vehicle that turns by theta on a curve of radii R_i(t): x_i' = R_i theta'."""
+    t = np.linspace(0, 4, 4001)
+    theta, theta_dot = heading(t)[:2]
+    R = np.array([radius(t, wheel)[0] for wheel in (0, 1)])
+    way = cumulative_simpson(R * theta_dot, x=t, initial=0.0)
+    assert np.abs(np.subtract(*way / R)[-1]) > 1e-2 * theta[-1]
+    mean = way[:, 1:] / theta[1:]  # as the cell of example 2 takes R_i: both wheels are then at theta
+    np.testing.assert_allclose(np.subtract(*way[:, 1:] / mean), 0, atol=1e-12)
+
+
+def test_24_what_is_not_in_y_theta_keeps_its_power_and_can_make_v_grow() -> None:
+    """(22) cancels Y tilde. A torque d from outside has the power -s_q d, and nothing cancels that."""
+    link, push = coupling("ring", 4, 2), Disturbance(0, -60.0, 0.01, 0.03)
+    pushed = lyapunov(experiment(link, disturbances=(push,)).simulate(0.04, 1e-3))
+    growth = first_growth(pushed)
+    assert growth is not None and growth.term == "disturbance"
+    assert first_growth(lyapunov(experiment(link).simulate(0.04, 1e-3))) is None
+
+
+@pytest.mark.parametrize("n", [3, 4, 5, 6])
+def test_25_equation_27_demands_n_minus_1_equations_or_n_where_the_task_has_one(n: int) -> None:
+    whole, divided = Coupling.sum(n), Coupling.ring(n)
+    assert np.linalg.matrix_rank(whole.matrix) == 1  # (6)
+    assert np.linalg.matrix_rank(divided.matrix) == n - 1 + n % 2  # (27)
+    w = np.zeros((n, 1))
+    w[:2, 0] = 1.0, -1.0  # c_1 e_1 + c_2 e_2 = 0: the task is kept
+    assert not whole.compare(w).any()
+    assert divided.compare(w).any()  # and (27) asks for more
+
+
+def test_26_arms_that_hold_one_object_feel_a_wrench_that_8_does_not_have() -> None:
+    run = carry_ur5()
+    moved, twist = np.random.default_rng(0).normal(size=(2, 6)) * [[0.02], [0.1]]
+    q, v = carried_along(run, moved, twist)
+    y_dot, s = evaluate_held(run, q, v)
+    v_dot = run.closed_loop().split(y_dot)[1]
+    arms = run.plant_type.keywords["robots"]
+    needed = np.array([arm.inverse_dynamics(*state) for arm, *state in zip(arms, q, v, v_dot, strict=True)])
+    assert np.abs(needed - s.tau).max() > 1.0  # N·m, of the object on the arms
 
 
 def test_what_the_paper_calls_asymptotic_holds_with_any_of_beta_and_k_eps_switched_off() -> None:

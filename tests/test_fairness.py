@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,20 +18,24 @@ from synctrl.analysis.trial_rows import AS_GIVEN, Row
 from synctrl.control.adaptation import Gradient
 from synctrl.control.laws import ChungSlotine, SlotineLi
 from synctrl.errors import InputError
-from synctrl.experiments import planar_four
+from synctrl.experiments import a460_pair, planar_four
 from synctrl.paper.fairness import (
+    AS_MUCH_TORQUE,
     FAIR,
+    STIFF,
+    STIFFEST,
     TORQUE,
     another_law_does_better,
+    as_much_torque,
     compare_laws,
     compare_parts,
     fair_section,
     taken_apart,
+    what_parts_do,
 )
 from synctrl.paper.report import write_page
 
 SHORT = {"duration": 0.05, "dt": 1e-3}
-STIFF = "Λ + β for Λ, without β and K_ε"
 
 
 def small() -> Experiment:
@@ -52,7 +57,7 @@ def test_every_combination_of_the_parts_is_tried_once_and_named() -> None:
         name: tuple(bool(np.any(getattr(run.gains, gain))) for gain in ("beta", "K_eps", "Gamma"))
         for name, run in made.items()
     }
-    del on[STIFF]
+    del on[STIFF], on[STIFFEST]
     assert len(set(on.values())) == len(on) == 8
     assert next(iter(on)) == "β + K_ε + adaptation"
     assert on["none of them"] == (False, False, False)
@@ -64,13 +69,47 @@ def test_every_combination_of_the_parts_is_tried_once_and_named() -> None:
 def test_what_learns_by_a_part_of_ones_own_is_taken_apart_without_it() -> None:
     gains = small().gains.replace(Gamma=None)
     made = taken_apart(replace(small(), gains=gains, adaptation=Gradient(0.3)))
-    assert [*made] == ["β + K_ε", "β", "K_ε", "none of them", STIFF]
+    assert [*made] == ["β + K_ε", "β", "K_ε", "none of them", STIFF, STIFFEST]
 
 
 def test_the_stiff_controller_is_independent_and_has_lambda_plus_beta() -> None:
     gains = taken_apart(planar_four())[STIFF].gains
     assert not gains.beta.any() and not gains.K_eps.any()
     assert gains.Lambda == planar_four().gains.Lambda + planar_four().gains.beta
+
+
+@pytest.mark.parametrize(("make", "most"), [(planar_four, 410.0), (a460_pair, 24.0)])
+def test_the_stiffest_controller_has_the_largest_gain_that_synchronization_has(make, most: float) -> None:
+    """In the direction in which S'S has its largest eigenvalue, u is Lambda + beta lambda times the error."""
+    whole = make()
+    S, gains = whole.cell.coupling.matrix, whole.gains
+    _, vectors = np.linalg.eigh(S.T @ S)
+    gain = gains.Lambda * vectors[:, -1] + gains.beta * (S.T @ (S @ vectors[:, -1]))
+    stiffest = taken_apart(whole)[STIFFEST].gains
+    np.testing.assert_allclose(gain, stiffest.Lambda * vectors[:, -1], atol=1e-9)
+    assert not stiffest.beta.any() and not stiffest.K_eps.any()
+    assert stiffest.Lambda == pytest.approx(most)
+
+
+def test_with_as_much_torque_under_friction_the_rms_of_epsilon_and_its_peak_say_opposite_things() -> None:
+    whole, options = a460_pair(), {"duration": 0.8, "engine": "compiled"}
+    made = {"whole": whole, **as_much_torque(whole, **options)}
+    found = side_by_side(made, **options)
+    ours, alone = (row.disturbed for row in found.rows)
+    assert alone.peak_torque == pytest.approx(ours.peak_torque, rel=1e-2)
+    assert ours.sync_rms < alone.sync_rms
+    assert ours.sync_peak > alone.sync_peak
+    (sentence,) = found.sentences
+    said = sentence.partition("disturbed, ")[2]
+    assert re.search(r"RMS ε [\d.]+ times larger, peak ε [\d.]+ times smaller", said)
+    assert found.rows[1].law == AS_MUCH_TORQUE
+
+
+def test_what_the_parts_do_is_said_from_the_numbers(parts: Comparison) -> None:
+    assert "Most is done by β." in what_parts_do(parts)
+    swapped = {"β": rows(parts)["K_ε"].quiet, "K_ε": rows(parts)["β"].quiet}
+    others = tuple(replace(row, quiet=swapped.get(row.law, row.quiet)) for row in parts.rows)
+    assert "Most is done by K_ε." in what_parts_do(replace(parts, rows=others))
 
 
 def test_an_independent_controller_with_lambda_110_tracks_better_than_the_papers(parts: Comparison) -> None:
@@ -99,7 +138,13 @@ def laws() -> Comparison:
 def better_by(laws: Comparison, tracking: float, sync: float) -> Comparison:
     ours, *others = laws.rows
     sizes = ours.disturbed
-    sizes = replace(sizes, tracking_rms=sizes.tracking_rms / tracking, sync_rms=sizes.sync_rms / sync)
+    sizes = replace(
+        sizes,
+        tracking_rms=sizes.tracking_rms / tracking,
+        tracking_peak=sizes.tracking_peak / tracking,
+        sync_rms=sizes.sync_rms / sync,
+        sync_peak=sizes.sync_peak / sync,
+    )
     return replace(laws, rows=(ours, *(replace(row, disturbed=sizes) for row in others)))
 
 
@@ -114,6 +159,16 @@ def test_another_law_does_better_if_both_errors_are_smaller(laws: Comparison, tr
     assert figures["quiet peak torque, SlotineLi"] == pytest.approx(
         figures["quiet peak torque, SunMills"], rel=1e-2
     )
+
+
+@pytest.mark.parametrize("size", ["tracking_peak", "sync_peak"])
+def test_a_law_with_a_larger_peak_does_not_do_better(laws: Comparison, size: str) -> None:
+    better = better_by(laws, 2.0, 2.0)
+    ours, *others = better.rows
+    peaks = tuple(
+        replace(r, disturbed=replace(r.disturbed, **{size: getattr(ours.disturbed, size)})) for r in others
+    )
+    assert not another_law_does_better(replace(better, rows=(ours, *peaks)), "SlotineLi").holds
 
 
 def test_under_the_push_another_law_does_better_at_equal_quiet_peak_torque() -> None:

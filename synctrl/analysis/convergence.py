@@ -1,13 +1,8 @@
 """What converged in a run: errors, with the identity behind the last step, and what it learned of its robots.
 
-That errors converge says nothing about parameters: they converge only as far as the motion excites them. Near
-s' = 0 the controller's balance is Y tilde = D s with the damping D, and adaptation then gives
-
-    tilde_b' = - Gamma_b Y_b^T D^-1 Y_b tilde_b,   Gamma_b = K Gamma K^T
-
-for the base parameters theta_b = K theta. The eigenvalues of Gamma_b^1/2 (int Y_b^T D^-1 Y_b dt) Gamma_b^1/2
-are numbers without unit, one per direction: how many times its error had the time to fall by e. What they
-support is an estimate, no proof, and nothing else is claimed here about convergence of parameters.
+That errors converge says nothing about parameters: they converge only as far as the motion excites them.
+What is said here of them is measured: how much of the error of every base parameter, theta_b = K theta, is
+left at the end of the run. How fast it will go on falling, and how to choose Gamma, says `exponential_rate`.
 """
 
 from __future__ import annotations
@@ -17,8 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from ..control.adaptation.gradient import BoundGradient
-from ..errors import InputError
 from ..renamed import names_elsewhere
 from ..robots.base_parameters import Grouping, grouping
 from ..simulation.result import Result
@@ -26,8 +19,12 @@ from ..simulation.simulate import Experiment
 from .replay import Replay, replay
 
 EPS = float(np.finfo(float).eps)
-#: a direction counts as learned when its error had the time to fall by e this often
-LEARNED = 4.0
+#: a base parameter counts as learned when no more than this share of its error is left
+LEFT = 0.05
+#: part of the run, at its end, over which errors are looked at: one that swings may be 0 at one instant
+LATE = 0.1
+#: errors at the start below this share of a base parameter's terms count as none
+KNOWN = 1e-9
 
 
 @dataclass(frozen=True)
@@ -112,7 +109,9 @@ class Identification:
         torque_error: Y (theta - theta_hat), what the model's torque lacks, (T, nv), N·m.
         base_error: K (theta - theta_hat), (T, r).
         gramian: int Y_b^T Y_b dt over the run, (r, r).
-        lifetimes: how many times the error of each direction had the time to fall by e, (r,), ascending.
+        wrong: which base parameters were wrong at the start, (r,), bool.
+        left: the largest error of each in the last tenth of the run as a share of that at the start, (r,); 0
+            where there was none to begin with. A combination may be learned though none of its terms is.
     """
 
     robot: str
@@ -121,7 +120,8 @@ class Identification:
     torque_error: np.ndarray
     base_error: np.ndarray
     gramian: np.ndarray
-    lifetimes: np.ndarray
+    wrong: np.ndarray
+    left: np.ndarray
 
     @property
     def excitation(self) -> float:
@@ -130,13 +130,13 @@ class Identification:
 
     @property
     def learned(self) -> int:
-        """Number of directions whose error had the time to become small."""
-        return int((self.lifetimes >= LEARNED).sum())
+        """Number of base parameters that were wrong, and of whose error at most a twentieth is left."""
+        return int((self.wrong & (self.left <= LEFT)).sum())
 
     @property
-    def supports_convergence(self) -> bool:
-        """Whether the excitation of the run supports that all base parameters converge."""
-        return self.learned == self.grouping.rank
+    def all_learned(self) -> bool:
+        """Whether that is said of all base parameters that were wrong, and some were."""
+        return 0 < self.learned == self.wrong.sum()
 
     def as_dict(self) -> dict[str, Any]:
         """The figures a report shows, as plain data."""
@@ -148,7 +148,9 @@ class Identification:
             "condition": self.grouping.condition,
             "excitation": self.excitation,
             "learned": self.learned,
-            "supports_convergence": self.supports_convergence,
+            "wrong": int(self.wrong.sum()),
+            "all_learned": self.all_learned,
+            "most_left": float(self.left.max(initial=0.0)),
             "torque_error_peak": float(np.abs(self.torque_error).max()),
             "torque_error_end": float(np.abs(self.torque_error[-1]).max()),
             "base_error_start": float(size[0]),
@@ -168,11 +170,10 @@ def identify(result: Result, experiment: Experiment | None = None) -> tuple[Iden
         RobotError: the rank of a regressor is not clear.
     """
     run = replay(result, experiment)
-    Gamma = _gamma(run)
-    return tuple(_identify(run, i, Gamma[i]) for i in range(run.loop.cell.n))
+    return tuple(_identify(run, i) for i in range(run.loop.cell.n))
 
 
-def _identify(run: Replay, i: int, Gamma: np.ndarray) -> Identification:
+def _identify(run: Replay, i: int) -> Identification:
     cell, result = run.loop.cell, run.result
     robot, parameters = cell.robots[i], cell.parameters[i]
     P = parameters.theta.size
@@ -180,34 +181,26 @@ def _identify(run: Replay, i: int, Gamma: np.ndarray) -> Identification:
     Y = _regressors(run, i)
     tilde = parameters.theta - result.theta_hat[:, i, :P]
     Y_b = Y[:, :, found.columns]
-    strength = np.trapezoid(np.einsum("tja,tjk,tkb->tab", Y_b, _compliance(run, i), Y_b), result.t, axis=0)
-    root = _root(found.K * Gamma[:P] @ found.K.T)
+    base_error = tilde @ found.K.T
+    wrong, left = _left(base_error, np.abs(found.K) @ np.abs(parameters.theta))
     return Identification(
         cell.names[i],
         found,
         found.names(parameters.names),
         np.matvec(Y, tilde),
-        tilde @ found.K.T,
+        base_error,
         np.trapezoid(np.einsum("tja,tjb->tab", Y_b, Y_b), result.t, axis=0),
-        np.maximum(np.linalg.eigvalsh(root @ strength @ root), 0.0),
+        wrong,
+        left,
     )
 
 
-def _gamma(run: Replay) -> np.ndarray:
-    """The diagonal Gamma of (14), (n, P).
-
-    Raises:
-        InputError: the run has another adaptation, whose lifetimes these are not.
-    """
-    adaptation = run.loop.controller.adaptation
-    if not isinstance(adaptation, BoundGradient):
-        found = run.result.info.get("adaptation", {}).get("name", "another")
-        raise InputError(
-            f"expected a run with the adaptation Gradient, eq. (14), found {found}",
-            subject="result",
-            found=found,
-        )
-    return adaptation.Gamma
+def _left(error: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which of the base parameters were wrong at the start, (r,), and what is left of errors, (T, r)."""
+    start = np.abs(error[0])
+    wrong = start > KNOWN * size
+    late = np.abs(error[-max(1, int(LATE * len(error))) :]).max(axis=0)
+    return wrong, np.divide(late, start, out=np.zeros_like(late), where=wrong)
 
 
 def _regressors(run: Replay, i: int) -> np.ndarray:
@@ -217,21 +210,6 @@ def _regressors(run: Replay, i: int) -> np.ndarray:
     columns = (run.result.q, run.result.v, run.rows.v_ref[run.logged], run.rows.a_ref[run.logged])
     states = zip(*(np.ascontiguousarray(column[:, i, joints]) for column in columns), strict=True)
     return np.array([parameters.regressor(*state) for state in states])
-
-
-def _compliance(run: Replay, i: int) -> np.ndarray:
-    """D^-1 at every logged instant, (T, nv, nv)."""
-    controller, nv = run.loop.controller, run.loop.cell.robots[i].nv
-    if controller.k_r_space == "joint":
-        return np.broadcast_to(np.diag(1 / controller.K_r[i, :nv]), (len(run.logged), nv, nv))
-    J = run.rows.J[run.logged, i][:, :, :nv]
-    return np.linalg.pinv(np.einsum("tai,a,taj->tij", J, controller.K_r[i], J), hermitian=True)
-
-
-def _root(A: np.ndarray) -> np.ndarray:
-    """Symmetric square root of a positive semidefinite matrix."""
-    values, vectors = np.linalg.eigh(A)
-    return vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
 
 
 __getattr__ = names_elsewhere(__name__, ".convergence", convergence_of="convergence")

@@ -51,7 +51,7 @@ class Dissipation:
         V: with the errors of base parameters where the adaptation is (14), (T,).
         damped, lost: X^2 and Z^2 until each instant, (T,).
         supply, entering: int s^T d, and what entered otherwise until each instant, (T,).
-        D: of all unmodelled torque, over the whole run, sqrt(N·m).
+        acted: D^2 of all unmodelled torque until each instant, (T,).
         sources: D of what each source does alone.
         V0_full: V(0) with the storage of the adaptation, as in a certificate.
         storage: what V has for the error of the estimates: "base parameters" or "the adaptation's own".
@@ -64,7 +64,7 @@ class Dissipation:
     lost: np.ndarray
     supply: np.ndarray
     entering: np.ndarray
-    D: float
+    acted: np.ndarray
     sources: Mapping[str, float]
     V0_full: float
     storage: str
@@ -83,12 +83,17 @@ class Dissipation:
     @property
     def X(self) -> float:  # noqa: N802
         """Root of the integral of s_q^T K_r s_q over the run."""
-        return float(np.sqrt(max(self.damped[-1], 0.0)))
+        return _root(self.damped)
 
     @property
     def Z(self) -> float:  # noqa: N802
         """Root of the integral of all else that V' loses."""
-        return float(np.sqrt(max(self.lost[-1], 0.0)))
+        return _root(self.lost)
+
+    @property
+    def D(self) -> float:  # noqa: N802
+        """Of all unmodelled torque, over the whole run, sqrt(N·m)."""
+        return _root(self.acted)
 
     @property
     def entered(self) -> float:
@@ -96,11 +101,20 @@ class Dissipation:
         return float(max(self.entering.max(), 0.0))
 
     @property
+    def bound(self) -> np.ndarray:
+        """The most that X can be until each instant, (T,); infinite where the theorem does not reach.
+
+        Its square is the most that V + X^2 + Z^2 can be.
+        """
+        if self.reason is not None:
+            return np.full_like(self.t, np.inf)
+        D2, R = np.maximum(self.acted, 0.0), np.maximum(np.maximum.accumulate(self.entering), 0.0)
+        return np.sqrt(D2) / 2 + np.sqrt(D2 / 4 + self.V0 + R)
+
+    @property
     def X_bound(self) -> float:  # noqa: N802
         """D/2 + sqrt(D^2/4 + V(0) + R); infinite where the theorem does not reach."""
-        if self.reason is not None:
-            return float("inf")
-        return float(self.D / 2 + np.sqrt(self.D**2 / 4 + self.V0 + self.entered))
+        return float(self.bound[-1])
 
     @property
     def rest(self) -> float:
@@ -113,14 +127,19 @@ class Dissipation:
         return float("inf") if self.reason is not None else self.V0 + self.entered + self.D**2 / 4
 
     @property
+    def duration(self) -> float:
+        """Time from the first to the last logged instant, s."""
+        return float(self.t[-1] - self.t[0])
+
+    @property
     def mean_square(self) -> float:
-        """Mean of s_q^T K_r s_q over the run, W."""
-        return self.X**2 / float(self.t[-1] - self.t[0])
+        """Mean of s_q^T K_r s_q over the run, W; 0 of a single instant."""
+        return self.X**2 / self.duration if self.duration else 0.0
 
     @property
     def mean_square_bound(self) -> float:
         """The most that it can be, W."""
-        return self.X_bound**2 / float(self.t[-1] - self.t[0])
+        return self.X_bound**2 / self.duration if self.duration else float("inf")
 
     @property
     def gap(self) -> np.ndarray:
@@ -170,7 +189,7 @@ def dissipation(result: Result | Replay, experiment: Experiment | None = None) -
 
 def balanced(run: Replay, reasons: Sequence[str]) -> Dissipation:
     """`dissipation` of a run of which it is known why the theorem does not reach it; empty if it does."""
-    sampled = run.result.info.get("control_period") is not None
+    sampled = run.result.info.get("control_period") is not None and len(run.result.t) > 1
     run, further = held(run) if sampled else (run, {})
     torques, x, (kept, rates, lost) = unmodelled(run, further), run.rows, _law(run)
     total, model = np.sum(list(torques.values()), axis=0), x.lacking - x.frozen
@@ -184,7 +203,7 @@ def balanced(run: Replay, reasons: Sequence[str]) -> Dissipation:
     energies = (kept + 0.5 * _sum(x.s_q * np.matvec(x.M, x.s_q)))[run.logged]
     storage, kind = _storage(run)
     return Dissipation(
-        run.result.t, energies + storage, damped, gone, supply, stored + due, _root(D2),
+        run.result.t, energies + storage, damped, gone, supply, stored + due, D2,
         dict(zip(torques, map(_root, each), strict=True)),
         float(energies[0] + x.storage[0]), kind, "; ".join(reasons) or None,
     )  # fmt: skip

@@ -74,6 +74,7 @@ class Lyapunov:
         events: instants between which and the next one V jumps, because plant or network move the state.
         jumped: what V gained at jumps, of the state or of the desired velocity, in all: V(T) - V(0) is the
             sum of `supplied`, of this, and of the drift at the end.
+        kinked: whether rates of terms jump at messages and their sum does not: `drift_bound` is too large.
     """
 
     t: np.ndarray
@@ -86,6 +87,7 @@ class Lyapunov:
     inside: tuple[str, ...] = THEOREM
     events: tuple[int, ...] = ()
     jumped: float = 0.0
+    kinked: bool = False
 
     @property
     def V(self) -> np.ndarray:  # noqa: N802
@@ -110,8 +112,8 @@ class Lyapunov:
     @property
     def resolved(self) -> bool:
         """Whether numerical errors are small beside what V did, so that `closes` says something."""
-        V = self.V
-        return self.drift_bound <= max(RESOLVED * float(np.ptp(V)), ROUNDED * float(V.max()))
+        V, error = self.V, self.largest_drift if self.kinked else self.drift_bound
+        return error <= max(RESOLVED * float(np.ptp(V)), ROUNDED * float(V.max()))
 
 
 @dataclass(frozen=True)
@@ -164,6 +166,7 @@ def lyapunov(result: Result | Replay, experiment: Experiment | None = None) -> L
         inside_of(run, proof),
         run.events,
         jumped(run, V),
+        run.loop.messages.sent and not run.events,
     )
 
 
@@ -195,7 +198,7 @@ def outside(network: BoundNetwork) -> str | None:
     return "no proof is known" if ask is None else ask()
 
 
-def _is_ideal(network: BoundNetwork) -> bool:
+def is_ideal(network: BoundNetwork) -> bool:
     """Whether the proof holds with a network as it stands, without a theorem of its own."""
     return outside(network) is None and getattr(network, "theorem", None) is None
 
@@ -220,7 +223,7 @@ def proof_along(run: Replay) -> Proof:
 
 def inside_of(run: Replay, proof: Proof) -> tuple[str, ...]:
     """Names of the powers that the theorem knows: diffusive coupling only where all is heard at once."""
-    ideal = _is_ideal(run.loop.controller.network)
+    ideal = is_ideal(run.loop.controller.network)
     known = (name for name in proof.powers if ideal or name != DIFFUSION)
     return ("damping", *known, "friction in Y", *GIVING)
 
@@ -259,7 +262,7 @@ def _power(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
     pushed = _sum(s * x.force)  # the rates of the proof less its powers, where it holds
     if not hasattr(controller.law, "proof"):
         power["law"] = -pushed
-    elif not _is_ideal(controller.network):
+    elif not is_ideal(controller.network):
         rates, powers = (sum(map(_sum, terms.values())) for terms in (proof.rates, proof.powers))
         power["network"] = rates - powers - pushed + _sum(x.s_q * np.matvec(x.M, x.gap))
     power["other"] = np.sum(_rates(run, proof), axis=0) - np.sum(list(power.values()), axis=0)

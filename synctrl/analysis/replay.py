@@ -44,6 +44,7 @@ class Moment(NamedTuple):
         chained: its powers, in the order of `Replay.chained`, N·m/s.
         epsilon, epsilon_dot: (p, m).
         E, sigma, sigma_dot, e_star, u, r: (n, m).
+        weighted: w = c e and its rate, as the law takes them, (2, n, m).
         force: what the law asks for in task space, (n, m).
         c, c_dot, c_inv: (n, m, m).
         slips: what the network told of r, see `Received`, (2, n, m); nothing where nobody asks.
@@ -82,6 +83,7 @@ class Moment(NamedTuple):
     e_star: np.ndarray
     u: np.ndarray
     r: np.ndarray
+    weighted: np.ndarray
     force: np.ndarray
     c: np.ndarray
     c_dot: np.ndarray
@@ -202,9 +204,9 @@ def _row(
         np.matvec(s.Y, frozen_error(adaptation, theta - s.theta_hat)), np.array(adaptation.storage(z, theta)),
         np.array(adaptation.storage_rate(z, s.z_dot, theta)),
         np.array([*adaptation.powers(z, theta, s.seen).values()]), *_chain(loop, y, y_dot, s),
-        s.epsilon, s.epsilon_dot, s.E, s.sigma, s.sigma_dot, s.e_star, s.u, s.r, s.force, s.reference.c,
-        s.reference.c_dot, s.reference.c_inv, np.array([] if s.errors.slips is None else s.errors.slips),
-        J, J_inv, s.task.inverse_damping, M, C_s,
+        s.epsilon, s.epsilon_dot, s.E, s.sigma, s.sigma_dot, s.e_star, s.u, s.r, s.errors.weighted, s.force,
+        s.reference.c, s.reference.c_dot, s.reference.c_inv,
+        np.array([] if s.errors.slips is None else s.errors.slips), J, J_inv, s.task.inverse_damping, M, C_s,
         np.matvec(np.abs(s.Y), np.abs(s.theta_hat) + np.abs(theta)),
     )  # fmt: skip
 

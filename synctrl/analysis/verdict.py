@@ -12,7 +12,13 @@ from .trial_rows import AS_GIVEN, Row
 #: relative difference up to which two sizes count as the same
 SAME = 0.02
 COLUMNS = ("tracking_peak", "tracking_rms", "sync_peak", "sync_rms", "peak_torque")
-ERRORS = {"tracking_rms": "e", "sync_rms": "ε"}
+#: sizes of the errors in the order in which they are said, with their words
+ERRORS = {
+    "tracking_rms": "RMS e",
+    "tracking_peak": "peak e",
+    "sync_rms": "RMS ε",
+    "sync_peak": "peak ε",
+}
 #: share of the peak torque that gravity takes, beyond which equal peak torque says little
 HEAVY = 0.5
 
@@ -24,7 +30,7 @@ def sentences(rows: Sequence[Row], situations: Sequence[str]) -> list[str]:
 
 
 def summary(rows: Sequence[Row], situations: Sequence[str]) -> str:
-    """Which rows are better than the first in both errors."""
+    """Which rows are better than the first in both errors, by RMS and by peak."""
     ours, *others = rows
     better = [
         f"{_at_rule(row)}, {situation}"
@@ -33,8 +39,8 @@ def summary(rows: Sequence[Row], situations: Sequence[str]) -> str:
         if max(_ratios(ours, row, situation), default=1.0) < 1 - SAME
     ]
     if better:
-        return f"Better than {ours.law} in both errors: {'; '.join(better)}."
-    return f"In no row is both the RMS of e and that of ε smaller than with {ours.law}."
+        return f"Better than {ours.law} in both errors, by RMS and by peak: {'; '.join(better)}."
+    return f"In no row are RMS and peak of both e and ε smaller than with {ours.law}."
 
 
 def about_gravity(rows: Sequence[Row], share: float) -> list[str]:
@@ -89,14 +95,14 @@ def _compared(ours: Row, row: Row, situation: str) -> str:
     ratios = _ratios(ours, row, situation)
     if not ratios:
         return row.remark or ours.remark
-    e, epsilon = (_times(ratio, name) for ratio, name in zip(ratios, ERRORS.values(), strict=True))
+    errors = ", ".join(_times(ratio, name) for ratio, name in zip(ratios, ERRORS.values(), strict=True))
     here, there = getattr(row, situation), getattr(ours, situation)
     torque = f"with {here.peak_torque:.4g} against {there.peak_torque:.4g} of torque"
-    return f"{situation}, {e} and {epsilon}, {torque}"
+    return f"{situation}, {errors}, {torque}"
 
 
 def _ratios(ours: Row, row: Row, situation: str) -> list[float]:
-    """RMS of e and of epsilon, over those of the first row; empty where a run is missing."""
+    """RMS and peaks of e and of epsilon, over those of the first row; empty where a run is missing."""
     here, there = getattr(row, situation), getattr(ours, situation)
     if here is None or there is None:
         return []
@@ -106,10 +112,10 @@ def _ratios(ours: Row, row: Row, situation: str) -> list[float]:
 
 def _times(ratio: float, name: str) -> str:
     if abs(ratio - 1) <= SAME:
-        return f"the same RMS {name}"
+        return f"{name} the same"
     if ratio > 1:
-        return f"an RMS {name} {ratio:.3g} times larger"
-    return f"an RMS {name} {1 / ratio:.3g} times smaller"
+        return f"{name} {ratio:.3g} times larger"
+    return f"{name} {1 / ratio:.3g} times smaller"
 
 
 def _numbers(sizes: Any) -> list[str]:

@@ -51,6 +51,7 @@ def a460_pair(
     reference_acceleration: str | None = None,
     k_r_space: str | None = None,
     adapt_friction: bool = False,
+    gravity: bool = True,
     **parts: Unpack[Parts],
 ) -> Experiment:
     """The two-arm cell of section V-A, in joint space with epsilon = e_1 - e_2, eq. (45).
@@ -61,17 +62,20 @@ def a460_pair(
         gains: by default the paper's.
         reference_acceleration, k_r_space: options of the law, see `Experiment`.
         adapt_friction: whether the controller's model has friction too, see `FrictionParameters`.
+        gravity: whether there is gravity, in the plant and in the controller's model.
         parts: `adaptation`, `law`, `network`, `sensors`, `actuators`, see `Experiment`.
     """
+    boolean("gravity", gravity)
     boolean("friction", friction)
     boolean("adapt_friction", adapt_friction)
-    robot = load_robot("a460")
+    robot = load_robot("a460") if gravity else load_robot("a460").weightless()
     members, ours = [_member(robot, i, FRICTION if friction else Friction()) for i in range(2)], GAINS
     if adapt_friction:
         members = [_knowing_friction(member) for member in members]
         ours = replace(GAINS, Gamma=np.repeat([float(GAINS.Gamma), GAMMA_FRICTION], [30, 6]))
     cell = Cell(members, Coupling.pair(c=(1.0, -1.0)), JointSpace(), name="A460 pair")
     remarks = [*["without friction"] * (not friction), *["friction adapted"] * adapt_friction]
+    remarks += ["without gravity"] * (not gravity)
     options = ControllerParts(reference_acceleration=reference_acceleration, k_r_space=k_r_space, **parts)
     return ready_experiment(cell, DURATION, ours, gains, synchronized, options, *remarks)
 

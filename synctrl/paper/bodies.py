@@ -10,7 +10,7 @@ from ..analysis.consistency import Consistency, physical_consistency
 from ..errors import InputError
 from ..show.consistency_plots import consistency_figure
 from ..simulation.result import Result
-from .claims import Claim, Finding
+from .claims import OURS_OF_THE_PAPER, Claim, Finding
 from .report import Block, Section, Table, Text, as_picture, number
 from .reproduction import PLANNED
 
@@ -38,7 +38,7 @@ def bodies_are_left(name: str, consistency: Consistency) -> Claim:
     return Claim(
         "The paper's own adaptation, (14), leaves the parameters of bodies that can exist in the paper's own "
         "cell.",
-        "ours, not the paper's",
+        OURS_OF_THE_PAPER,
         not consistency.holds,
         tuple(figures),
         f"Run {name.replace('_', ' ')}, {consistency.t[-1]:g} s. Asked: the pseudo-inertia of an estimated "

@@ -10,11 +10,11 @@ from ..assembly.body import place_of
 from ..experiments.carry import GEOMETRIC_ERROR
 from ..simulation.result import Result
 from .claims import MUCH, Claim, Finding, findings
-from .tasks import root_mean_square
+from .tasks import OUR_CELL, root_mean_square
 
 #: how near a force has to come to one that was predicted, as a share of it
 NEAR = 0.05
-SOURCE = "not in the paper: our cell, with forces"
+SOURCE = f"{OUR_CELL}, with forces"
 _DIRECTION = GEOMETRIC_ERROR[:3] / np.linalg.norm(GEOMETRIC_ERROR[:3])
 #: a share of the force that is small
 THIRD = 1 / 3

@@ -15,7 +15,7 @@ from ..show.curves import Curves
 from ..simulation.result import Result
 from .claims import MUCH, Claim, findings
 from .reproduction import PlannedRun
-from .tasks import COMPARED, OURS, Drawing, Task, more_than_gain, root_mean_square, since_push
+from .tasks import COMPARED, OUR_CELL, Drawing, Task, more_than_gain, root_mean_square, since_push
 
 #: Lambda + beta: what an independent controller could be given instead, 1/s
 STIFF = GAINS.replace(Lambda=26.0)
@@ -81,7 +81,7 @@ def stays_on_the_edge(together: Result, alone: Result) -> Claim:
     who, ours, theirs = ("synchronized", "independent"), *((peak(r), end(r)) for r in (together, alone))
     return Claim(
         "Synchronization keeps the bead on the edge while the robot that carries the plate is pushed.",
-        OURS,
+        OUR_CELL,
         all(a * MUCH <= b for a, b in zip(ours, theirs, strict=True)),
         (
             *findings("peak of the bead's error", (ours[0], theirs[0]), "m", who),
@@ -98,7 +98,7 @@ def paid(together: Result, alone: Result) -> Claim:
     plate = [off_own_path(run, CARRIER) for run in (together, alone)]
     return Claim(
         "The nozzle pays for it: to stay on the plate it leaves its own path.",
-        OURS,
+        OUR_CELL,
         off[0] > off[1],
         (
             *findings("nozzle off its path, peak", off, "m", ("synchronized", "independent")),

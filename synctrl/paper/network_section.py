@@ -19,7 +19,7 @@ from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .claims import Claim, Finding, findings, left
 from .reproduction import PlannedRun
-from .tasks import OURS, Drawing, Task, root_mean_square
+from .tasks import OUR_CELL, Drawing, Task, root_mean_square
 
 #: the network over which receivers are compared: messages that come late, at odd times, or not at all
 BAD = partial(Network, period=0.01, delay=0.01, jitter=0.01, loss=0.2)
@@ -92,7 +92,7 @@ def every_delay_is_tolerated(runs: Mapping[str, Result]) -> Claim:
     figures += findings("left of ε, share of its peak", shares, "", who)
     return Claim(
         "Both cells of the paper tolerate every constant delay.",
-        OURS,
+        OUR_CELL,
         min(margins) > 0 and max(shares) < FADED,
         tuple(figures),
         "Asked: the least eigenvalue of the theorem is above 0 at every logged instant, and with a delay "
@@ -106,7 +106,7 @@ def a_filter_costs_almost_nothing(filtered: Result, ideal: Result) -> Claim:
     share = rms(filtered) / rms(ideal)
     return Claim(
         "With a filter at the receiver, late, irregular and lost messages cost almost nothing.",
-        OURS,
+        OUR_CELL,
         share <= ALMOST_NOTHING,
         (Finding("RMS of ε against ideal communication", share),),
         f"Asked: at most {ALMOST_NOTHING:g} times the RMS of ε with ideal communication, of four arms of "
@@ -120,7 +120,7 @@ def holding_doubles(held: Result, ideal: Result) -> Claim:
     share = rms(held) / rms(ideal)
     return Claim(
         "To hold what was heard last, without a filter, doubles ε.",
-        OURS,
+        OUR_CELL,
         share >= DOUBLE,
         (Finding("RMS of ε against ideal communication", share),),
         f"Asked: at least {DOUBLE:g} times the RMS of ε with ideal communication, over the same messages. "

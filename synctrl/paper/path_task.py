@@ -15,7 +15,7 @@ from ..show.curves import Curves
 from ..simulation.result import Result
 from .claims import MUCH, Claim, findings
 from .reproduction import PlannedRun
-from .tasks import COMPARED, OURS, Drawing, Task, more_than_gain, since_push
+from .tasks import COMPARED, OUR_CELL, Drawing, Task, more_than_gain, since_push
 
 #: Lambda + beta: what an independent controller could be given instead, 1/s
 STIFF = GAINS.replace(Lambda=26.0)
@@ -80,7 +80,7 @@ def gap_is_kept(gap: Result, alone: Result) -> Claim:
     who = "synchronized", "independent"
     return Claim(
         "Synchronization along the path keeps the gap although one robot is pushed back.",
-        OURS,
+        OUR_CELL,
         all(a * MUCH <= b for a, b in zip(ours, theirs, strict=True)),
         (
             *findings("error of the gap where they meet", (ours[0], theirs[0]), "m", who),
@@ -107,7 +107,7 @@ def weights_count_at_the_end(weighted: Result, gap: Result) -> Claim:
     who = "weighted", "not weighted"
     return Claim(
         "Weights that grow towards the meeting keep the gap better there, and worse before.",
-        OURS,
+        OUR_CELL,
         abs(there[0]) < abs(there[1]) and peaks[0] > peaks[1],
         (
             *findings("error of the gap where they meet", there, "m", who),
@@ -123,7 +123,7 @@ def phase_keeps_the_point(phase: Result, gap: Result) -> Claim:
     who = "phase", "gap"
     return Claim(
         "Robots that compare how late they are keep the point where they meet, and not the gap.",
-        OURS,
+        OUR_CELL,
         abs(off[0]) * MUCH <= abs(off[1]) and abs(there[1]) * MUCH <= abs(there[0]),
         (
             *findings("point off along the path", off, "m", who),
@@ -138,7 +138,7 @@ def robot_2_pays(gap: Result, alone: Result) -> Claim:
     speeds = [speed_off(run, 1) for run in (gap, alone)]
     return Claim(
         "Robot 2 pays for robot 1: its own speed, which its dispenser has to follow, is disturbed.",
-        OURS,
+        OUR_CELL,
         speeds[0] >= MUCH * speeds[1],
         tuple(findings("largest error of robot 2's speed", speeds, "m/s", ("synchronized", "independent"))),
         f"Asked: an error of its speed that is larger by a factor of at least {MUCH:g}.",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..analysis.convergence import LEARNED, Identification
+from ..analysis.convergence import LATE, LEFT, Identification
 from ..checks import instance
 from ..show.plots import common_limits, joint_trajectories, sync_errors, tracking_errors
 from ..show.style import display
@@ -81,7 +81,7 @@ def friction_section(runs: Mapping[str, Result], folder: Path) -> Section:
 
 def identification_section(found: Mapping[str, Sequence[Identification]]) -> Section:
     """What runs could learn of their robots' parameters, and what they did learn, by title of the run."""
-    sizes = ("adapted", "identifiable", "learned")
+    sizes = ("adapted", "identifiable", "wrong", "learned")
     errors = ("torque_error_peak", "torque_error_end", "base_error_start", "base_error_end")
     data = [(f"{title}: {each.robot}", each.as_dict()) for title, robots in found.items() for each in robots]
     rows = [
@@ -95,16 +95,16 @@ def identification_section(found: Mapping[str, Sequence[Identification]]) -> Sec
         for name, row in data
     ]
     head = (
-        "run and robot", "adapted", "identifiable", "learned", "condition", "excitation",
+        "run and robot", "adapted", "identifiable", "wrong at first", "learned", "condition", "excitation",
         "torque error, N·m, peak", "at the end", "base parameter error, start", "at the end",
     )  # fmt: skip
     words = Text(
         "That the tracking error vanishes says nothing about parameters. Identifiable: how many combinations "
         "of the adapted parameters torque depends on at all (base parameters), with the condition number of "
         "their columns. Excitation: smallest eigenvalue of the integral of YᵀY over the run, for base "
-        "parameters in SI units. Learned: directions whose error had the time to fall by e "
-        f"{LEARNED:g} times, by an estimate that neglects s'. Only where all are learned could one speak of "
-        "convergence of parameters."
+        "parameters in SI units. Learned: base parameters of whose error at the start no more than "
+        f"{100 * LEFT:g} % is left in the last {100 * LATE:g} % of the run. That is measured, and says "
+        "nothing of longer runs."
     )
     return Section("Errors converge, parameters need not", (words, Table(head, tuple(rows))))
 

@@ -243,10 +243,13 @@ def _table_row(row: Iterable[str]) -> str:
 def _claim(claim: Claim) -> str:
     verdict = "holds" if claim.holds else "does not hold"
     figures = "".join(f"<li>{words(q.name)} <b>{words(_shown(q))}</b></li>" for q in claim.figures)
+    why = claim.explanation
+    if claim.by_construction:
+        why = f"{why} Could hardly have failed: {claim.by_construction}"
     return (
         f'<li class="{"holds" if claim.holds else "fails"}"><strong>{verdict}</strong> '
         f'<span class="what">{words(claim.text)}</span> <span class="source">{words(claim.source)}</span>'
-        f'<ul class="figures">{figures}</ul><div class="why">{words(claim.explanation)}</div></li>'
+        f'<ul class="figures">{figures}</ul><div class="why">{words(why)}</div></li>'
     )
 
 

@@ -182,6 +182,9 @@ def _reporter(name: str, duration: float) -> Callable[[float], None]:
 STIFF = GAINS.replace(Lambda=110.0)
 #: in which the errors of the undisturbed arms have their peaks, s
 PEAKS = 1.0
+#: long enough to see what is left of errors after the motion, s
+LONG = 12.0
+_left = partial(PlannedRun, duration=LONG, log_dt=1e-2, engine="compiled")
 
 PLANNED: Mapping[str, PlannedRun] = {
     "a460_pair_synchronized": PlannedRun(a460_pair),
@@ -189,6 +192,10 @@ PLANNED: Mapping[str, PlannedRun] = {
     "a460_pair_frictionless": PlannedRun(partial(a460_pair, friction=False), 8.0),
     "a460_pair_friction_unknown": PlannedRun(a460_pair, 6.0),
     "a460_pair_friction_adapted": PlannedRun(partial(a460_pair, adapt_friction=True), 6.0),
+    "a460_pair_left_both": _left(a460_pair),
+    "a460_pair_left_friction": _left(partial(a460_pair, gravity=False)),
+    "a460_pair_left_gravity": _left(partial(a460_pair, friction=False)),
+    "a460_pair_left_neither": _left(partial(a460_pair, friction=False, gravity=False)),
     "a460_pair_full": PlannedRun(a460_full_pair),
     "a460_pair_full_alone": PlannedRun(partial(a460_full_pair, synchronized=False)),
     "planar_four_synchronized": PlannedRun(planar_four),
@@ -197,8 +204,12 @@ PLANNED: Mapping[str, PlannedRun] = {
     "planar_four_independent_disturbed": PlannedRun(
         partial(planar_four, synchronized=False, disturbance="torque")
     ),
-    "planar_four_without_k_eps": PlannedRun(partial(planar_four, gains=GAINS.replace(K_eps=0.0)), PEAKS),
-    "planar_four_without_adaptation": PlannedRun(partial(planar_four, gains=GAINS.replace(Gamma=0.0)), PEAKS),
+    "planar_four_without_k_eps": PlannedRun(
+        partial(planar_four, gains=GAINS.replace(K_eps=0.0)), engine="compiled"
+    ),
+    "planar_four_without_adaptation": PlannedRun(
+        partial(planar_four, gains=GAINS.replace(Gamma=0.0)), engine="compiled"
+    ),
     "planar_four_stiff": PlannedRun(partial(planar_four, synchronized=False, gains=STIFF), PEAKS),
 }
 

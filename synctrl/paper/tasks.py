@@ -15,12 +15,12 @@ import numpy as np
 from ..show.curves import Curves, overlay
 from ..show.side_by_side import side_by_side
 from ..simulation.result import Result
-from .claims import MUCH, Claim, Finding, need
+from .claims import MUCH, OURS, Claim, Finding, need
 from .report import Block, Links, Section, Table, Text, Verdicts, as_picture, number
 from .reproduction import PlannedRun
 
 #: where the claims of tasks are from
-OURS = "not in the paper: our cell"
+OUR_CELL = f"{OURS}: a cell that is not in the paper"
 #: words for runs that a task compares: synchronized, independent with as much gain, and independent
 COMPARED = "synchronized", "Λ = 26 s⁻¹", "independent"
 
@@ -140,7 +140,7 @@ def more_than_gain(peaks: Sequence[float], seen: Sequence[Finding], remark: str 
     )
     return Claim(
         "That is not gain alone: an independent controller with Λ + β for Λ gets part of the way.",
-        OURS,
+        OUR_CELL,
         peaks[0] * MUCH <= peaks[1] < peaks[2],
         tuple(seen),
         " ".join(filter(None, (asked, remark))),

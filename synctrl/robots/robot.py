@@ -137,6 +137,12 @@ class Robot:
         model.armature = values.copy()
         return self._with(model)
 
+    def weightless(self) -> Self:
+        """This robot where there is no gravity."""
+        model = pin.Model(self.model)
+        model.gravity.setZero()
+        return self._with(model)
+
     # -- what it is ---------------------------------------------------------------------------------------
 
     @property
