@@ -10,6 +10,7 @@ import pytest
 from cells import random_experiment
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 from refusals import refused
 from scipy.linalg import expm
 from seams.degrees import Degrees
@@ -101,10 +102,18 @@ def test_energy_torque_and_kappa_are_at_least_those_of_the_run(weight: str, cart
     assert (size <= np.linalg.norm(told.kappa, axis=-1) * found.X).all()
 
 
-def test_friction_of_a_run_is_within_what_was_reckoned_with() -> None:
-    one = experiment(coupling("ring", 3, 2), friction=Friction(viscous=0.8, coulomb=0.4, smoothing=0.2))
+@pytest.mark.parametrize("kind", ["viscous", "coulomb"])
+def test_friction_of_a_run_is_within_what_was_reckoned_with(kind: str) -> None:
+    one = experiment(coupling("ring", 3, 2), friction=Friction(**{kind: 0.6}, smoothing=0.2))
     found = dissipation(one.simulate(DURATION, DT), one)
     assert 0 < found.D <= tube(one.cell, one.gains, duration=DURATION).D
+
+
+def test_viscous_friction_at_rest_adds_its_share_of_the_damping_to_the_torque() -> None:
+    one, gamma = quiet(0.5), 0.3
+    rubbed = quiet(0.5, friction=Friction(viscous=gamma * GAINS.K_r))
+    assert one.X / (1 - gamma) == pytest.approx(rubbed.X)
+    assert pytest.approx(one.D + gamma * rubbed.X) == rubbed.D
 
 
 # -- what it is made of ------------------------------------------------------------------------------------
@@ -137,12 +146,17 @@ def test_modes_are_the_solution_of_the_equation_of_the_errors(seed: int, kind: s
         np.testing.assert_allclose(modes.spread(0), found, rtol=0.02, atol=1e-5)
 
 
-def quiet(torque: float = 0.0, duration: float = 2.0, c: float = 1.0, **changes) -> Tube:
+def quiet(
+    torque: float = 0.0,
+    duration: float = 2.0,
+    c: float = 1.0,
+    friction: Friction | None = None,
+    **changes: ArrayLike,
+) -> Tube:
     """The tube of two arms that are known and stand where they should, V(0) = 0."""
     arm, gains = load_robot("planar2r"), replace(GAINS, **changes)
-    stay = [
-        Member(arm, Hold([0.3, 1.0]), theta_hat0=arm.inertial_parameters, name=f"arm {k}") for k in (1, 2)
-    ]
+    more = {"theta_hat0": arm.inertial_parameters, "friction": friction}
+    stay = [Member(arm, Hold([0.3, 1.0]), name=f"arm {k}", **more) for k in (1, 2)]
     return tube(Cell(stay, Coupling.pair((c, -c))), gains, torque, duration)
 
 
