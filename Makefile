@@ -17,6 +17,8 @@ WORKERS ?= 2
 export MPLBACKEND := Agg
 # One thread per process: the matrices are small, and the workers use the cores already.
 export OPENBLAS_NUM_THREADS := 1
+# Modules are compiled where they are first imported, and never those that nothing imports (--no-compile below).
+export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: help reproduce test test-lowest stress lint clean
 .NOTPARALLEL:
@@ -66,7 +68,7 @@ $(LOWEST)/.installed-%: $(LOWEST)/.made pyproject.toml constraints-lowest.txt
 # $(call install,ENVIRONMENT,WHAT,VERSIONS)
 define install
 	@echo "Installing $(2) into $(1): once, a minute or two."
-	@$(1)/bin/python -m pip install -qq --disable-pip-version-check -c $(3) -e '$(2)'
+	@$(1)/bin/python -m pip install -qq --disable-pip-version-check --no-compile -c $(3) -e '$(2)'
 	@touch $@
 endef
 

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from synctrl import (
     AxisRotation,
@@ -22,7 +23,6 @@ from synctrl import (
     Coupling,
     Experiment,
     Friction,
-    FunctionTrajectory,
     Gains,
     JointSpace,
     Member,
@@ -37,6 +37,7 @@ from synctrl.control.excursion import POINTS, excursion
 from synctrl.robots.catalog import catalog_names
 from synctrl.robots.mechanism import joint_limits
 from synctrl.robots.payload import carrying
+from synctrl.tasks.trajectories import Motion
 
 #: rad/s; s; s, of the motion there and back; share of the true parameters that is known; kg
 BANDWIDTH, DURATION, RETURN, KNOWN, LOAD = 8.0, 3.0, 4.0, 0.7, 2.0
@@ -48,15 +49,6 @@ SPACES = ("joint", "position", "pose")
 #: period of sampled control, s; None is continuous control with RK4 of 1 ms
 PERIODS = (None, 1e-3, 2e-3, 4e-3)
 NAIVE = Gains(Lambda=BANDWIDTH, beta=BANDWIDTH / 2, K_r=80.0, K_eps=10.0, Gamma=0.3)
-
-
-class Task(NamedTuple):
-    """One arm in one space: where it starts, and what it is to do."""
-
-    robot: Robot
-    space: JointSpace | CartesianSpace | PoseSpace
-    q0: np.ndarray
-    path: FunctionTrajectory | PoseTrajectory
 
 
 class Outcome(NamedTuple):
@@ -71,14 +63,32 @@ class Outcome(NamedTuple):
         return self.status == "completed" and self.error < LAST_ERROR and self.torque < TORQUE
 
 
-def swing(start: np.ndarray, way: np.ndarray) -> FunctionTrajectory:
+class Swing(NamedTuple):
     """start + way (1 - cos(w t))/2: there and back, from rest."""
-    w = 2 * np.pi / RETURN
-    return FunctionTrajectory(
-        lambda t: start + way * (1 - np.cos(w * t)) / 2,
-        lambda t: way * w * np.sin(w * t) / 2,
-        lambda t: way * w * w * np.cos(w * t) / 2,
-    )
+
+    start: np.ndarray
+    way: np.ndarray
+    breaks: tuple[float, ...] = ()
+
+    @property
+    def dimension(self) -> int:
+        return self.start.size
+
+    def __call__(self, t: ArrayLike) -> Motion:
+        w, half = 2 * np.pi / RETURN, self.way / 2
+        phase = w * np.asarray(t, dtype=float)[..., None]
+        return Motion(
+            self.start + half * (1 - np.cos(phase)), half * w * np.sin(phase), half * w * w * np.cos(phase)
+        )
+
+
+class Task(NamedTuple):
+    """One arm in one space: where it starts, and what it is to do."""
+
+    robot: Robot
+    space: JointSpace | CartesianSpace | PoseSpace
+    q0: np.ndarray
+    path: Swing | PoseTrajectory
 
 
 def good_posture(robot: Robot, rows: list[int]) -> np.ndarray:
@@ -108,7 +118,7 @@ def task(name: str, space: str) -> Task | None:
     robot = load_robot(name)
     if space == "joint":
         q0 = good_posture(robot, [0, 1, 2])
-        return Task(robot, JointSpace(), q0, swing(q0, SWING * (-1.0) ** np.arange(robot.nv)))
+        return Task(robot, JointSpace(), q0, Swing(q0, SWING * (-1.0) ** np.arange(robot.nv)))
     if space == "position":
         axes = movable_axes(robot)
         if not axes:
@@ -123,15 +133,15 @@ def position_task(robot: Robot, axes: str) -> Task:
     q0 = good_posture(robot, rows)
     x = robot.tip_position(q0)
     inward = -x / np.linalg.norm(x) + 0.3
-    return Task(robot, CartesianSpace(axes), q0, swing(x[rows], SHIFT * np.linalg.norm(x) * inward[rows]))
+    return Task(robot, CartesianSpace(axes), q0, Swing(x[rows], SHIFT * np.linalg.norm(x) * inward[rows]))
 
 
 def pose_task(robot: Robot) -> Task:
     q0 = good_posture(robot, [*range(6)])
     tip = robot.tip_pose(q0)
     x = tip.translation
-    way = swing(x, SHIFT * (-x + 0.3 * np.linalg.norm(x)))
-    turn = AxisRotation(tip.rotation, (1.0, 0.5, -0.5), swing(np.zeros(1), np.array([TURN])))
+    way = Swing(x, SHIFT * (-x + 0.3 * np.linalg.norm(x)))
+    turn = AxisRotation(tip.rotation, (1.0, 0.5, -0.5), Swing(np.zeros(1), np.array([TURN])))
     return Task(robot, PoseSpace(), q0, PoseTrajectory(way, turn))
 
 

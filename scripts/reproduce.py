@@ -130,7 +130,7 @@ def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun], limit:
         bodies_section(bodies, BODIES, out / "figures" / "bodies"),
         identification_section(learned),
         *(fair_section(*pair, out / "figures" / f"fair_{name}") for name, pair in compared.items()),
-        promises_section(certificates),
+        promises_section(certificates, runs, out / "figures"),
         certificate_section(certificates, out / "figures"),
         judge_section(judged(every), out / "figures"),
         step_section(runs),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Any
 from unicodedata import category
 
@@ -12,6 +13,8 @@ from .errors import InputError
 
 #: characters of a name or a unit
 LONGEST_LABEL = 1000
+#: numbers of an array that Python looks through before numpy has begun
+FEW = 50
 
 
 def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | None = None) -> np.ndarray:
@@ -21,7 +24,7 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | No
         InputError: not numbers, another shape, or not finite.
     """
     array = numbers(name, value, shape)
-    if not np.isfinite(array).all():
+    if not _finite(array):
         where = np.argwhere(~np.isfinite(array))[0]
         entry = f" at index {tuple(int(k) for k in where)}" if array.ndim else ""
         found = array[tuple(where)]
@@ -252,7 +255,15 @@ def printable(text: str) -> str:
     return "".join(c if c in "\n\t" or unprintable(c) is None else "\ufffd" for c in text)
 
 
+def _finite(array: np.ndarray) -> bool:
+    if array.size <= FEW:
+        return all(map(isfinite, array.ravel().tolist()))
+    return bool(np.isfinite(array).all())
+
+
 def _fits(found: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:
+    if found == expected:
+        return True
     return len(found) == len(expected) and all(
         e is None or e == f for f, e in zip(found, expected, strict=True)
     )

@@ -10,8 +10,8 @@ from theory_cells import coupling, experiment
 from synctrl import Disturbance
 from synctrl.analysis import certify
 from synctrl.analysis.certify import MEANINGS, VERDICTS, Certificate
-from synctrl.paper.promises_section import PROMISED, dissipation_table, promises_section
-from synctrl.paper.report import Points, number, write_page
+from synctrl.paper.promises_section import PROMISED, dissipation_table, promised_means
+from synctrl.paper.report import Points, Section, number, write_page
 from synctrl.paper.theory import CERTIFIED
 
 PUSH = Disturbance(robot=0, torque=[0.5], start=0.02, stop=0.08)
@@ -33,8 +33,8 @@ def test_every_promised_run_is_certified() -> None:
 
 def test_each_run_has_its_verdict_and_what_that_means(certificates) -> None:
     assert [each.verdict for each in certificates.values()] == [*VERDICTS]
-    section = promises_section(dict(zip(PROMISED, certificates.values(), strict=False)))
-    (points,) = (block for block in section.blocks if isinstance(block, Points))
+    blocks = promised_means(dict(zip(PROMISED, certificates.values(), strict=False)))
+    (points,) = (block for block in blocks if isinstance(block, Points))
     for sentence, meaning in zip(points.sentences, MEANINGS, strict=True):
         assert meaning in sentence
     assert "Outside the theorem: torque from outside" in points.sentences[1]
@@ -54,6 +54,6 @@ def test_a_bound_stands_beside_what_it_bounds_and_none_where_nothing_is_promised
 
 
 def test_runs_that_were_not_certified_are_left_out(certificates, tmp_path) -> None:
-    section = promises_section({PROMISED[1]: certificates["pushed"], "another": certificates["quiet"]})
-    text = write_page(tmp_path / "page.html", "page", [section]).read_text("utf-8")
+    blocks = promised_means({PROMISED[1]: certificates["pushed"], "another": certificates["quiet"]})
+    text = write_page(tmp_path / "page.html", "page", [Section("promises", tuple(blocks))]).read_text("utf-8")
     assert text.count("<tr><th scope='row'>") == 1

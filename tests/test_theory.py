@@ -7,9 +7,12 @@ import pytest
 from theory_cells import GAINS, coupling, experiment, planar_arm
 
 from synctrl import Cell, Coupling, Experiment, FunctionTrajectory, Member
+from synctrl.analysis import side_by_side
 from synctrl.analysis.lyapunov import THEOREM, lyapunov
 from synctrl.analysis.replay import replay
 from synctrl.control.laws import Along, SunMills
+from synctrl.experiments import planar_four
+from synctrl.paper.fairness import STIFFEST, taken_apart
 
 pytestmark = pytest.mark.filterwarnings("ignore::synctrl.errors.CouplingWarning")  # odd rings are meant
 rng = np.random.default_rng(11)
@@ -144,3 +147,21 @@ def test_the_command_has_the_gain_lambda_plus_beta_times_an_eigenvalue_of_s_tran
         np.testing.assert_allclose(command, (Lambda + beta * value) * w, atol=1e-9)
     assert Lambda + beta * values[-1] == pytest.approx(most)
     assert Lambda + beta * values[0] == pytest.approx(Lambda)
+
+
+def test_over_the_papers_five_seconds_beta_does_nearly_all_of_the_work() -> None:
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    made = taken_apart(planar_four())
+    law, nothing = next(iter(made)), "none of them"
+    tried = (law, nothing, "β", "K_ε", "adaptation", STIFFEST)
+    rows = side_by_side({name: made[name] for name in tried}, engine="compiled").rows
+    found = {row.law: row.quiet for row in rows}
+    rms = {name: sizes.sync_rms / found[nothing].sync_rms for name, sizes in found.items()}
+    assert rms["β"] == pytest.approx(0.034, abs=5e-4)
+    assert found["β"].sync_peak / found[nothing].sync_peak == pytest.approx(0.086, abs=5e-4)
+    assert rms["K_ε"] == pytest.approx(0.90, abs=5e-3)
+    assert rms["adaptation"] == pytest.approx(0.98, abs=5e-3)
+    assert rms[STIFFEST] == pytest.approx(rms[law], rel=0.05)
+    for size in ("sync_peak", "tracking_rms", "tracking_peak"):
+        assert getattr(found[STIFFEST], size) < getattr(found[law], size)
+    assert found[STIFFEST].peak_torque == pytest.approx(8 * found[law].peak_torque, rel=0.05)

@@ -127,14 +127,19 @@ class Dissipation:
         return float("inf") if self.reason is not None else self.V0 + self.entered + self.D**2 / 4
 
     @property
+    def duration(self) -> float:
+        """Time from the first to the last logged instant, s."""
+        return float(self.t[-1] - self.t[0])
+
+    @property
     def mean_square(self) -> float:
-        """Mean of s_q^T K_r s_q over the run, W."""
-        return self.X**2 / float(self.t[-1] - self.t[0])
+        """Mean of s_q^T K_r s_q over the run, W; 0 of a single instant."""
+        return self.X**2 / self.duration if self.duration else 0.0
 
     @property
     def mean_square_bound(self) -> float:
         """The most that it can be, W."""
-        return self.X_bound**2 / float(self.t[-1] - self.t[0])
+        return self.X_bound**2 / self.duration if self.duration else float("inf")
 
     @property
     def gap(self) -> np.ndarray:
@@ -184,7 +189,7 @@ def dissipation(result: Result | Replay, experiment: Experiment | None = None) -
 
 def balanced(run: Replay, reasons: Sequence[str]) -> Dissipation:
     """`dissipation` of a run of which it is known why the theorem does not reach it; empty if it does."""
-    sampled = run.result.info.get("control_period") is not None
+    sampled = run.result.info.get("control_period") is not None and len(run.result.t) > 1
     run, further = held(run) if sampled else (run, {})
     torques, x, (kept, rates, lost) = unmodelled(run, further), run.rows, _law(run)
     total, model = np.sum(list(torques.values()), axis=0), x.lacking - x.frozen

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 
 from ..analysis.certify import Certificate
 from ..analysis.dissipation import SEEN, Dissipation
+from ..simulation.result import Result
+from .promised_errors import promised_errors
+from .promised_rates import promised_rates
 from .report import Block, Points, Section, Table, Text, number
+from .reproduction import PLANNED
 
 #: the runs of which it is told
 PROMISED = (
@@ -19,19 +24,37 @@ PROMISED = (
     "planar_four_synchronized_disturbed",
     "planar_four_independent_disturbed",
 )
+#: the cells whose synchronized runs are told in full
+CELLS = "a460_pair", "planar_four"
 TITLE = "What the run's certificate promises"
 
 
-def promises_section(certificates: Mapping[str, Certificate]) -> Section:
-    """What the certificate of each run says, and what Theorem A bounds beside what it was.
+def promises_section(
+    certificates: Mapping[str, Certificate], runs: Mapping[str, Result], folder: Path
+) -> Section:
+    """What certificates and the three theorems say of the runs, beside what they did.
 
     Args:
         certificates: by name of the run; those of `PROMISED` are told.
+        runs: by name, `PLANNED`.
+        folder: where figures go.
     """
+    a460, planar = (
+        {name.removeprefix(cell): run for name, run in runs.items() if name.startswith(cell)}
+        for cell in ("a460_pair_", "planar_four_")
+    )
+    blocks = promised_means(certificates)
+    for cell in CELLS:
+        name = f"{cell}_synchronized"
+        blocks += promised_errors(runs[name], PLANNED[name].make(), folder / f"modal_{cell}")
+    return Section(TITLE, (*blocks, *promised_rates(a460, planar, folder / "rates_over_gamma")))
+
+
+def promised_means(certificates: Mapping[str, Certificate]) -> list[Block]:
+    """What the certificate of each run says, and what Theorem A bounds beside what it was."""
     told = {name: certificates[name] for name in PROMISED if name in certificates}
-    blocks: list[Block] = [Text(_ABOUT), Points(tuple(said(each) for each in told.values()))]
-    blocks += [Text(_THEOREM_A), dissipation_table(told)]
-    return Section(TITLE, tuple(blocks))
+    points = Points(tuple(said(each) for each in told.values()))
+    return [Text(_ABOUT), points, Text(_THEOREM_A), dissipation_table(told)]
 
 
 def said(certificate: Certificate) -> str:
@@ -45,14 +68,14 @@ def dissipation_table(certificates: Mapping[str, Certificate]) -> Table:
     """Theorem A's bounds of every run, beside what was bounded."""
     found = [(c.title, c.dissipation) for c in certificates.values() if c.dissipation is not None]
     head = ("run", "V(0)", "D", "by", *("actual", "at most", "share") * 2, "actual", "at most")
-    groups = (("", 3), ("X, √(N·m)", 3), ("Z² + V(T), N·m", 3), ("mean of sᵀK_r s, W", 2))
+    groups = (("", 3), ("X, √(N·m)", 3), ("Z² + V(T), N·m", 3), ("mean of sᵀ K_r s, W", 2))
     rows = tuple((title, *_cells(each)) for title, each in found)
     return Table(head, rows, _CAPTION, groups)
 
 
 def _cells(found: Dissipation) -> tuple[str, ...]:
     acting = [name for name, D in found.sources.items() if SEEN * max(found.X, found.D) < D]
-    told = number(found.V0), number(found.D), ", ".join(acting) or "nothing"
+    told = number(found.V0), number(found.D if acting else 0.0), ", ".join(acting) or "nothing"
     pairs = (found.X, found.X_bound), (found.rest, found.rest_bound)
     compared = (cell for a, b in pairs for cell in (number(a), _finite(b), f"{a / b:.0%}" if a / b else "–"))
     return (*told, *compared, number(found.mean_square), _finite(found.mean_square_bound))
@@ -68,7 +91,7 @@ _ABOUT = (
 )
 _THEOREM_A = (
     "Theorem A: whatever torque d acts that the model does not know, friction, a push, saturation, with "
-    "X² = ∫ Σ sᵀK_r s, D² = ∫ Σ dᵀK_r⁻¹ d, and Z² all else that V' loses, X ≤ D/2 + √(D²/4 + V(0)) and "
+    "X² = ∫ Σ sᵀ K_r s, D² = ∫ Σ dᵀ K_r⁻¹ d, and Z² all else that V' loses, X ≤ D/2 + √(D²/4 + V(0)) and "
     "Z² + V(T) ≤ V(0) + D²/4. It bounds means over the run, not the largest error."
 )
 _CAPTION = (
