@@ -44,11 +44,13 @@ from synctrl.control.adaptation import Gradient
 from synctrl.control.controller import Signals
 from synctrl.control.laws import ChungSlotine
 from synctrl.errors import InputError
+from synctrl.experiments import a460_pair, planar_four
 from synctrl.robots.parameters import FrictionParameters, planar_two_link_parameters
 from synctrl.show.rate_figures import rates_figure
 
 GAINS = Gains(Lambda=6.0, beta=3.0, K_r=2.0, K_eps=0.4, Gamma=0.3)
 PERIOD = 1.0
+PAGE = Path(__file__).parents[1] / "docs" / "theorem_c.md"
 ROD = rod_arm((1.0, 1.0), (0.3, 0.3))
 THREE = planar_two_link_parameters(ROD, (1.0, 1.0), (0.3, 0.3))
 
@@ -163,6 +165,21 @@ def test_at_rest_as_many_combinations_are_excited_as_joints_are_loaded() -> None
     z = rate.coordinates
     assert [found.rank - count for found, count in zip(z.groupings, z.unexcited, strict=True)] == [2, 2]
     assert len(rate.unexcited) == sum(z.unexcited)
+
+
+def test_the_papers_a460_at_rest_learn_what_their_gravity_shows() -> None:
+    """Joint 1 is vertical, so gravity loads two joints of each arm, in one posture."""
+    rate = exponential_rate(a460_pair(friction=False), 1.0, start=5.0)
+    z = rate.coordinates
+    assert [found.rank - count for found, count in zip(z.groupings, z.unexcited, strict=True)] == [2, 2]
+    assert 0 < rate.excited_rate < z.controller.Lambda.min() / 60
+    assert f"at {rate.excited_rate:.2f} 1/s" in PAGE.read_text("utf-8")
+
+
+def test_a_motion_that_has_faded_away_excites_nothing() -> None:
+    rate = exponential_rate(planar_four(), 1.0, start=25.0)  # what rounding leaves of it does not count
+    assert rate.coordinates.unexcited == (3, 3, 3, 3)
+    assert rate.slowest.startswith("robot") and rate.excited_rate > 0
 
 
 def test_learning_faster_is_not_always_faster() -> None:
@@ -380,7 +397,7 @@ def test_factors_that_are_not_above_0_are_refused() -> None:
 
 
 def test_the_page_of_the_theorem_runs_and_has_the_numbers_that_it_shows() -> None:
-    page = (Path(__file__).parents[1] / "docs" / "theorem_c.md").read_text("utf-8")
+    page = PAGE.read_text("utf-8")
     names: dict[str, Any] = {}
     for block in re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL):
         exec(compile(block, "docs/theorem_c.md", "exec"), names)

@@ -68,8 +68,11 @@ class ExponentialRate:
 
     @property
     def stable(self) -> bool:
-        """Whether all errors, of parameters too, vanish exponentially if they are small."""
-        return not self.unexcited and self.radius < 1
+        """Whether all errors, of parameters too, vanish exponentially if they are small.
+
+        A multiplier that is nearer to 1 than its error does not tell.
+        """
+        return not self.unexcited and self.radius < 1 - self.error
 
     def as_dict(self) -> dict[str, Any]:
         """The figures a report shows, as plain data."""

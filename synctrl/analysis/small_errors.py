@@ -24,6 +24,8 @@ from .on_motion import OnMotion
 
 #: eigenvalues below this share of the largest count as 0
 ZERO = 1e-10
+#: square of the entries of Y, in SI units, below which a motion excites nothing at all
+FAINT = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +132,7 @@ def _adapted(Y: np.ndarray, found: Grouping, Gamma: np.ndarray) -> tuple[np.ndar
     L = vectors[:, used] * np.sqrt(values[used])
     Y_u = Y[:, :, found.columns] @ L
     power, turn = np.linalg.eigh(np.einsum("tja,tjb->ab", Y_u, Y_u) / len(Y))
-    noise = ZERO * np.sum(L * L)  # of a motion that excites nothing at all
-    count = int((power <= ZERO * max(power.max(initial=0.0), noise)).sum())
+    count = int((power <= max(ZERO * power.max(initial=0.0), FAINT * np.sum(L * L))).sum())
     return L @ turn[:, ::-1], count
 
 
