@@ -9,11 +9,11 @@ import pytest
 from theory_cells import coupling, experiment
 
 from synctrl import Experiment
-from synctrl.analysis import exponential_rate, modal_bounds, tube
+from synctrl.analysis import RatesOverGamma, exponential_rate, modal_bounds, tube
 from synctrl.experiments import a460_pair, planar_four
 from synctrl.experiments.a460_pair import MOTION_TIME
 from synctrl.paper.promised_errors import caption, modal_table, promised_errors, tube_table, tube_words
-from synctrl.paper.promised_rates import PERIOD, about_a460, about_planar, late_rate
+from synctrl.paper.promised_rates import PERIOD, about_a460, about_planar, late_rate, rates_caption
 from synctrl.paper.report import Section, number, write_page
 from synctrl.show.style import display
 from synctrl.simulation.result import Result
@@ -84,6 +84,13 @@ def test_the_a460_at_rest_falls_in_the_end_at_the_rate_of_theorem_c() -> None:
     said = about_a460(rate, {"left_gravity": run, "left_both": run})
     assert f"fall at {number(rate.excited_rate)} 1/s" in said
     assert f"{number(late_rate(run))} 1/s without friction" in said
+
+
+def test_the_caption_of_the_rates_has_the_rate_of_the_papers_gamma_and_the_best_one() -> None:
+    rates = RatesOverGamma(np.array([0.5, 1.0, 2.0]), np.array([0.1, 0.2, 0.15]), float("inf"), ())
+    assert "gives 0.2 1/s, the best of these, 1 times as much, 0.2 1/s" in rates_caption(rates)
+    other = replace(rates, rates=np.array([0.1, 0.2, 0.7]))
+    assert "gives 0.2 1/s, the best of these, 2 times as much, 0.7 1/s" in rates_caption(other)
 
 
 def test_the_planar_arms_fall_as_their_motion_ends() -> None:

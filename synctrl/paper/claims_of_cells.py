@@ -142,9 +142,9 @@ def gain_contributes_little(name: str, paper: Result, without: Result) -> Claim:
             *claims.findings("late ε", lates, unit, who),
         ),
         f"Asked: the peak of ε, and its RMS over {t[-1]:g} s, change by at most {claims.LITTLE:.0%}. "
-        f"Without {name} the peak, at {1e3 * at:.0f} ms, changes by {peaks[1] / peaks[0] - 1:+.1%}, the RMS "
-        f"by {sizes[1] / sizes[0] - 1:+.1%}, and what is left over the last tenth by "
-        f"{lates[1] / lates[0] - 1:+.1%}.",
+        f"Without {name} the peak, at {1e3 * at:.0f} ms, changes by {peaks[1] / peaks[0] - 1:+z.1%}, the RMS "
+        f"by {sizes[1] / sizes[0] - 1:+z.1%}, and what is left over the last tenth by "
+        f"{lates[1] / lates[0] - 1:+z.1%}.",
     )
 
 

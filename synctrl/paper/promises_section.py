@@ -68,14 +68,14 @@ def dissipation_table(certificates: Mapping[str, Certificate]) -> Table:
     """Theorem A's bounds of every run, beside what was bounded."""
     found = [(c.title, c.dissipation) for c in certificates.values() if c.dissipation is not None]
     head = ("run", "V(0)", "D", "by", *("actual", "at most", "share") * 2, "actual", "at most")
-    groups = (("", 3), ("X, √(N·m)", 3), ("Z² + V(T), N·m", 3), ("mean of sᵀK_r s, W", 2))
+    groups = (("", 3), ("X, √(N·m)", 3), ("Z² + V(T), N·m", 3), ("mean of sᵀ K_r s, W", 2))
     rows = tuple((title, *_cells(each)) for title, each in found)
     return Table(head, rows, _CAPTION, groups)
 
 
 def _cells(found: Dissipation) -> tuple[str, ...]:
     acting = [name for name, D in found.sources.items() if SEEN * max(found.X, found.D) < D]
-    told = number(found.V0), number(found.D), ", ".join(acting) or "nothing"
+    told = number(found.V0), number(found.D if acting else 0.0), ", ".join(acting) or "nothing"
     pairs = (found.X, found.X_bound), (found.rest, found.rest_bound)
     compared = (cell for a, b in pairs for cell in (number(a), _finite(b), f"{a / b:.0%}" if a / b else "–"))
     return (*told, *compared, number(found.mean_square), _finite(found.mean_square_bound))
@@ -91,7 +91,7 @@ _ABOUT = (
 )
 _THEOREM_A = (
     "Theorem A: whatever torque d acts that the model does not know, friction, a push, saturation, with "
-    "X² = ∫ Σ sᵀK_r s, D² = ∫ Σ dᵀK_r⁻¹ d, and Z² all else that V' loses, X ≤ D/2 + √(D²/4 + V(0)) and "
+    "X² = ∫ Σ sᵀ K_r s, D² = ∫ Σ dᵀ K_r⁻¹ d, and Z² all else that V' loses, X ≤ D/2 + √(D²/4 + V(0)) and "
     "Z² + V(T) ≤ V(0) + D²/4. It bounds means over the run, not the largest error."
 )
 _CAPTION = (
