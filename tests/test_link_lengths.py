@@ -24,7 +24,6 @@ ARMS = (
     "xarm7",
     "kinova",
     "z1",
-    "so101",
 )
 ROUNDING = 1e-9
 

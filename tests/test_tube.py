@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -19,10 +20,11 @@ from theory_cells import EDGES, GAINS, coupling, experiment
 from synctrl import Cell, Coupling, Disturbance, Experiment, Friction, Gains, Member, load_robot
 from synctrl.analysis import Tube, dissipation, tube
 from synctrl.analysis.error_modes import ErrorModes
+from synctrl.analysis.jacobian_size import jacobian_sizes, parts_of
 from synctrl.analysis.replay import replay
 from synctrl.control.controller import Controller
 from synctrl.errors import InputError
-from synctrl.experiments import a460_pair
+from synctrl.experiments import a460_pair, bead_on_edge, panda_four, planar_four, ur5_payload
 from synctrl.tasks.trajectories import FunctionTrajectory, Hold
 
 DURATION, DT = 0.2, 2.5e-3
@@ -114,6 +116,30 @@ def test_viscous_friction_at_rest_adds_its_share_of_the_damping_to_the_torque() 
     rubbed = quiet(0.5, friction=Friction(viscous=gamma * GAINS.K_r))
     assert one.X / (1 - gamma) == pytest.approx(rubbed.X)
     assert pytest.approx(one.D + gamma * rubbed.X) == rubbed.D
+
+
+@pytest.mark.parametrize("make", [ur5_payload, panda_four])
+def test_nor_does_one_in_poses_or_of_redundant_arms(make: Callable[[], Experiment]) -> None:
+    one = make()
+    run = one.simulate(0.1, 2e-3)
+    told = tube(one.cell, one.gains, duration=one.duration, times=run.t)
+    assert (told.sizes(run.tracking_error) <= told.radius).all()
+
+
+@pytest.mark.parametrize("make", [planar_four, ur5_payload, panda_four, bead_on_edge])
+def test_no_jacobian_at_any_place_is_larger_than_lengths_of_links_say(make: Callable[[], Experiment]) -> None:
+    """With errors of orientations as they come, and points that slide on what an arm carries."""
+    one, rng = make(), np.random.default_rng(0)
+    cell, K_r = one.cell, Controller(one.cell, one.gains).K_r
+    times = np.linspace(0.0, one.duration, 40)
+    scale = np.divide(1.0, np.sqrt(K_r), out=np.zeros_like(K_r), where=K_r > 0)[:, None]
+    for desired in cell.reference_table(times).desired:
+        motion = np.stack((rng.uniform(-np.pi, np.pi, K_r.shape), 0 * K_r))
+        task = cell.task.measure(motion, desired)
+        angle = float(np.linalg.norm(task.error[0][:, 3:], axis=-1).max()) if cell.m == 6 else 0.0
+        sizes, sampled = jacobian_sizes(cell, K_r, times, angle)
+        parts = [np.linalg.norm((scale * task.J)[:, part], 2, axis=(-2, -1)) for part in parts_of(cell)]
+        assert not sampled and (np.stack(parts, axis=-1) <= sizes * (1 + 1e-9)).all()
 
 
 # -- what it is made of ------------------------------------------------------------------------------------

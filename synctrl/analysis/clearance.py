@@ -124,7 +124,8 @@ class Along(NamedTuple):
     """An arm along its desired path, where it is nearest to a singular configuration.
 
     Attributes:
-        room, size: s^2 / (2 H) there and R, in units of the scale that is best.
+        room, size: s^2 / (2 H) there and R, m, or rad with positions over `scale`.
+        scale: of those tried the one that leaves most room, m.
         time: of that instant, s.
         jumps: whether joint positions from instant to instant may be on different branches.
         elsewhere: whether the start is beyond the second root.
@@ -132,6 +133,7 @@ class Along(NamedTuple):
 
     room: float
     size: float
+    scale: float
     time: float
     jumps: bool
     elsewhere: bool
@@ -150,7 +152,8 @@ def _near(cell: Cell, i: int, told: Reference, radius: np.ndarray) -> Clearance:
     if found.size < found.room and (found.jumps or found.elsewhere):
         words = "joint positions jump along the path" if found.jumps else "the start is on another branch"
         return Clearance(None, f"{words} of {name}", np.inf)
-    words = f"{name} may be singular from errors of {found.room:.3g} on, at t = {found.time:.3g} s"
+    unit = "m" if radius.shape[-1] == 1 else f"rad, with {found.scale:.2g} m for 1 rad"
+    words = f"{name} may be singular from errors of {found.room:.3g} {unit}, at t = {found.time:.3g} s"
     share = found.size / found.room if found.room > 0 else np.inf
     return Clearance(share < 1, f"{words}, and its tube allows {found.size:.3g}", share)
 
@@ -161,12 +164,14 @@ def _along(cell: Cell, i: int, times: np.ndarray, path: np.ndarray, radius: np.n
     if followed is None:
         return None
     (q, J), reach = followed, column_bounds(robot).linear.max()
-    tried = [_room(robot, J, radius, scale * reach) for scale in SCALES]
-    room, size, H, s = max(tried, key=lambda found: float((found[0] / found[1]).min()))
+    tried = {scale * reach: _room(robot, J, radius, scale * reach) for scale in SCALES}
+    scale = max(tried, key=lambda each: float((tried[each][0] / tried[each][1]).min()))
+    room, size, H, s = tried[scale]
     k, away = int(np.argmin(room / size)), float(np.linalg.norm(cell.q0[i, : robot.nv] - q[0]))
     jumps = bool((np.linalg.norm(np.diff(q, axis=0), axis=-1) * H >= s[1:]).any())
     beyond = away * H >= s[0] + float(np.sqrt(max(s[0] ** 2 - 2 * H * size[0], 0.0)))
-    return Along(float(room[k]), float(size[k]), float(times[k]), jumps, beyond)
+    unit = scale if radius.shape[-1] == 1 else 1.0
+    return Along(float(unit * room[k]), float(unit * size[k]), scale, float(times[k]), jumps, beyond)
 
 
 def bend(robot: Robot, scale: float, m: int) -> tuple[np.ndarray, float]:
