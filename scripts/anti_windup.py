@@ -84,12 +84,12 @@ def hedged(experiment: Experiment, speed: float | None = None) -> Experiment:
     return replace(experiment, adaptation=adaptation, gains=gains.replace(Gamma=None))
 
 
-def run(experiment: Experiment, duration: float | None = None) -> Result:
+def run(experiment: Experiment, duration: float | None = None, engine: str = "pinocchio") -> Result:
     """The run, or what there is of it if it had to stop."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            return experiment.simulate(duration)
+            return experiment.simulate(duration, engine=engine)
         except SimulationError as stop:
             return stop.result
 

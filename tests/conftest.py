@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import importlib.util
 import os
 import sysconfig
 from collections.abc import Callable
@@ -28,6 +29,8 @@ settings.register_profile(
 )
 settings.load_profile("synctrl")
 
+#: of full runs; tests of both engines hold that it makes no difference
+ENGINE = "compiled" if importlib.util.find_spec("casadi") else "pinocchio"
 INSTALLED = Path(sysconfig.get_path("purelib"))
 
 
@@ -52,12 +55,12 @@ def once_if_installed(look: Callable) -> Callable:
 @pytest.fixture(scope="session")
 def planar_run():
     """Full runs of the four arms, each computed once: `planar_run(synchronized, disturbance)`."""
-    run = cache(lambda *arguments: planar_four(*arguments).simulate())
+    run = cache(lambda *arguments: planar_four(*arguments).simulate(engine=ENGINE))
     return lambda synchronized=True, disturbance=None: run(synchronized, disturbance)
 
 
 @pytest.fixture(scope="session")
 def a460_run():
     """Full runs of the two A460, each computed once: `a460_run(synchronized, friction)`."""
-    run = cache(lambda *arguments: a460_pair(*arguments).simulate())
+    run = cache(lambda *arguments: a460_pair(*arguments).simulate(engine=ENGINE))
     return lambda synchronized=True, friction=True: run(synchronized, friction)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -29,6 +30,8 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::synctrl.errors.SaturationWarning"),  # torque is meant to be cut
     pytest.mark.filterwarnings("ignore::synctrl.errors.StepWarning"),  # estimates that run away ask for less
 ]
+#: of long runs; both do the same, see below
+ENGINE = "compiled" if importlib.util.find_spec("casadi") else "pinocchio"
 SEEDS = st.integers(0, 2**32 - 1)
 CELL = a460_pair(friction=False).cell
 P = CELL.theta.shape[1]
@@ -184,7 +187,7 @@ def test_a_run_that_is_never_cut_is_the_plain_law_bit_for_bit(make, engine, opti
 @pytest.mark.parametrize("name", CELLS)
 def test_estimates_stay_bounded_whatever_is_cut_off(name):
     experiment = CELLS[name]()
-    result = run(experiment, 0.8)
+    result = run(experiment, 0.8, ENGINE)
     radius = np.array(result.info["adaptation"]["adaptation"]["radius"])
     assert (result.outputs["applied_torque"] != result.tau).any()
     assert (reach(experiment, result.theta_hat) <= radius * (1 + 1e-9)).all()
@@ -192,14 +195,15 @@ def test_estimates_stay_bounded_whatever_is_cut_off(name):
 
 def test_estimates_drift_without_bounds_where_there_is_less_torque_than_gravity_takes():
     experiment = below_gravity()
-    drift = [reach(experiment, run(each, 2.0).theta_hat)[-1] for each in (plain(experiment), experiment)]
+    runs = [run(each, 2.0, ENGINE) for each in (plain(experiment), experiment)]
+    drift = [reach(experiment, each.theta_hat)[-1] for each in runs]
     assert (drift[0] > 2 * drift[1]).any()
 
 
 def test_a_leak_keeps_integrals_within_what_epsilon_was_over_the_leak_and_without_one_they_grow():
     leak, experiment = 5.0, below_gravity()
     leaking = replace(experiment, gains=experiment.gains.replace(leak=leak))
-    runs = [run(each, 2.0) for each in (leaking, experiment)]
+    runs = [run(each, 2.0, ENGINE) for each in (leaking, experiment)]
     held, free = (np.abs(each.sync_integral).max(axis=(1, 2)) for each in runs)
     allowed, much = (np.maximum.accumulate(np.abs(r.sync_error).max(axis=(1, 2))) / leak for r in runs)
     assert all((each.outputs["applied_torque"] != each.tau).any() for each in runs)
@@ -211,7 +215,7 @@ def test_after_a_push_above_its_limits_an_arm_comes_back_only_with_bounds():
     experiment = pushed_above_limits()
     short = replace(experiment.disturbances[0], start=0.1, stop=0.6)
     experiment = replace(experiment, disturbances=[short])
-    plainly, held = (run(each, 2.5) for each in (plain(experiment), experiment))
+    plainly, held = (run(each, 2.5, ENGINE) for each in (plain(experiment), experiment))
     last = [
         np.flatnonzero((each.outputs["applied_torque"] != each.tau).any(axis=(1, 2)))[-1]
         for each in (plainly, held)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ import pytest
 TESTS = Path(__file__).parent
 PAGES = {path.name: path.read_text("utf-8") for path in sorted((TESTS.parent / "docs").glob("*.md"))}
 PAGE = PAGES["theory.md"]
+FILES = {path.name: path.read_text("utf-8") for path in sorted(TESTS.glob("test_*.py"))}
 #: sections without statements of their own
 PLAIN = {"", "Where the equations are", "References"}
 #: where a statement begins, beside headings and paragraphs that begin with bold words: items of a list
@@ -29,22 +31,25 @@ def statements() -> dict[str, str]:
     return found
 
 
-def named(block: str, page: str = PAGE) -> list[tuple[str, str]]:
-    """Tests named in brackets, each with its file: the one named last, or that of which the page says so."""
-    found, usual = [], re.search(r"in\s+`tests/(test_\w+\.py)`", page)
+def named(block: str) -> list[tuple[str, str]]:
+    """Tests named in brackets, each with its file: that which was named last, or that of the errata."""
+    found = []
     for bracket in re.findall(r"\[([^\[\]]*`test_[^\[\]]*)\](?!\()", block):
-        file = usual[1] if usual else ""
+        file = "test_errata.py"
         for name in re.findall(r"`(test_\w+(?:\.py)?(?:\.\.\.)?)`", bracket):
             file = name if name.endswith(".py") else file
             found.append((file, "" if name.endswith(".py") else name))
     return found
 
 
-def exists(file: str, name: str) -> bool:
-    """Whether a test of that name, or one that begins like a name that ends in dots, is in that file."""
-    path, end = TESTS / file, "" if name.endswith("...") else r"\("
-    pattern = rf"(?m)^def {name.removesuffix('...')}{end}"
-    return path.is_file() and re.search(pattern, path.read_text("utf-8")) is not None
+DEFINED = {file: re.findall(r"(?m)^def (test_\w+)\(", source) for file, source in FILES.items()}
+ALL = {name for names in DEFINED.values() for name in names}
+
+
+def among(name: str, tests: Iterable[str]) -> bool:
+    """Whether one of the tests has that name, or begins like a name that ends in dots."""
+    begin = name.removesuffix("...")
+    return begin in tests or (begin != name and any(test.startswith(begin) for test in tests))
 
 
 STATEMENTS = statements()
@@ -64,11 +69,15 @@ def test_every_assumption_of_the_theorem_has_a_row_that_says_where_it_is_checked
     assert all(named(where) for *_, where in rows)
 
 
+def test_every_test_that_the_page_names_exists_in_its_file() -> None:
+    assert not [(file, name) for file, name in named(PAGE) if name and not among(name, DEFINED[file])]
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_every_test_that_a_page_names_exists(page: str) -> None:
-    tests = named(PAGES[page], PAGES[page])
-    assert not [(file, name) for file, name in tests if name and not exists(file, name)]
-    assert all((TESTS / file).is_file() for file, _ in tests)
+    tests = named(PAGES[page])
+    assert not [name for _, name in tests if name and not among(name, ALL)]
+    assert not [file for file, name in tests if not name and file not in FILES]
 
 
 def test_every_citation_has_a_reference_and_every_reference_is_cited() -> None:
@@ -85,7 +94,9 @@ def test_the_checks_find_what_is_missing() -> None:
     begun = ("test_errata.py", "test_01_...")
     assert named(block) == [begun, ("test_leak.py", ""), ("test_leak.py", "test_a")]
     assert not named("1. Words of `test_01_...`, see [there](there.md).")
-    assert exists("test_errata.py", "test_01_...") and not exists("test_errata.py", "test_01")
+    tests = ["test_01_a", "test_02"]
+    assert among("test_01_...", tests) and among("test_02", tests)
+    assert not among("test_01", tests) and not among("test_03_...", tests)
 
 
 def test_every_file_in_which_the_page_says_that_an_equation_is_exists() -> None:
