@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import importlib.util
 import os
 import sysconfig
 from collections.abc import Callable
@@ -11,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from engines import ENGINE
 from hypothesis import HealthCheck, settings
 
 import synctrl.robots.urdf.meshes as checking
@@ -29,8 +29,6 @@ settings.register_profile(
 )
 settings.load_profile("synctrl")
 
-#: of full runs; tests of both engines hold that it makes no difference
-ENGINE = "compiled" if importlib.util.find_spec("casadi") else "pinocchio"
 INSTALLED = Path(sysconfig.get_path("purelib"))
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from engines import ENGINE
 from hypothesis import given
 from hypothesis import strategies as st
 from refusals import refused
@@ -30,8 +30,6 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::synctrl.errors.SaturationWarning"),  # torque is meant to be cut
     pytest.mark.filterwarnings("ignore::synctrl.errors.StepWarning"),  # estimates that run away ask for less
 ]
-#: of long runs; both do the same, see below
-ENGINE = "compiled" if importlib.util.find_spec("casadi") else "pinocchio"
 SEEDS = st.integers(0, 2**32 - 1)
 CELL = a460_pair(friction=False).cell
 P = CELL.theta.shape[1]

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from engines import ENGINE
 from hypothesis import given
 from hypothesis import strategies as st
 from refusals import refused
@@ -183,7 +184,7 @@ def test_a_push_enters_the_filtered_torque_as_if_it_were_dynamics():
 
 def errors_of(experiment: Experiment, *times: float) -> np.ndarray:
     """Errors of the estimates at some instants, as shares of theta, (times, robots)."""
-    result, theta = experiment.simulate(dt=1e-3), experiment.cell.theta
+    result, theta = experiment.simulate(dt=1e-3, engine=ENGINE), experiment.cell.theta
     rows = [np.searchsorted(result.t, t) for t in times]
     return np.linalg.norm((result.theta_hat[rows] - theta) / theta, axis=-1)
 
@@ -203,7 +204,7 @@ def test_a_memory_that_fades_stops_pulling_at_rest_and_leaves_an_error():
 
 
 def test_forgotten_gamma_shrinks_where_something_is_learned_and_grows_back_to_its_bound():
-    result = (experiment := arms(FORGETTING)).simulate(1.5, dt=2e-3)
+    result = (experiment := arms(FORGETTING)).simulate(1.5, dt=2e-3, engine=ENGINE)
     bound = FORGETTING.bind(experiment.cell)
     grown = []
     for z in result.outputs["adaptation_state"][::25]:

@@ -61,8 +61,19 @@ def test_the_example_with_gains_of_ones_own_runs(page, part, name):
     assert result.status == "completed" and result.info[part]["name"] == name
 
 
-def test_the_example_about_held_objects_has_the_outputs_that_the_page_names():
-    names = run("assembly.md")
+@pytest.fixture(scope="module")
+def held_objects() -> dict:
+    return run("assembly.md")
+
+
+def test_in_the_example_about_held_objects_either_hand_has_half_of_the_weight(held_objects):
+    force = held_objects["held"].outputs["hand_wrench"][-1, :, :3]
+    half = -0.5 * held_objects["plate"].mass * np.array(held_objects["arm"].gravity_vector)
+    np.testing.assert_allclose(force, [half, half], atol=1e-3)
+
+
+def test_the_example_about_held_objects_has_the_outputs_that_the_page_names(held_objects):
+    names = held_objects
     assert names["squeeze"].shape == names["result"].t.shape
     told = set(re.findall(r"`((?:object|hand|internal)_\w+)`", (DOCS / "assembly.md").read_text("utf-8")))
     assert told == {name for name in names["result"].outputs if name != "plant_state"}
