@@ -180,3 +180,11 @@ def test_what_could_hardly_have_failed_is_named_and_is_about_robots_that_nothing
     assert len(built) == 2
     shown = Verdicts(tuple(built)).html()
     assert shown.count("Could hardly have failed: ") == 2
+
+
+def test_a_disturbed_run_in_shorter_steps_responds_at_the_instants_of_the_other(planar):
+    undisturbed, disturbed = planar["synchronized"].decimated(2), planar["synchronized_disturbed"]
+    expected = (disturbed.tracking_error - planar["synchronized"].tracking_error)[::2]
+    np.testing.assert_array_equal(claims.response(disturbed, undisturbed), expected)
+    with refused(InputError, "claims"):
+        claims.response(undisturbed, disturbed)

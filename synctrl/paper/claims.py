@@ -172,6 +172,18 @@ def common(a: Result, b: Result) -> tuple[np.ndarray, np.ndarray]:
     return t, a.sync_error[: len(t)]
 
 
+def response(disturbed: Result, undisturbed: Result) -> np.ndarray:
+    """Tracking errors with less those without a disturbance, at the instants of the latter, (T, n, m).
+
+    Raises:
+        InputError: the disturbed run does not have them all.
+    """
+    at = np.searchsorted(disturbed.t, undisturbed.t).clip(max=len(disturbed.t) - 1)
+    if not np.array_equal(disturbed.t[at], undisturbed.t):
+        raise InputError("expected a disturbed run logged at the instants of the other", subject="claims")
+    return disturbed.tracking_error[at] - undisturbed.tracking_error
+
+
 def changed(a: Result, b: Result, name: str, rows: Iterable[int]) -> int:
     """Number of logged values of these rows that are not the same bits."""
     one, other = (np.ascontiguousarray(getattr(run, name)[:, list(rows)]) for run in (a, b))

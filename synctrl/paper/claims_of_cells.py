@@ -50,7 +50,7 @@ def a460_claims(runs: Mapping[str, Result]) -> list[Claim]:
 
 def others_move_along(undisturbed: Result, disturbed: Result) -> Claim:
     """The disturbance of robot 1 moves robots 2 to 4 the same way when they are synchronized."""
-    response = disturbed.tracking_error - undisturbed.tracking_error  # (T, n, m)
+    response = claims.response(disturbed, undisturbed)
     first, others = response[:, 0].ravel(), response[:, 1:].swapaxes(0, 1).reshape(response.shape[1] - 1, -1)
     lengths = np.linalg.norm(others, axis=1) * np.linalg.norm(first)
     cosines = others @ first / np.where(lengths > 0, lengths, np.inf)  # 0 for a robot that does not respond
