@@ -334,6 +334,13 @@ def test_a_jump_of_the_desired_velocity_is_counted_and_called_outside() -> None:
     assert certificate.as_dict()["balance"]["jumped"] == record.jumped
 
 
+@pytest.mark.parametrize("dt", [1e-3, 7e-4], ids=["at an instant of the log", "between two"])
+def test_v_does_not_grow_by_integration_where_the_desired_velocity_jumps(dt: float) -> None:
+    certificate = certify(kinked().simulate(dt=dt))
+    assert np.diff(certificate.lyapunov.V).max() > 0.1
+    assert certificate.growth is None
+
+
 def test_a_balance_whose_bound_is_a_large_share_of_what_v_lost_says_nothing() -> None:
     coarse, fine = (certify(planar_four().simulate(0.5, dt=dt)) for dt in (6.25e-3, 1e-3))
     record = coarse.lyapunov

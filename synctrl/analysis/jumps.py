@@ -7,13 +7,19 @@ instants, an event parts the log. What V does there is no part of V', and nothin
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from ..control.network.messages import GRID
+from ..coupling.cell import Cell
+from ..simulation.clock import before
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.schedules import DisturbanceSchedule
+
+#: relative size from which a difference between the two sides of a break is a jump, and not rounding
+JUMP = 1e-9
 
 
 class SmoothPart(NamedTuple):
@@ -58,8 +64,39 @@ def _events_in(t: np.ndarray, loop: ClosedLoop, period: float | None) -> list[in
     messages = np.array(loop.messages.between(0.0, end) if jumps_at_messages(loop) else [])
     if period is not None:
         messages = period * np.ceil(messages / period - GRID)
-    after = np.searchsorted(t, np.concatenate((events, messages)) - tolerance(t))
-    return sorted({int(k) - 1 for k in after if 0 < k < len(t)})
+    return list(ends_before(t, np.concatenate((events, messages))))
+
+
+class DesiredJump(NamedTuple):
+    """A break at which the desired "position" or "velocity" jumps, by `size`, most of robot `robot`."""
+
+    time: float
+    what: str
+    robot: int
+    size: float
+
+
+def desired_jumps(cell: Cell, end: float) -> Iterator[DesiredJump]:
+    """Breaks until `end`, s, at which the desired motion or its velocity jumps, and s_q and V with them."""
+    for time in (time for time in cell.breaks if 0.0 < time <= end):
+        left, right = cell.references(np.array([before(time), time]))
+        for row, what in ((0, "position"), (1, "velocity")):
+            jump = np.abs(right.desired[row] - left.desired[row]).max(axis=-1)
+            if jump.max() > JUMP * max(1.0, np.abs(right.desired[row]).max()):
+                i = int(jump.argmax())
+                yield DesiredJump(time, what, i, float(jump[i]))
+
+
+def jumps_of_v(t: np.ndarray, cell: Cell, events: tuple[int, ...]) -> tuple[int, ...]:
+    """Logged instants between which and the next one V jumps, at `events` or where what is desired jumps."""
+    times = np.array([jump.time for jump in desired_jumps(cell, float(t[-1]))])
+    return tuple(sorted({*events, *ends_before(t, times)}))
+
+
+def ends_before(t: np.ndarray, times: np.ndarray) -> tuple[int, ...]:
+    """Logged instants between which and the next one something happens, at that next one at the latest."""
+    after = np.searchsorted(t, times - tolerance(t))
+    return tuple(sorted({int(k) - 1 for k in after if 0 < k < len(t)}))
 
 
 def jumps_at_messages(loop: ClosedLoop) -> bool:
