@@ -8,6 +8,8 @@ from dataclasses import FrozenInstanceError, replace
 import numpy as np
 import pytest
 from refusals import refused
+from test_devices import ALL
+from test_devices import small as small_devices
 from theory_cells import GAINS, coupling, experiment
 
 from synctrl import (
@@ -115,6 +117,14 @@ def test_a_run_under_sampled_control_is_not_covered_but_bounded() -> None:
     certificate = certify(run)
     assert certificate.verdict == "bounded by Theorem A"
     assert any("held for 0.002 s" in reason for reason in certificate.outside)
+
+
+def test_of_sampled_control_samples_are_named_and_not_the_step() -> None:
+    certificate = certify(small_devices(**ALL).simulate(0.3, 1e-3, control_period=2e-3))
+    assert certificate.growth is not None and certificate.growth.term == "sampling"
+    assert "numerical errors explain" not in str(certificate)
+    assert certificate.dissipation is not None
+    assert f"with what is held, by {np.abs(certificate.dissipation.gap).max():.2g}" in str(certificate)
 
 
 def test_a_certificate_is_frozen_readable_and_plain_data() -> None:
