@@ -91,8 +91,12 @@ class Certificate:
 
     @property
     def closes(self) -> bool | None:
-        """Whether the balance of V closes; None if the log is thinned."""
-        return self.lyapunov.closes if self.every == 1 else None
+        """Whether the balance of V closes; None if the log is thinned, or torque is held."""
+        return None if self.every > 1 or self._held else self.lyapunov.closes
+
+    @property
+    def _held(self) -> bool:
+        return self.dissipation is not None and SAMPLING in self.dissipation.sources
 
     def as_dict(self) -> dict[str, Any]:
         """The same as plain numbers, words and lists, without the arrays over time."""
@@ -245,10 +249,10 @@ def _ends(term: np.ndarray) -> dict[str, float]:
 
 
 def _balance(c: Certificate) -> str:
-    if c.closes is None:
+    if c.every > 1:
         return f"cannot be seen in a log of one of {c.every} steps"
     record, a = c.lyapunov, c.dissipation
-    if a is not None and SAMPLING in a.sources:
+    if c._held and a is not None:
         off = f"off by {record.largest_drift:.2g}, as V' is that of nothing held"
         return f"{off}; with what is held, by {float(np.abs(a.gap).max()):.2g}"
     return f"off by {record.largest_drift:.2g}, numerical errors explain {record.drift_bound:.2g}"
