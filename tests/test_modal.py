@@ -336,13 +336,14 @@ def frozen_pair(Lambda: float, beta: float, K_r: float, known: tuple[float, floa
 
 @pytest.mark.parametrize(
     ("name", "mode", "cell", "duration"),
-    [  # a long push, one that begins slowly, one that swings at sqrt(a b), and one that begins fast
+    [  # a long push, one that begins slowly, one that swings at sqrt(a b), and two that begin fast or slowly
         ("l2", 0, lambda: frozen_pair(20.0, 3.0, 20.0, (0.5, 0.5)), 0.8),
         ("peak", 0, lambda: frozen_pair(4.0, 3.0, 2.0, (0.5, 0.5)), 0.3),
         ("l2", 1, lambda: frozen_pair(20.0, 10.0, 10.0, (0.5, 1.5), 0.1, 20.0), 1.0),
         ("peak", 1, lambda: frozen_pair(4.0, 1.0, 1.0, (1.0, 0.5)), 0.25),
+        ("errors", 0, lambda: frozen_pair(4.0, 3.0, 2.0, (0.5, 0.5)), 0.3),
     ],
-    ids=["energy of the common mode", "its peak", "energy of the differences", "their peak"],
+    ids=["energy of the common mode", "its peak", "energy of the differences", "their peak", "errors"],
 )
 def test_a_run_from_rest_reaches_nine_tenths_of_the_bound(name, mode, cell, duration):
     bounds = modal_bounds(cell().simulate(duration, dt=1e-3, engine="compiled"))

@@ -213,17 +213,18 @@ def _errors(
     most: float | None,
     ahead: np.ndarray | None,
 ) -> Bounded:
-    """sup |e_i| <= sup |c_i^-1| (|free_i(t)| + |h_i rho(t)|), with h_i^2 = sum_j q_ij^2 h2_j^2.
+    """sup |e_i| <= sup |c_i^-1| (|free_i(t)| + |sum_j |q_ij| h2_j rho_j(t)|).
 
-    A priori each |r_j| is at most `ahead`, and all of them together at most `most`: the smaller bound counts.
+    A priori each |r_j| is at most `ahead`, and all of them together at most `most`, of which a robot gets
+    h_i^2 = sum_j q_ij^2 h2_j^2: the smaller bound counts.
     """
     c_inv, w = run.rows.c_inv[run.logged], run.rows.weighted[run.logged, 0]
     inverse, apart = np.linalg.norm(c_inv, 2, axis=(-2, -1)), np.linalg.norm(modes.vectors @ free, axis=-1)
     h = np.sqrt(modes.vectors**2 @ modes.h2**2)
 
     def pushed(rho: np.ndarray) -> np.ndarray:
-        """|h_i rho| with rho of all modes and axes, (..., n, m)."""
-        return np.linalg.norm(h * np.linalg.norm(rho, axis=-2)[..., None, :], axis=-1)
+        """What rho of all modes and axes, (..., n, m), makes of every robot's w at most, (..., n)."""
+        return np.linalg.norm(np.abs(modes.vectors) @ (modes.h2 * rho), axis=-1)
 
     def largest(pushed: np.ndarray) -> np.ndarray:
         return (inverse * (apart + pushed)).max(axis=0)
