@@ -17,7 +17,7 @@ from .convergence import Convergence, convergence
 from .delay_condition import DelayCondition, delay_condition
 from .dissipation import Dissipation, balanced
 from .gain_condition import GainCondition, gain_condition
-from .in_words import InWords
+from .in_words import InWords, units_in_words
 from .lyapunov import RESOLVED, Growth, Lyapunov, first_growth, lyapunov
 from .metrics import finite_or_none
 from .replay import Replay, replay
@@ -128,7 +128,8 @@ class Certificate(InWords):
         record, errors = self.lyapunov, self.convergence
         acting = [name for name, power in record.power.items() if (np.abs(power) > record.rounding).any()]
         supplied = ", ".join(f"{name} {record.supplied[name]:.3g}" for name in acting)
-        final = ", ".join(f"{name} {x:.3g} {errors.units[name]}" for name, x in errors.final.items())
+        units = {name: units_in_words(unit) for name, unit in errors.units.items()}
+        final = ", ".join(f"{name} {x:.3g} {units[name]}" for name, x in errors.final.items())
         lines = [
             f"{self.title}: {self.verdict}",
             f"  that is: {self.meaning}",

@@ -8,3 +8,8 @@ class InWords:
 
     def __repr__(self) -> str:
         return str(self)
+
+
+def units_in_words(unit: str) -> str:
+    """A unit behind a number; several, where numbers in different units are compared, in brackets."""
+    return f"({unit})" if ", " in unit else unit

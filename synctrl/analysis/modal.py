@@ -24,7 +24,7 @@ from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .balance import accumulated
 from .dissipation import dissipation
-from .in_words import InWords
+from .in_words import InWords, units_in_words
 from .modal_filter import ModalFilter
 from .modal_signals import run_signals, slip_matrices
 from .replay import Replay, replay
@@ -234,4 +234,4 @@ def _errors(
 def _row(bounded: Bounded, at: tuple[int, ...], unit: str) -> str:
     """One of the numbers with its bounds, in words."""
     ahead = "" if bounded.a_priori is None else f", a priori {bounded.a_priori[at]:.3g}"
-    return f"{bounded.actual[at]:.3g}, at most {bounded.bound[at]:.3g}{ahead} {unit}"
+    return f"{bounded.actual[at]:.3g}, at most {bounded.bound[at]:.3g}{ahead} {units_in_words(unit)}"
