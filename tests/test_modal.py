@@ -401,3 +401,5 @@ def test_the_figure_has_a_panel_for_each_eigenvalue_with_the_run_inside_the_band
         line = panel.lines[0].get_ydata()
         assert line.max() <= inner <= outer
         assert panel.get_ylim() == panels[0].get_ylim() and panel.get_ylim()[0] < line.max()
+    still = replace(bounds, w=bounds.w * np.array([1.0, 1, 1, 1e-7])[:, None])
+    assert all(panel.get_ylim()[0] < panel.lines[0].get_ydata().max() for panel in modal_figure(still).axes)
