@@ -356,6 +356,12 @@ def test_what_the_theorem_does_not_reach_is_refused_by_name(subject: str, change
         exponential_rate(replace(rods(), **change), PERIOD)
 
 
+def test_saturation_is_named_and_not_the_adaptation_that_comes_with_it() -> None:
+    limited = a460_pair(friction=False)
+    with refused(InputError, "saturate"):
+        exponential_rate(replace(limited, saturate=True), 1.0, start=5.0)
+
+
 def test_friction_that_is_not_adapted_is_refused_even_at_rest() -> None:
     with refused(InputError, "arm 1, parameters"):
         exponential_rate(rods(size=(0.0, 0.0), friction=Friction(viscous=0.5)), PERIOD)

@@ -60,13 +60,13 @@ def check_reach(experiment: Experiment, loop: ClosedLoop) -> None:
         InputError: another law, adaptation or network, something from outside, a plant with a state of its
             own, arms with spare joints, or the printed x' of (13) under weights that move.
     """
-    for subject, (kinds, expected) in KNOWN.items():
-        part = getattr(loop.controller, subject)
-        if type(part) not in kinds:
-            raise InputError.expected(expected, type(part).__name__, subject)
     for subject in ABSENT:
         if getattr(experiment, subject):
             raise InputError.expected("none, for errors that are left alone", "some", subject, shown="some")
+    for subject, (kinds, expected) in KNOWN.items():
+        part = getattr(loop.controller, subject)
+        if type(part) not in kinds:
+            raise InputError.expected(expected, type(part).__name__.removeprefix("Bound"), subject)
     plant, cell = loop.plant, loop.cell
     if plant.hidden0.size or loop.chain is not None:
         raise InputError.expected(
