@@ -163,7 +163,8 @@ def modal_bounds(result: Result | Replay, experiment: Experiment | None = None) 
             positions at once.
     """
     run = replay(result, experiment)
-    signals, slip, modes, result = run_signals(run), dissipation(run), modal_filter(run), run.result
+    signals, slip, modes = run_signals(run), dissipation(run), ModalFilter.of(run.loop.controller)
+    result = run.result
     w, E, r, driven = (modes.to_modes(rows) for rows in signals[:4])
     free = modes.free(result.t - result.t[0], w[0], E[0])
     rho, gap = np.sqrt(_grown(run, r**2)), np.sqrt(_grown(run, (r - driven) ** 2)[-1])
@@ -179,12 +180,6 @@ def modal_bounds(result: Result | Replay, experiment: Experiment | None = None) 
         slip.X, X_bound, gap, l2, Bounded(np.abs(w).max(axis=0), *largest),
         _errors(run, modes, free, rho, ahead), signals.reason, slip.reason,
     )  # fmt: skip
-
-
-def modal_filter(run: Replay) -> ModalFilter:
-    """The filters of the cell and the gains of a run."""
-    controller, S = run.loop.controller, run.loop.cell.coupling.matrix
-    return ModalFilter.from_matrix(S, controller.Lambda, controller.beta, controller.leak)
 
 
 def _sum(free: np.ndarray, gain: np.ndarray, rho: np.ndarray | None) -> np.ndarray | None:

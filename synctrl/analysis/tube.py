@@ -3,10 +3,10 @@
     V(0) = sum_i (1/2 s_q^T M s_q + 1/2 t^T (K Gamma K^T)^+ t) + sum_k 1/2 eps_k^T K_eps eps_k
     X <= D/2 + (D^2/4 + V(0))^1/2,    |w_i - w_i of r = 0| <= X (max over axes of sum_k h_ik^2 kappa_k^2)^1/2
 
-with h of `ErrorModes`, kappa_k = sup |c_k J_k K_r^-1/2| and e = c^-1 w. kappa is a bound by lengths of links
-for all joint positions, so that nothing is assumed of J but that J^-1 exists; and that the tube itself may
-show: errors stay in the tube as long as J^-1 exists, and in the tube it does. The page about the tube in
-`docs` has the proofs.
+with h^2 of `ModalFilter.spread`, kappa_k = sup |c_k J_k K_r^-1/2| and e = c^-1 w. kappa is a bound by lengths
+of links for all joint positions, so that nothing is assumed of J but that J^-1 exists; and that the tube
+itself may show: errors stay in the tube as long as J^-1 exists, and in the tube it does. The page about the
+tube in `docs` has the proofs.
 """
 
 from __future__ import annotations
