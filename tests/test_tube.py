@@ -291,6 +291,17 @@ def test_a_desired_velocity_that_jumps_is_refused() -> None:
     assert tube(cell, GAINS, duration=0.9).closes
 
 
+def test_a_desired_position_that_jumps_is_refused() -> None:
+    arm, rest = load_robot("planar2r"), lambda t: np.zeros(2)
+    step = FunctionTrajectory(lambda t: (t >= 1.0) * np.array([0.0, 0.3]), rest, rest, breaks=(1.0,))
+    cell = Cell([Member(arm, step, name=f"arm {k}") for k in (1, 2)], Coupling.pair())
+    with refused(InputError, "arm 1, trajectory", found=0.3):
+        tube(cell, GAINS)
+    late = Cell(cell.members, cell.coupling, clocks=np.array([0.0, 0.7]))
+    with refused(InputError, "arm 2, trajectory", found=0.3):
+        tube(late, GAINS, duration=0.9)
+
+
 def test_of_a_space_of_ones_own_kappa_is_sampled_and_it_says_so() -> None:
     one = experiment(coupling("pair", 2, 2))
     moved = {"trajectory": Hold(np.rad2deg([0.4, 1.1])), "q0": [0.4, 1.1]}

@@ -29,7 +29,7 @@ from .clearance import clearance
 from .jacobian_size import sizes_of
 from .torque_bound import Outside, largest_norm, outside
 from .tube_radius import Known, Radii, radii, radii_with
-from .tube_start import check_velocities, read_instants, start
+from .tube_start import check_motions, read_instants, start
 
 #: what has to be true where kappa is given
 KAPPA_GIVEN = "kappa is as given"
@@ -145,7 +145,8 @@ def tube(
 
     Raises:
         InputError: gains or numbers of another size or sign, viscous friction without a bound of speeds, an
-            error that is never learned, a desired velocity that jumps, or slides without limits on an arm.
+            error that is never learned, a desired position or velocity that jumps, or slides without limits
+            on an arm.
     """
     controller, end = Controller(cell, gains), positive_number("duration", duration)
     acting = outside(cell, torque, disturbances, speed)
@@ -159,7 +160,7 @@ def tube(
 def _known(controller: Controller, instants: np.ndarray, acting: Outside, end: float) -> Known:
     """What is known of a cell before a run that ends at a time, s."""
     cell = controller.cell
-    check_velocities(cell, end)
+    check_motions(cell, end)
     energy, w = start(controller, cell.references(np.array([0.0]))[0])
     D = largest_norm(controller, acting, sum(energy.values()), w, end)
     return Known(controller, instants, cell.reference_table(instants), w, energy, D)
