@@ -263,9 +263,20 @@ def test_what_it_cannot_be_told_is_refused() -> None:
         tube(cell, gains, duration=0.0)
     with refused(InputError, "kappa"):
         tube(cell, gains, kappa=1.0)
+    with refused(InputError, "kappa", found=-1.0):
+        tube(cell, gains, kappa=-np.ones((2, 2)))
     for times in ([], [0.0, 6.0], [-1.0], [1.0, 0.5]):
         with refused(InputError, "times"):
             tube(cell, gains, times=times)
+
+
+def test_errors_of_other_robots_have_no_lengths_in_a_tube() -> None:
+    one = experiment(coupling("pair", 2, 2))
+    told = tube(one.cell, one.gains, times=[0.0])
+    np.testing.assert_array_equal(told.sizes([[3.0, 4.0], [0.0, -1.0]]), [[3.0, 4.0], [0.0, 1.0]])
+    for e in (np.zeros(2), np.zeros((3, 2)), np.zeros((5, 2, 3)), None):
+        with refused(InputError, "e"):
+            told.sizes(e)
 
 
 def test_an_error_of_parameters_that_is_never_learned_is_refused_and_one_that_is_none_is_not() -> None:

@@ -18,10 +18,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, positive_number
+from ..checks import finite_array, numbers, positive_number
 from ..control.controller import Controller
 from ..control.gains import Gains
 from ..coupling.cell import Cell
+from ..errors import InputError
 from ..simulation.schedules import Disturbance
 from ..tasks.pose import MAX_ANGLE
 from ..tasks.spaces import JointSpace
@@ -102,8 +103,15 @@ class Tube:
         return bool(self.excludes_singularities) and not (self.sampled or open_turn)
 
     def sizes(self, e: ArrayLike) -> np.ndarray:
-        """Lengths of errors part by part, (..., n, parts), of (..., n, m): what the radius is a bound of."""
-        return sizes_of(np.asarray(e), [slice(part.start, part.stop) for part in self.parts])
+        """Lengths of errors part by part, (..., n, parts), of (..., n, m): what the radius is a bound of.
+
+        Raises:
+            InputError: no numbers, or another number of robots or coordinates.
+        """
+        errors, shape = numbers("e", e), (len(self.names), self.parts[-1].stop)
+        if errors.shape[-2:] != shape:
+            raise InputError.expected(f"shape (..., {shape[0]}, {shape[1]})", errors.shape, "e")
+        return sizes_of(errors, [slice(part.start, part.stop) for part in self.parts])
 
     def as_dict(self) -> dict[str, Any]:
         """The same as plain data, of the radius only the largest over time."""
@@ -154,6 +162,8 @@ def tube(
     if kappa is None:
         return _tube(known, radii(known), speed is not None)
     given = finite_array("kappa", kappa, (cell.n, len(known.parts)))
+    if given.min() < 0:
+        raise InputError.expected("bounds of at least 0", float(given.min()), "kappa")
     return _tube(known, radii_with(known, given), speed is not None, KAPPA_GIVEN)
 
 
