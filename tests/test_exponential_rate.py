@@ -340,6 +340,12 @@ def test_a_period_that_is_none_is_refused_with_what_was_found() -> None:
         exponential_rate(circles(), 0.3)
 
 
+@pytest.mark.parametrize("name, value", [("period", -1.0), ("period", np.nan), ("start", -0.5)])
+def test_times_that_are_none_are_refused(name: str, value: float) -> None:
+    with refused(InputError, name):
+        exponential_rate(rods(), **{"period": PERIOD, name: value})
+
+
 PUSH = Disturbance(0, 1.0, 0.1, 0.2)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, finite_number, instance, positive_number
+from ..checks import finite_array, instance, non_negative_number, positive_number
 from ..errors import InputError
 from ..simulation.simulate import Experiment
 from .directions import describe_slowest, describe_unexcited
@@ -125,10 +125,11 @@ def exponential_rate(experiment: Experiment, period: float, start: float = 0.0) 
     Args:
         experiment: a cell with the paper's law and adaptation, alone: see `check_reach`.
         period: of the desired motion and the weights, s.
-        start: from when on the motion repeats, s.
+        start: from when on the motion repeats, s, at least 0.
 
     Raises:
-        InputError: no period of the motion, or an experiment that the theorem does not reach, by name.
+        InputError: a time that is none, no period of the motion, or an experiment that the theorem does not
+            reach, by name.
         UnreachableError: no joint positions for what is desired.
         RobotError: the rank of a regressor is not clear.
     """
@@ -165,7 +166,7 @@ class _Period:
 
     def __init__(self, experiment: Experiment, period: float, start: float):
         instance("experiment", experiment, Experiment, "an Experiment")
-        self.period, self.start = positive_number("period", period), finite_number("start", start)
+        self.period, self.start = positive_number("period", period), non_negative_number("start", start)
         loop = experiment.closed_loop()
         check_reach(experiment, loop)
         check_period(loop.cell, self.start, self.period)
