@@ -346,6 +346,16 @@ def test_times_that_are_none_are_refused(name: str, value: float) -> None:
         exponential_rate(rods(), **{"period": PERIOD, name: value})
 
 
+def test_a_rate_is_not_simulated_with_another_experiment() -> None:
+    experiment, rate = rate_of("fast")
+    faster = replace(experiment, gains=experiment.gains.replace(Lambda=7.0))
+    for other, found in ((planar_four(), "robots"), (faster, "gains"), (None, "NoneType")):
+        with refused(InputError, "experiment", found=found):
+            simulated_decay(other, rate)
+    with refused(InputError, "rate"):
+        simulated_decay(experiment, experiment)
+
+
 PUSH = Disturbance(0, 1.0, 0.1, 0.2)
 
 
