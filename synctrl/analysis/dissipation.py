@@ -38,6 +38,8 @@ from .unmodelled import unmodelled
 
 #: share of the largest from which something is worth a word
 SEEN = 1e-9
+#: share of what V(0), d and what enters supply at most, by which the balance may miss
+COARSE = 1e-2
 #: what is in V for the error of the estimates
 BASE, OWN = "base parameters", "the adaptation's own"
 
@@ -146,13 +148,21 @@ class Dissipation:
         """V + X^2 + Z^2 - V(0) - int s^T d - what entered, (T,); 0 but for integration and quadrature."""
         return self.V + self.damped + self.lost - self.V0 - self.supply - self.entering
 
+    @property
+    def unresolved(self) -> str | None:
+        """Why X and Z are not to be trusted, in words, as of a log that is thinned; else None."""
+        gap = float(np.abs(self.gap).max())
+        if gap <= COARSE * (self.V0 + self.entered + self.D**2 / 4):
+            return None
+        return f"the log is too coarse for integrals over it: their balance misses by {gap:.3g}"
+
     def as_dict(self) -> dict[str, Any]:
         """The same as plain numbers and words, without the arrays over time."""
         names = ("D", "X", "X_bound", "Z", "rest", "rest_bound", "mean_square", "mean_square_bound")
         numbers = {name: finite_or_none(getattr(self, name)) for name in (*names, "V0", "V0_full", "VT")}
         sources = {name: float(value) for name, value in self.sources.items()}
         more = {"entered": self.entered, "supply": float(self.supply[-1]), "storage": self.storage}
-        return {**numbers, **more, "sources": sources, "reason": self.reason}
+        return {**numbers, **more, "sources": sources, "reason": self.reason, "unresolved": self.unresolved}
 
     @property
     def lines(self) -> list[str]:
@@ -163,10 +173,12 @@ class Dissipation:
         acting = {name: D for name, D in self.sources.items() if floor < D}
         named = ", ".join(f"{name} {D:.3g}" for name, D in acting.items())
         entered = f", R = {self.entered:.3g}" if self.entered > SEEN * self.V0 else ""
+        doubt = [] if self.unresolved is None else [f"  {self.unresolved}"]
         return [
             f"Theorem A: X = {self.X:.3g} of at most {self.X_bound:.3g}, Z^2 + V(T) = {self.rest:.3g} of at "
             f"most {self.rest_bound:.3g}",
             f"  by V(0) = {self.V0:.3g} ({self.storage}){entered}, D = {self.D:.3g} ({named or 'nothing'})",
+            *doubt,
         ]
 
     def __str__(self) -> str:

@@ -81,6 +81,7 @@ class ModalBounds:
         errors: sup |e_i|, (n,).
         reason: why r is not c J s_q, in words, or None.
         unbounded: why Theorem A does not reach the run, in words, or None.
+        unresolved: why integrals over the log are not to be trusted, in words, or None.
     """
 
     title: str
@@ -103,6 +104,7 @@ class ModalBounds:
     errors: Bounded
     reason: str | None
     unbounded: str | None
+    unresolved: str | None = None
 
     @property
     def rho_a_priori(self) -> np.ndarray | None:
@@ -134,6 +136,7 @@ class ModalBounds:
             **{name: getattr(self, name).as_dict() for name in ("l2", "peak", "errors")},
             "reason": self.reason,
             "unbounded": self.unbounded,
+            "unresolved": self.unresolved,
             "sentence": self.sentence,
         }
 
@@ -148,6 +151,8 @@ class ModalBounds:
             lines.append(f"  r is more than c J s_q, by what was measured: {self.reason}")
         if self.unbounded is not None:
             lines.append(f"  nothing is known a priori: {self.unbounded}")
+        if self.unresolved is not None:
+            lines.append(f"  {self.unresolved}")
         return "\n".join(lines)
 
 
@@ -179,7 +184,7 @@ def modal_bounds(result: Result | Replay, experiment: Experiment | None = None) 
         str(result.info["title"]), result.t, modes, tuple(result.info["axes"]), tuple(result.names),
         result.unit("coupled_error"), w[run.logged], r[run.logged], free, rho, kappa, kappas,
         slip.X, X_bound, gap, l2, Bounded(np.abs(w).max(axis=0), *largest),
-        _errors(run, modes, free, rho, total), signals.reason, slip.reason,
+        _errors(run, modes, free, rho, total), signals.reason, slip.reason, slip.unresolved,
     )  # fmt: skip
 
 
