@@ -176,6 +176,19 @@ def test_the_papers_a460_at_rest_learn_what_their_gravity_shows() -> None:
     assert f"at {rate.excited_rate:.2f} 1/s" in PAGE.read_text("utf-8")
 
 
+def test_a_rate_does_not_depend_on_how_many_periods_count_as_one() -> None:
+    """Of directions that are not excited nothing may leak into what is left of the others."""
+    for name, periods in (("at rest", 400), ("straight arm", 8)):
+        experiment, rate = rate_of(name)
+        longer = exponential_rate(experiment, periods * rate.period)
+        assert longer.unexcited and longer.excited_rate == pytest.approx(rate.excited_rate, rel=1e-4)
+
+
+def test_a_period_after_which_only_rounding_is_left_is_refused() -> None:
+    with refused(InputError, "period", found=250.0):
+        exponential_rate(weighed(), 250.0)
+
+
 def test_a_motion_that_has_faded_away_excites_nothing() -> None:
     rate = exponential_rate(planar_four(), 1.0, start=25.0)  # what rounding leaves of it does not count
     assert rate.coordinates.unexcited == (3, 3, 3, 3)
