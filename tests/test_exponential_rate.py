@@ -184,6 +184,11 @@ def test_a_rate_does_not_depend_on_how_many_periods_count_as_one() -> None:
         assert longer.unexcited and longer.excited_rate == pytest.approx(rate.excited_rate, rel=1e-4)
 
 
+def test_errors_that_grow_beyond_numbers_are_refused() -> None:
+    with refused(InputError, "period", found=1.0):
+        monodromy(lambda times: np.tile(1e4 * np.eye(2), (len(times), 1, 1)), [0.0, 1.0])
+
+
 def test_a_period_after_which_only_rounding_is_left_is_refused() -> None:
     with refused(InputError, "period", found=250.0):
         exponential_rate(weighed(), 250.0)
