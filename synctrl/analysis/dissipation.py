@@ -30,7 +30,7 @@ from .balance import accumulated
 from .base_storage import base_storages
 from .gain_condition import gain_condition
 from .held import held
-from .lyapunov import inside_of, proof_along
+from .lyapunov import damping, inside_of, proof_along
 from .metrics import finite_or_none
 from .model_torques import frozen_error
 from .replay import Replay, replay
@@ -207,7 +207,7 @@ def balanced(run: Replay, reasons: Sequence[str]) -> Dissipation:
     total, model = np.sum(list(torques.values()), axis=0), x.lacking - x.frozen
     claimed = lost + _sum(x.s_q * (model - np.vecmat(x.force, x.J)))
     squares = [_squared(run, torque) for torque in (total, *torques.values())]
-    losses = [_damping(run), lost + _sum(x.s_q * x.friction_damping)]
+    losses = [_sum(damping(run)), lost + _sum(x.s_q * x.friction_damping)]
     powers = [*losses, _sum(x.s_q * total), claimed, rates + x.storage_rate, *squares]
     damped, gone, supply, due, stored, D2, *each = accumulated(run, np.stack(powers, axis=1)).T
     own = (kept + x.storage)[run.logged]
@@ -245,13 +245,6 @@ def _storage(run: Replay) -> tuple[np.ndarray, str]:
         storages = base_storages(cell, cast(MetricGradient, adaptation).Gamma)
         return np.sum([each.energy(learned[:, i]) for i, each in enumerate(storages)], axis=0), BASE
     return own
-
-
-def _damping(run: Replay) -> np.ndarray:
-    """s_q^T K_r s_q, (R,), in the space in which K_r acts."""
-    x, controller = run.rows, run.loop.controller
-    s = x.s_q if controller.k_r_space == "joint" else np.matvec(x.J, x.s_q)
-    return _sum(s * controller.K_r * s)
 
 
 def _squared(run: Replay, torque: np.ndarray) -> np.ndarray:
