@@ -20,7 +20,7 @@ from test_saturation import pair
 from theory_cells import GAINS, coupling, experiment
 
 from synctrl import Cell, Disturbance, Experiment, Friction, Network, Payload, Result
-from synctrl.analysis import Dissipation, certify, dissipation
+from synctrl.analysis import Dissipation, certify, dissipation, modal_bounds
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.analysis.replay import Replay, replay
 from synctrl.control.adaptation import Ball, Leakage
@@ -311,6 +311,19 @@ def test_every_certificate_has_the_bounds_beside_the_actual_values() -> None:
     for line in found.lines:
         assert line in str(certificate)
     assert found.mean_square * 0.03 == pytest.approx(found.X**2)
+
+
+def test_a_log_that_is_too_coarse_for_its_integrals_says_so() -> None:
+    result = experiment(coupling("pair", 2, 2), GAINS.replace(K_r=20.0), known=1.0).simulate(0.2, 1e-3)
+    thinned = result.decimated(100)
+    fine, coarse = dissipation(result), dissipation(thinned)
+    assert fine.unresolved is None
+    assert len(fine.lines) == 2
+    assert coarse.X_bound < coarse.X  # that is what the warning is for
+    for found in (coarse, modal_bounds(thinned)):
+        assert found.unresolved is not None
+        assert found.unresolved in str(found)
+        assert found.as_dict()["unresolved"] == found.unresolved
 
 
 def test_a_loaded_run_has_the_same_dissipation(tmp_path) -> None:

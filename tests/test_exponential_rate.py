@@ -176,6 +176,24 @@ def test_the_papers_a460_at_rest_learn_what_their_gravity_shows() -> None:
     assert f"at {rate.excited_rate:.2f} 1/s" in PAGE.read_text("utf-8")
 
 
+def test_a_rate_does_not_depend_on_how_many_periods_count_as_one() -> None:
+    """Of directions that are not excited nothing may leak into what is left of the others."""
+    for name, periods in (("at rest", 400), ("straight arm", 8)):
+        experiment, rate = rate_of(name)
+        longer = exponential_rate(experiment, periods * rate.period)
+        assert longer.unexcited and longer.excited_rate == pytest.approx(rate.excited_rate, rel=1e-4)
+
+
+def test_errors_that_grow_beyond_numbers_are_refused() -> None:
+    with refused(InputError, "period", found=1.0):
+        monodromy(lambda times: np.tile(1e4 * np.eye(2), (len(times), 1, 1)), [0.0, 1.0])
+
+
+def test_a_period_after_which_only_rounding_is_left_is_refused() -> None:
+    with refused(InputError, "period", found=250.0):
+        exponential_rate(weighed(), 250.0)
+
+
 def test_a_motion_that_has_faded_away_excites_nothing() -> None:
     rate = exponential_rate(planar_four(), 1.0, start=25.0)  # what rounding leaves of it does not count
     assert rate.coordinates.unexcited == (3, 3, 3, 3)
@@ -338,6 +356,22 @@ def test_a_period_that_is_none_is_refused_with_what_was_found() -> None:
     assert "arm" in str(caught.value)
     with refused(InputError, "period", found=0.3):  # the motion rests, but the weights turn
         exponential_rate(circles(), 0.3)
+
+
+@pytest.mark.parametrize("name, value", [("period", -1.0), ("period", np.nan), ("start", -0.5)])
+def test_times_that_are_none_are_refused(name: str, value: float) -> None:
+    with refused(InputError, name):
+        exponential_rate(rods(), **{"period": PERIOD, name: value})
+
+
+def test_a_rate_is_not_simulated_with_another_experiment() -> None:
+    experiment, rate = rate_of("fast")
+    faster = replace(experiment, gains=experiment.gains.replace(Lambda=7.0))
+    for other, found in ((planar_four(), "robots"), (faster, "gains"), (None, "NoneType")):
+        with refused(InputError, "experiment", found=found):
+            simulated_decay(other, rate)
+    with refused(InputError, "rate"):
+        simulated_decay(experiment, experiment)
 
 
 PUSH = Disturbance(0, 1.0, 0.1, 0.2)

@@ -181,6 +181,17 @@ def test_no_bound_is_violated_whatever_the_coupling_and_whatever_acts(cell):
     assert bounds.gap.max() <= 1e-9 * bounds.rho.max()
 
 
+@pytest.mark.parametrize("kind", ["pair", "all-to-all"])
+def test_before_a_run_errors_have_the_bound_of_kappa_however_many_robots_there_are(kind):
+    cell = experiment(coupling(kind, 2 if kind == "pair" else 4, 2), cartesian=True)
+    bounds = modal_bounds(cell.simulate(0.1, dt=1e-3))
+    r = bounds.kappa * bounds.X_bound + np.linalg.norm(bounds.gap)
+    c_inv = np.linalg.norm(cell.cell.coupling.weights(np.zeros(1), 2).c_inv[0], 2, axis=(1, 2))
+    plain = c_inv * (np.linalg.norm(bounds.w[0]) + r / np.sqrt(2 * bounds.filter.Lambda.min()))
+    assert (bounds.errors.bound <= bounds.errors.a_priori).all()
+    assert (bounds.errors.a_priori <= plain).all()
+
+
 def test_no_bound_is_violated_for_poses_of_arms_under_an_unknown_payload():
     bounds = modal_bounds(ur5_payload().simulate(0.1, dt=5e-4, engine="compiled"))
     assert holds(bounds) and bounds.reason is None and bounds.w.shape[1:] == (2, 6)

@@ -10,16 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..simulation.clock import before
 from ..simulation.plant import Plant
 from .delay_condition import DelayCondition
 from .gain_condition import GainCondition
-from .jumps import jumps_at_messages
+from .jumps import desired_jumps, jumps_at_messages
 from .lyapunov import Lyapunov, outside
 from .replay import Replay
 
-#: relative size from which a difference between the two sides of a break is a jump, and not rounding
-JUMP = 1e-9
 #: powers of which Theorem A says nothing: the proof itself is another, or there is none
 UNBOUNDED = ("law", "weight rate", "damped inverse")
 
@@ -150,20 +147,11 @@ def _events(run: Replay) -> list[str]:
 
 
 def _desired_jumps(run: Replay) -> list[str]:
-    """Breaks at which the desired motion or its velocity jumps, and s_q and V with them."""
-    cell, end = run.loop.cell, float(run.result.t[-1])
-    found = []
-    for time in (time for time in cell.breaks if 0.0 < time <= end):
-        left, right = cell.references(np.array([before(time), time]))
-        for row, words in ((0, "position"), (1, "velocity")):
-            jump = np.abs(right.desired[row] - left.desired[row]).max(axis=-1)
-            if jump.max() > JUMP * max(1.0, np.abs(right.desired[row]).max()):
-                i = int(jump.argmax())
-                found.append(
-                    f"the desired {words} of {cell.names[i]} jumps by {jump[i]:.3g} at t = {time:g} s: "
-                    "V jumps there"
-                )
-    return found
+    cell = run.loop.cell
+    return [
+        f"the desired {what} of {cell.names[i]} jumps by {size:.3g} at t = {time:g} s: V jumps there"
+        for i, what, size, time in desired_jumps(cell, float(run.result.t[-1]))
+    ]
 
 
 def _law(run: Replay) -> list[str]:

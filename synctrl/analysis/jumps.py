@@ -12,8 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..control.network.messages import GRID
+from ..coupling.cell import Cell
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.schedules import DisturbanceSchedule
+
+#: how long before a break a desired motion is looked at, s: more than times and clocks are rounded
+JUST_BEFORE = 1e-11
+#: relative size from which a difference between the two sides of a break is a jump, and not rounding
+JUMP = 1e-9
 
 
 class SmoothPart(NamedTuple):
@@ -22,6 +28,32 @@ class SmoothPart(NamedTuple):
     first: int
     last: int
     rows: slice
+
+
+class DesiredJump(NamedTuple):
+    """A jump of what is desired of a robot: its number, "position" or "velocity", the size, and when, s."""
+
+    robot: int
+    what: str
+    size: float
+    time: float
+
+
+def desired_jumps(cell: Cell, end: float) -> list[DesiredJump]:
+    """Jumps of desired positions and velocities after 0 and until the end, s; s_q and V jump there, too.
+
+    Of all robots the one that jumps most.
+    """
+    found = []
+    for time in (time for time in cell.breaks if 0.0 < time <= end):
+        instants = np.array([time - JUST_BEFORE, time])
+        left, right = (reference.desired for reference in cell.references(instants))
+        for row, what in enumerate(("position", "velocity")):
+            jump, passed = np.abs(right[row] - left[row]).max(axis=-1), JUST_BEFORE * np.abs(left[row + 1])
+            i = int(jump.argmax())
+            if jump[i] > JUMP * max(1.0, np.abs(right[row]).max()) + 2 * passed.max():
+                found.append(DesiredJump(i, what, float(jump[i]), time))
+    return found
 
 
 def jumps_in(

@@ -228,6 +228,13 @@ def inside_of(run: Replay, proof: Proof) -> tuple[str, ...]:
     return ("damping", *known, "friction in Y", *GIVING)
 
 
+def damping(run: Replay) -> np.ndarray:
+    """s_q^T K_r s_q joint by joint, (R, n, nv), or of J s_q axis by axis where K_r acts in task space."""
+    x, controller = run.rows, run.loop.controller
+    s = x.s_q if controller.k_r_space == "joint" else np.matvec(x.J, x.s_q)
+    return np.asarray(s * controller.K_r * s)
+
+
 def _rates(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
     """Time derivatives of the terms of V by the chain rule, (R,) each."""
     return (*map(_sum, _summands(run, proof)), run.rows.storage_rate, *run.rows.stored_rate.T)
@@ -243,12 +250,11 @@ def _summands(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
 def _power(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
     """Terms of V', one value per row; "other" is what the chain rule has beyond those with a name."""
     x, controller = run.rows, run.loop.controller
-    K_r, s, moved = controller.K_r, np.matvec(x.c_inv, x.r), np.matvec(x.J, x.s_q)
+    s, moved = np.matvec(x.c_inv, x.r), np.matvec(x.J, x.s_q)
     in_task = controller.k_r_space == "task"
-    damping = moved * K_r * moved if in_task else x.s_q * K_r * x.s_q
-    unfollowed = x.force - K_r * moved if in_task else x.force  # what acts on s where J s_q is meant
+    unfollowed = x.force - controller.K_r * moved if in_task else x.force  # acts on s where J s_q is meant
     terms = {
-        "damping": -damping,
+        "damping": -damping(run),
         **proof.powers,
         "friction in Y": -x.s_q * x.friction_damping,
         "friction": x.s_q * x.friction,

@@ -85,6 +85,7 @@ class ModalBounds(InWords):
         errors: sup |e_i|, (n,).
         reason: why r is not c J s_q, in words, or None.
         unbounded: why Theorem A does not reach the run, in words, or None.
+        unresolved: why integrals over the log are not to be trusted, in words, or None.
     """
 
     title: str
@@ -109,6 +110,7 @@ class ModalBounds(InWords):
     errors: Bounded
     reason: str | None
     unbounded: str | None
+    unresolved: str | None = None
 
     @property
     def rho_a_priori(self) -> np.ndarray | None:
@@ -140,6 +142,7 @@ class ModalBounds(InWords):
             **{name: getattr(self, name).as_dict() for name in ("l2", "peak", "errors")},
             "reason": self.reason,
             "unbounded": self.unbounded,
+            "unresolved": self.unresolved,
             "sentence": self.sentence,
         }
 
@@ -157,6 +160,8 @@ class ModalBounds(InWords):
             lines.append(f"  r is more than c J s_q, by what was measured: {self.reason}")
         if self.unbounded is not None:
             lines.append(f"  nothing is known a priori: {self.unbounded}")
+        if self.unresolved is not None:
+            lines.append(f"  {self.unresolved}")
         return "\n".join(lines)
 
 
@@ -172,13 +177,15 @@ def modal_bounds(result: Result | Replay, experiment: Experiment | None = None) 
             positions at once.
     """
     run = replay(result, experiment)
-    signals, slip, modes, result = run_signals(run), dissipation(run), modal_filter(run), run.result
+    signals, slip, modes = run_signals(run), dissipation(run), ModalFilter.of(run.loop.controller)
+    result = run.result
     w, E, r, driven = (modes.to_modes(rows) for rows in signals[:4])
     free = modes.free(result.t - result.t[0], w[0], E[0])
     rho, gap = np.sqrt(_grown(run, r**2)), np.sqrt(_grown(run, (r - driven) ** 2)[-1])
     kappa, kappas = _kappas(run, modes)
     X_bound = slip.X_bound if slip.reason is None else None
     ahead = None if X_bound is None else kappas * X_bound + gap
+    total = None if X_bound is None else kappa * X_bound + float(np.linalg.norm(gap))
     norm, peak = modes.free_norm(w[0], E[0]), np.abs(free)
     l2 = Bounded(np.sqrt(_grown(run, w**2)[-1]), norm + modes.gain * rho[-1], _sum(norm, modes.gain, ahead))
     largest = (peak + modes.h2 * rho).max(axis=0), _sum(peak.max(axis=0), modes.h2, ahead)
@@ -187,14 +194,8 @@ def modal_bounds(result: Result | Replay, experiment: Experiment | None = None) 
         result.unit("coupled_error"), result.units("coupled_error")[0], result.unit("tracking_error"),
         w[run.logged], r[run.logged], free, rho, kappa, kappas,
         slip.X, X_bound, gap, l2, Bounded(np.abs(w).max(axis=0), *largest),
-        _errors(run, modes, free, rho, ahead), signals.reason, slip.reason,
+        _errors(run, modes, free, rho, total), signals.reason, slip.reason, slip.unresolved,
     )  # fmt: skip
-
-
-def modal_filter(run: Replay) -> ModalFilter:
-    """The filters of the cell and the gains of a run."""
-    controller, S = run.loop.controller, run.loop.cell.coupling.matrix
-    return ModalFilter.from_matrix(S, controller.Lambda, controller.beta, controller.leak)
 
 
 def _sum(free: np.ndarray, gain: np.ndarray, rho: np.ndarray | None) -> np.ndarray | None:
@@ -215,20 +216,23 @@ def _kappas(run: Replay, modes: ModalFilter) -> tuple[float, np.ndarray]:
 
 
 def _errors(
-    run: Replay, modes: ModalFilter, free: np.ndarray, rho: np.ndarray, ahead: np.ndarray | None
+    run: Replay, modes: ModalFilter, free: np.ndarray, rho: np.ndarray, total: float | None
 ) -> Bounded:
-    """sup |e_i| <= sup |c_i^-1| (|free_i(t)| + |h_i rho(t)|), with h_i^2 = sum_j q_ij^2 h2_j^2."""
+    """sup |e_i| <= sup |c_i^-1| (|free_i(t)| + |h_i rho(t)|), with h_i^2 = sum_j q_ij^2 h2_j^2.
+
+    A priori |h_i rho| is at most h_i of the axis with the largest times `total`, |r| of all robots and axes.
+    """
     c_inv, w = run.rows.c_inv[run.logged], run.rows.weighted[run.logged, 0]
     inverse, apart = np.linalg.norm(c_inv, 2, axis=(-2, -1)), np.linalg.norm(modes.vectors @ free, axis=-1)
     h = np.sqrt(modes.vectors**2 @ modes.h2**2)
 
-    def most(rho: np.ndarray) -> np.ndarray:
-        """With rho of all modes and axes, (..., n, m)."""
-        pushed = np.linalg.norm(h * np.linalg.norm(rho, axis=-2)[..., None, :], axis=-1)
-        return (inverse * (apart + pushed)).max(axis=0)
+    def most(pushed: np.ndarray) -> np.ndarray:
+        """With |h_i rho|, (..., n)."""
+        return np.asarray((inverse * (apart + pushed)).max(axis=0))
 
     e = np.linalg.norm(np.matvec(c_inv, w), axis=-1).max(axis=0)
-    return Bounded(e, most(rho), None if ahead is None else most(ahead))
+    pushed = np.linalg.norm(h * np.linalg.norm(rho, axis=-2)[:, None], axis=-1)
+    return Bounded(e, most(pushed), None if total is None else most(h.max(axis=-1) * total))
 
 
 def _row(bounded: Bounded, at: tuple[int, ...], unit: str) -> str:

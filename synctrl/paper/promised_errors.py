@@ -38,7 +38,7 @@ def promised_errors(run: Result, experiment: Experiment, stem: Path) -> list[Blo
 
 def caption(bounds: ModalBounds) -> str:
     """What the figure shows, and what beta does, in words made from the gains."""
-    limits = [each for each in (bounds.reason, bounds.unbounded) if each is not None]
+    limits = [each for each in (bounds.reason, bounds.unbounded, bounds.unresolved) if each is not None]
     beyond = f" Limits: {'; '.join(limits)}." if limits else ""
     return (
         f"{bounds.title}: weighted errors w = c e of the run, mode by mode, inside their bounds. "
