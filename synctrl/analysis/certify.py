@@ -17,8 +17,9 @@ from .convergence import Convergence, convergence
 from .delay_condition import DelayCondition, delay_condition
 from .dissipation import Dissipation, balanced
 from .gain_condition import GainCondition, gain_condition
+from .growth import Growth, first_growth
 from .in_words import InWords, units_in_words
-from .lyapunov import RESOLVED, Growth, Lyapunov, first_growth, lyapunov
+from .lyapunov import RESOLVED, Lyapunov, lyapunov
 from .metrics import finite_or_none
 from .replay import Replay, replay
 

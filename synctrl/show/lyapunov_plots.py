@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from ..analysis.lyapunov import Growth, Lyapunov
+from ..analysis.growth import Growth
+from ..analysis.lyapunov import Lyapunov
 from ..renamed import names_elsewhere
 from .panels import GAP, LEGEND, power_of_ten, stacked_panels
 from .plots import style
