@@ -20,7 +20,7 @@ from test_saturation import pair
 from theory_cells import GAINS, coupling, experiment
 
 from synctrl import Cell, Disturbance, Experiment, Friction, Network, Payload, Result
-from synctrl.analysis import Dissipation, certify, dissipation
+from synctrl.analysis import Dissipation, certify, dissipation, modal_bounds
 from synctrl.analysis.lyapunov import lyapunov
 from synctrl.analysis.replay import Replay, replay
 from synctrl.control.adaptation import Ball, Leakage
@@ -313,6 +313,19 @@ def test_every_certificate_has_the_bounds_beside_the_actual_values() -> None:
     assert found.mean_square * 0.03 == pytest.approx(found.X**2)
 
 
+def test_a_log_that_is_too_coarse_for_its_integrals_says_so() -> None:
+    result = experiment(coupling("pair", 2, 2), GAINS.replace(K_r=20.0), known=1.0).simulate(0.2, 1e-3)
+    thinned = result.decimated(100)
+    fine, coarse = dissipation(result), dissipation(thinned)
+    assert fine.unresolved is None
+    assert len(fine.lines) == 2
+    assert coarse.X_bound < coarse.X  # that is what the warning is for
+    for found in (coarse, modal_bounds(thinned)):
+        assert found.unresolved is not None
+        assert found.unresolved in str(found)
+        assert found.as_dict()["unresolved"] == found.unresolved
+
+
 def test_a_loaded_run_has_the_same_dissipation(tmp_path) -> None:
     run = small(**ALL)
     result = run.simulate(0.02, 1e-3, control_period=2e-3)
@@ -379,3 +392,8 @@ def test_the_figure_has_the_sum_below_its_bound_and_no_bound_where_there_is_none
     assert (found.bound**2 >= total * (1 - ROUNDING)).all()
     without = dissipation_figure(replace(found, reason="no law"))
     assert "at most" not in [line.get_label() for panel in without.axes for line in panel.get_lines()]
+
+
+def test_where_nothing_acts_d_is_said_to_be_0() -> None:
+    found = dissipation(experiment(coupling("pair", 2, 1), joints=1).simulate(0.02, 1e-3))
+    assert found.D < 1e-9 and "D = 0 sqrt(N·m) (nothing)" in str(found)

@@ -177,6 +177,24 @@ def test_the_papers_a460_at_rest_learn_what_their_gravity_shows() -> None:
     assert f"at {rate.excited_rate:.2f} 1/s" in PAGE.read_text("utf-8")
 
 
+def test_a_rate_does_not_depend_on_how_many_periods_count_as_one() -> None:
+    """Of directions that are not excited nothing may leak into what is left of the others."""
+    for name, periods in (("at rest", 400), ("straight arm", 8)):
+        experiment, rate = rate_of(name)
+        longer = exponential_rate(experiment, periods * rate.period)
+        assert longer.unexcited and longer.excited_rate == pytest.approx(rate.excited_rate, rel=1e-4)
+
+
+def test_errors_that_grow_beyond_numbers_are_refused() -> None:
+    with refused(InputError, "period", found=1.0):
+        monodromy(lambda times: np.tile(1e4 * np.eye(2), (len(times), 1, 1)), [0.0, 1.0])
+
+
+def test_a_period_after_which_only_rounding_is_left_is_refused() -> None:
+    with refused(InputError, "period", found=250.0):
+        exponential_rate(weighed(), 250.0)
+
+
 def test_a_motion_that_has_faded_away_excites_nothing() -> None:
     rate = exponential_rate(planar_four(), 1.0, start=25.0)  # what rounding leaves of it does not count
     assert rate.coordinates.unexcited == (3, 3, 3, 3)
@@ -341,6 +359,22 @@ def test_a_period_that_is_none_is_refused_with_what_was_found() -> None:
         exponential_rate(circles(), 0.3)
 
 
+@pytest.mark.parametrize("name, value", [("period", -1.0), ("period", np.nan), ("start", -0.5)])
+def test_times_that_are_none_are_refused(name: str, value: float) -> None:
+    with refused(InputError, name):
+        exponential_rate(rods(), **{"period": PERIOD, name: value})
+
+
+def test_a_rate_is_not_simulated_with_another_experiment() -> None:
+    experiment, rate = rate_of("fast")
+    faster = replace(experiment, gains=experiment.gains.replace(Lambda=7.0))
+    for other, found in ((planar_four(), "robots"), (faster, "gains"), (None, "NoneType")):
+        with refused(InputError, "experiment", found=found):
+            simulated_decay(other, rate)
+    with refused(InputError, "rate"):
+        simulated_decay(experiment, experiment)
+
+
 PUSH = Disturbance(0, 1.0, 0.1, 0.2)
 
 
@@ -355,6 +389,12 @@ PUSH = Disturbance(0, 1.0, 0.1, 0.2)
 def test_what_the_theorem_does_not_reach_is_refused_by_name(subject: str, change: dict) -> None:
     with refused(InputError, subject):
         exponential_rate(replace(rods(), **change), PERIOD)
+
+
+def test_saturation_is_named_and_not_the_adaptation_that_comes_with_it() -> None:
+    limited = a460_pair(friction=False)
+    with refused(InputError, "saturate"):
+        exponential_rate(replace(limited, saturate=True), 1.0, start=5.0)
 
 
 def test_friction_that_is_not_adapted_is_refused_even_at_rest() -> None:
@@ -400,6 +440,35 @@ def test_the_figure_marks_the_best_gamma() -> None:
         assert panel.get_ylim()[1] > found.rates.max()
 
 
+def test_rates_far_below_lambda_are_drawn_on_a_logarithmic_axis() -> None:
+    found = RatesOverGamma(np.array([0.1, 1.0, 10.0]), np.array([1e-6, 3e-6, 2e-5]), 6.0, ())
+    (panel,) = rates_figure({"two arms": found}).axes
+    low, high = panel.get_ylim()
+    assert panel.get_yscale() == "log" and 0 < low < found.rates.min() and high > found.limit
+    with refused(InputError, "found"):
+        rates_figure(found)  # type: ignore[arg-type]
+
+
+def test_rates_over_gamma_say_which_is_best_and_whether_it_is_at_an_end() -> None:
+    found = RatesOverGamma(np.array([0.1, 1.0, 10.0]), np.array([1.0, 3.0, 2.0]), 6.0, ("arm 1: m",))
+    for words in (
+        "Gamma times 10: 2 1/s",
+        "best: times 1\n",
+        "6 1/s whatever Gamma",
+        "not learned: arm 1: m",
+    ):
+        assert words in str(found)
+    growing = replace(found, rates=np.array([1.0, 2.0, 3.0]), limit=np.inf, unexcited=())
+    assert "beyond" in str(growing) and "whatever" not in str(growing)
+    assert repr(found) == str(found)
+
+
+def test_a_rate_within_its_own_error_is_said_not_to_tell() -> None:
+    _, rate = rate_of("straight arm")
+    assert "cannot be told" not in str(rate)
+    assert "cannot be told" in str(replace(rate, error=1.0))
+
+
 def test_factors_that_are_not_above_0_are_refused() -> None:
     with refused(InputError, "factors"):
         rates_over_gamma(rods(), PERIOD, [0.0, 1.0])
@@ -414,6 +483,9 @@ def test_the_page_of_the_theorem_runs_and_has_the_numbers_that_it_shows() -> Non
     shown = re.findall(r"^\| rate, 1/s \| (.*) \|$", page, flags=re.MULTILINE)[0].split(" | ")
     np.testing.assert_allclose(names["rates"].rates, np.array(shown, float), atol=0.006)
     assert names["check"].misfit < 0.01
+    for line in str(names["rates"]).splitlines()[-2:]:
+        assert f"    {line}\n" in page
+    assert repr(names["check"]).partition("they differ")[0] in page
     assert set(re.findall(r"`(test_\w+)`", page)) <= {*globals(), *TESTS_ELSEWHERE}
 
 

@@ -19,8 +19,8 @@ from theory_cells import EDGES, GAINS, coupling, experiment
 
 from synctrl import Cell, Coupling, Disturbance, Experiment, Friction, Gains, Member, load_robot
 from synctrl.analysis import Tube, dissipation, tube
-from synctrl.analysis.error_modes import ErrorModes
 from synctrl.analysis.jacobian_size import jacobian_sizes, parts_of
+from synctrl.analysis.modal_filter import ModalFilter
 from synctrl.analysis.replay import replay
 from synctrl.control.controller import Controller
 from synctrl.errors import InputError
@@ -155,7 +155,7 @@ def test_modes_are_the_solution_of_the_equation_of_the_errors(seed: int, kind: s
     Lambda = rng.uniform(0.5, 5.0)
     beta = rng.choice([0.0, rng.uniform(0.1, 5.0), Lambda / np.linalg.eigvalsh(L)[-1]])
     gains = Gains(Lambda=Lambda, beta=beta, K_r=1.0, K_eps=1.0, Gamma=0.1, leak=leak * Lambda)
-    modes = ErrorModes.of(Controller(experiment(link, joints=1).cell, gains))
+    modes = ModalFilter.of(Controller(experiment(link, joints=1).cell, gains))
     one = np.eye(n)
     A = np.block([[-Lambda * one - beta * L, -(1 - leak) * Lambda * beta * one], [L, -leak * Lambda * one]])
     step = 4e-3 / Lambda
@@ -164,9 +164,10 @@ def test_modes_are_the_solution_of_the_equation_of_the_errors(seed: int, kind: s
     responses = np.empty((len(times), n, n))
     for k in range(len(times)):
         responses[k], moved = moved[:n], flow @ moved
-    np.testing.assert_allclose(modes.free(w, times), responses @ w, atol=1e-9)
+    free = modes.vectors @ modes.free(times, modes.to_modes(w), 0 * w)
+    np.testing.assert_allclose(free, responses @ w, atol=1e-9)
     slopes = np.trapezoid(np.gradient(responses @ modes.vectors, step, axis=0) ** 2, times, axis=0).sum(0)
-    assert np.sqrt(slopes.max()) == pytest.approx(modes.free_rates()[0], rel=0.05)
+    assert np.sqrt(slopes.max()) == pytest.approx(modes.free_rate_norm()[0], rel=0.05)
     if beta == 0 or leak > 0 or beta * np.linalg.eigvalsh(L)[1] > Lambda:  # else slow modes last longer
         found = np.trapezoid(responses**2, times, axis=0)
         np.testing.assert_allclose(modes.spread(0), found, rtol=0.02, atol=1e-5)
@@ -262,9 +263,20 @@ def test_what_it_cannot_be_told_is_refused() -> None:
         tube(cell, gains, duration=0.0)
     with refused(InputError, "kappa"):
         tube(cell, gains, kappa=1.0)
+    with refused(InputError, "kappa", found=-1.0):
+        tube(cell, gains, kappa=-np.ones((2, 2)))
     for times in ([], [0.0, 6.0], [-1.0], [1.0, 0.5]):
         with refused(InputError, "times"):
             tube(cell, gains, times=times)
+
+
+def test_errors_of_other_robots_have_no_lengths_in_a_tube() -> None:
+    one = experiment(coupling("pair", 2, 2))
+    told = tube(one.cell, one.gains, times=[0.0])
+    np.testing.assert_array_equal(told.sizes([[3.0, 4.0], [0.0, -1.0]]), [[3.0, 4.0], [0.0, 1.0]])
+    for e in (np.zeros(2), np.zeros((3, 2)), np.zeros((5, 2, 3)), None):
+        with refused(InputError, "e"):
+            told.sizes(e)
 
 
 def test_an_error_of_parameters_that_is_never_learned_is_refused_and_one_that_is_none_is_not() -> None:
@@ -288,6 +300,17 @@ def test_a_desired_velocity_that_jumps_is_refused() -> None:
     with refused(InputError, "arm 1, trajectory"):
         tube(cell, GAINS)
     assert tube(cell, GAINS, duration=0.9).closes
+
+
+def test_a_desired_position_that_jumps_is_refused() -> None:
+    arm, rest = load_robot("planar2r"), lambda t: np.zeros(2)
+    step = FunctionTrajectory(lambda t: (t >= 1.0) * np.array([0.0, 0.3]), rest, rest, breaks=(1.0,))
+    cell = Cell([Member(arm, step, name=f"arm {k}") for k in (1, 2)], Coupling.pair())
+    with refused(InputError, "arm 1, trajectory", found=0.3):
+        tube(cell, GAINS)
+    late = Cell(cell.members, cell.coupling, clocks=np.array([0.0, 0.7]))
+    with refused(InputError, "arm 2, trajectory", found=0.3):
+        tube(late, GAINS, duration=0.9)
 
 
 def test_of_a_space_of_ones_own_kappa_is_sampled_and_it_says_so() -> None:
@@ -321,3 +344,4 @@ def test_it_says_in_words_and_numbers_what_it_found() -> None:
     for name, r in zip(told.names, told.largest[:, 0], strict=True):
         assert f"{name}: |e(x, y)| <= {r:.4g} m" in text
     assert "as long as J^-1 exists" in text
+    assert "if no other torque acts, and weights" in text and repr(told) == text

@@ -110,7 +110,7 @@ def _in_words(run: Replay, record: Lyapunov, name: str) -> str:
     special = name == "other" and plant is not Plant
     words = _WORDS.get(name, f"the adaptation's {name}")
     words += f", of the plant {plant.__qualname__}" if special else ""
-    return f"{words}: power from {power.min():.3g} to {power.max():.3g}"
+    return f"{words}: power from {power.min():.3g} to {power.max():.3g} W"
 
 
 _WORDS = {
@@ -147,11 +147,10 @@ def _events(run: Replay) -> list[str]:
 
 
 def _desired_jumps(run: Replay) -> list[str]:
-    """Breaks at which the desired motion or its velocity jumps, in words."""
-    names, end = run.loop.cell.names, float(run.result.t[-1])
+    cell = run.loop.cell
     return [
-        f"the desired {what} of {names[i]} jumps by {size:.3g} at t = {time:g} s: V jumps there"
-        for time, what, i, size in desired_jumps(run.loop.cell, end)
+        f"the desired {what} of {cell.names[i]} jumps by {size:.3g} at t = {time:g} s: V jumps there"
+        for i, what, size, time in desired_jumps(cell, float(run.result.t[-1]))
     ]
 
 

@@ -72,7 +72,11 @@ def base_storages(cell: Cell, Gamma: np.ndarray) -> tuple[BaseStorage, ...]:
 def _base_storage(cell: Cell, i: int, Gamma: np.ndarray) -> BaseStorage:
     parameters = cell.parameters[i]
     found = grouping(parameters, cell.robots[i].nv, cell.names[i])
-    P = parameters.theta.size
-    G = np.diag(Gamma[:P]) if Gamma.ndim == 1 else Gamma[:P, :P]
-    metric = found.K @ G @ found.K.T
-    return BaseStorage(found, FullMetric(0.5 * (metric + metric.T)[None]))
+    return BaseStorage(found, FullMetric(base_rate(found, Gamma)[None]))
+
+
+def base_rate(found: Grouping, Gamma: np.ndarray) -> np.ndarray:
+    """G = K Gamma K^T of one robot, (r, r), of its diagonal, (P or more, padded), or its padded matrix."""
+    P = found.K.shape[1]
+    G = found.K @ (np.diag(Gamma[:P]) if Gamma.ndim == 1 else Gamma[:P, :P]) @ found.K.T
+    return np.asarray(0.5 * (G + G.T))

@@ -7,18 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import count, index, positive_number
+from ..checks import count, index, instance, positive_number
+from ..control.controller import Controller
 from ..coupling.cell import Cell
+from ..errors import InputError
 from ..simulation.engines import Engine
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .exponential_rate import ExponentialRate
+from .in_words import InWords
 from .on_motion import DesiredMotion
+from .origin import alike
 from .small_errors import Coordinates
 
 
-@dataclass(frozen=True, eq=False)
-class Decay:
+@dataclass(frozen=True, eq=False, repr=False)
+class Decay(InWords):
     """What a small error became in the nonlinear closed loop.
 
     Attributes:
@@ -38,6 +42,12 @@ class Decay:
     def misfit(self) -> float:
         """|simulated - multiplier| / |multiplier|."""
         return abs(self.simulated - self.multiplier) / abs(self.multiplier)
+
+    def __str__(self) -> str:
+        return (
+            f"of a small error a period leaves {_number(self.multiplier)} by the theorem, and "
+            f"{_number(self.simulated)} in the simulation; they differ by {self.misfit:.2g} of that"
+        )
 
 
 def simulated_decay(
@@ -66,9 +76,10 @@ def simulated_decay(
         dt, engine: as in `simulate`.
 
     Raises:
-        InputError: no such direction, or numbers that are not positive.
+        InputError: no such direction, numbers that are not positive, or another experiment than the rate's.
         SimulationError: the run had to stop.
     """
+    _check_origin(experiment, rate)
     count("periods", periods), positive_number("size", size)
     k = len(rate.unexcited) if direction is None else index("direction", direction, len(rate.multipliers))
     before = size * _along(rate, k)
@@ -80,6 +91,34 @@ def simulated_decay(
     simulated = multiplier * share ** (1 / periods)  # of all roots the one nearest to the multiplier
     expected = np.linalg.matrix_power(rate.Phi, periods) @ before
     return Decay(multiplier, simulated, before, after, expected)
+
+
+def _number(value: complex) -> str:
+    """Without an imaginary part where there is none."""
+    return f"{value.real:.6g}" if value.imag == 0 else f"({value:.6g})"
+
+
+def _check_origin(experiment: Experiment, rate: ExponentialRate) -> None:
+    """Refuse an experiment that the rate is not of, as far as its robots, coupling and gains tell."""
+    instance("experiment", experiment, Experiment, "an Experiment")
+    instance("rate", rate, ExponentialRate, "an ExponentialRate")
+    ours, its = map(_told, (experiment.closed_loop().controller, rate.coordinates.controller))
+    for name, value in ours.items():
+        if not alike(value, its[name]):
+            shown = f"one with {name} {value!r:.200}, where it has {its[name]!r:.200}"
+            raise InputError.expected("the experiment that the rate is of", name, "experiment", shown=shown)
+
+
+def _told(controller: Controller) -> dict[str, Any]:
+    """What tells experiments apart, as plain data."""
+    cell = controller.cell
+    return {
+        "robots": list(cell.names),
+        "axes": list(cell.labels),
+        "theta": cell.theta.tolist(),
+        "S": cell.coupling.matrix.tolist(),
+        "gains": controller.gains.as_dict(),
+    }
 
 
 def _along(rate: ExponentialRate, k: int) -> np.ndarray:

@@ -30,7 +30,8 @@ from .balance import accumulated
 from .base_storage import base_storages
 from .gain_condition import gain_condition
 from .held import held
-from .lyapunov import inside_of, proof_along
+from .in_words import InWords
+from .lyapunov import damping, inside_of, proof_along
 from .metrics import finite_or_none
 from .model_torques import frozen_error
 from .replay import Replay, replay
@@ -38,12 +39,14 @@ from .unmodelled import unmodelled
 
 #: share of the largest from which something is worth a word
 SEEN = 1e-9
+#: share of what V(0), d and what enters supply at most, by which the balance may miss
+COARSE = 1e-2
 #: what is in V for the error of the estimates
 BASE, OWN = "base parameters", "the adaptation's own"
 
 
-@dataclass(frozen=True, eq=False)
-class Dissipation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Dissipation(InWords):
     """The balance of V along a run, and what Theorem A promises of it; N·m if weights have no unit.
 
     Attributes:
@@ -146,13 +149,21 @@ class Dissipation:
         """V + X^2 + Z^2 - V(0) - int s^T d - what entered, (T,); 0 but for integration and quadrature."""
         return self.V + self.damped + self.lost - self.V0 - self.supply - self.entering
 
+    @property
+    def unresolved(self) -> str | None:
+        """Why X and Z are not to be trusted, in words, as of a log that is thinned; else None."""
+        gap = float(np.abs(self.gap).max())
+        if gap <= COARSE * (self.V0 + self.entered + self.D**2 / 4):
+            return None
+        return f"the log is too coarse for integrals over it: their balance misses by {gap:.3g}"
+
     def as_dict(self) -> dict[str, Any]:
         """The same as plain numbers and words, without the arrays over time."""
         names = ("D", "X", "X_bound", "Z", "rest", "rest_bound", "mean_square", "mean_square_bound")
         numbers = {name: finite_or_none(getattr(self, name)) for name in (*names, "V0", "V0_full", "VT")}
         sources = {name: float(value) for name, value in self.sources.items()}
         more = {"entered": self.entered, "supply": float(self.supply[-1]), "storage": self.storage}
-        return {**numbers, **more, "sources": sources, "reason": self.reason}
+        return {**numbers, **more, "sources": sources, "reason": self.reason, "unresolved": self.unresolved}
 
     @property
     def lines(self) -> list[str]:
@@ -162,11 +173,15 @@ class Dissipation:
         floor = SEEN * max(self.X, self.D)
         acting = {name: D for name, D in self.sources.items() if floor < D}
         named = ", ".join(f"{name} {D:.3g}" for name, D in acting.items())
-        entered = f", R = {self.entered:.3g}" if self.entered > SEEN * self.V0 else ""
+        D = self.D if acting else 0.0  # the rest is rounding
+        entered = f", R = {self.entered:.3g} N·m" if self.entered > SEEN * self.V0 else ""
+        doubt = [] if self.unresolved is None else [f"  {self.unresolved}"]
         return [
-            f"Theorem A: X = {self.X:.3g} of at most {self.X_bound:.3g}, Z^2 + V(T) = {self.rest:.3g} of at "
-            f"most {self.rest_bound:.3g}",
-            f"  by V(0) = {self.V0:.3g} ({self.storage}){entered}, D = {self.D:.3g} ({named or 'nothing'})",
+            f"Theorem A: X = {self.X:.3g} of at most {self.X_bound:.3g} sqrt(N·m), Z^2 + V(T) = "
+            f"{self.rest:.3g} of at most {self.rest_bound:.3g} N·m",
+            f"  by V(0) = {self.V0:.3g} N·m ({self.storage}){entered}, "
+            f"D = {D:.3g} sqrt(N·m) ({named or 'nothing'})",
+            *doubt,
         ]
 
     def __str__(self) -> str:
@@ -195,7 +210,7 @@ def balanced(run: Replay, reasons: Sequence[str]) -> Dissipation:
     total, model = np.sum(list(torques.values()), axis=0), x.lacking - x.frozen
     claimed = lost + _sum(x.s_q * (model - np.vecmat(x.force, x.J)))
     squares = [_squared(run, torque) for torque in (total, *torques.values())]
-    losses = [_damping(run), lost + _sum(x.s_q * x.friction_damping)]
+    losses = [_sum(damping(run)), lost + _sum(x.s_q * x.friction_damping)]
     powers = [*losses, _sum(x.s_q * total), claimed, rates + x.storage_rate, *squares]
     damped, gone, supply, due, stored, D2, *each = accumulated(run, np.stack(powers, axis=1)).T
     own = (kept + x.storage)[run.logged]
@@ -233,13 +248,6 @@ def _storage(run: Replay) -> tuple[np.ndarray, str]:
         storages = base_storages(cell, cast(MetricGradient, adaptation).Gamma)
         return np.sum([each.energy(learned[:, i]) for i, each in enumerate(storages)], axis=0), BASE
     return own
-
-
-def _damping(run: Replay) -> np.ndarray:
-    """s_q^T K_r s_q, (R,), in the space in which K_r acts."""
-    x, controller = run.rows, run.loop.controller
-    s = x.s_q if controller.k_r_space == "joint" else np.matvec(x.J, x.s_q)
-    return _sum(s * controller.K_r * s)
 
 
 def _squared(run: Replay, torque: np.ndarray) -> np.ndarray:

@@ -14,18 +14,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, finite_number, instance, positive_number
+from ..checks import finite_array, instance, non_negative_number, positive_number
 from ..errors import InputError
 from ..simulation.simulate import Experiment
 from .directions import describe_slowest, describe_unexcited
+from .in_words import InWords
 from .interpolated import Interpolated
 from .monodromy import FIRST, instants, monodromy
 from .on_motion import DesiredMotion, check_period, check_reach
 from .small_errors import Coordinates, error_matrices, make_coordinates
 
+#: smallest multiplier that has all its digits
+LEAST = float(np.finfo(float).tiny / np.finfo(float).eps)
 
-@dataclass(frozen=True, eq=False)
-class ExponentialRate:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ExponentialRate(InWords):
     """What one period makes of small errors, to first order.
 
     Attributes:
@@ -84,18 +88,20 @@ class ExponentialRate:
         }
 
     def __str__(self) -> str:
-        what = "what the motion excites" if self.unexcited else "small errors"
+        what = "errors of what the motion excites" if self.unexcited else "small errors"
         left = np.exp(-self.excited_rate * self.period)
         told = (
-            f"{what}: {self.excited_rate:.4g} 1/s, {left:.4g} is left after a period of {self.period:g} s; "
-            f"slowest: {self.slowest}"
+            f"{what} fall at {self.excited_rate:.4g} 1/s, after a period of {self.period:g} s "
+            f"{left:.4g} of them is left; slowest: {self.slowest}"
         )
+        if left >= 1 - self.error:
+            told += f"\nthis cannot be told from no rate: what is left is known to {self.error:.1g}"
         frozen = f"\nnot excited, and so not learned: {'; '.join(self.unexcited)}"
         return told + frozen * bool(self.unexcited)
 
 
-@dataclass(frozen=True, eq=False)
-class RatesOverGamma:
+@dataclass(frozen=True, eq=False, repr=False)
+class RatesOverGamma(InWords):
     """How the rate depends on how fast robots learn.
 
     Attributes:
@@ -116,6 +122,21 @@ class RatesOverGamma:
         """The factor with the largest rate."""
         return float(self.factors[np.argmax(self.rates)])
 
+    def __str__(self) -> str:
+        lines = [
+            f"Gamma times {k:.3g}: {rate:.3g} 1/s" for k, rate in zip(self.factors, self.rates, strict=True)
+        ]
+        lines.append(f"best: times {self.best:.3g}")
+        if self.best in self.factors[[0, -1]]:
+            lines[-1] += ", at an end of the factors; a better one may lie beyond"
+        if np.isfinite(self.limit):
+            lines.append(
+                f"errors that no synchronization error sees fall at {self.limit:g} 1/s whatever Gamma"
+            )
+        if self.unexcited:
+            lines.append(f"not excited, and so not learned: {'; '.join(self.unexcited)}")
+        return "\n".join(lines)
+
 
 def exponential_rate(experiment: Experiment, period: float, start: float = 0.0) -> ExponentialRate:
     """Multipliers and rate of small errors along a desired motion that repeats.
@@ -125,10 +146,11 @@ def exponential_rate(experiment: Experiment, period: float, start: float = 0.0) 
     Args:
         experiment: a cell with the paper's law and adaptation, alone: see `check_reach`.
         period: of the desired motion and the weights, s.
-        start: from when on the motion repeats, s.
+        start: from when on the motion repeats, s, at least 0.
 
     Raises:
-        InputError: no period of the motion, or an experiment that the theorem does not reach, by name.
+        InputError: a time that is none, no period of the motion or one that leaves nothing of small errors,
+            or an experiment that the theorem does not reach, by name.
         UnreachableError: no joint positions for what is desired.
         RobotError: the rank of a regressor is not clear.
     """
@@ -165,7 +187,7 @@ class _Period:
 
     def __init__(self, experiment: Experiment, period: float, start: float):
         instance("experiment", experiment, Experiment, "an Experiment")
-        self.period, self.start = positive_number("period", period), finite_number("start", start)
+        self.period, self.start = positive_number("period", period), non_negative_number("start", start)
         loop = experiment.closed_loop()
         check_reach(experiment, loop)
         check_period(loop.cell, self.start, self.period)
@@ -176,25 +198,43 @@ class _Period:
 
     def rate(self, factor: float) -> ExponentialRate:
         """With Gamma times a factor."""
-        z = self.coordinates
-        Phi, error = monodromy(lambda t: error_matrices(self._on(t), z, factor), self.edges)
-        values, left, right = _eigen(Phi, z.excited)
-        count = sum(z.unexcited)
+        z, kept = self.coordinates, self.coordinates.excited
+        block, error = monodromy(
+            lambda t: error_matrices(self._on(t), z, factor)[:, kept][..., kept], self.edges
+        )
+        values, left, right = _eigen(block, kept)
+        Phi, count = np.eye(z.size), sum(z.unexcited)
+        Phi[np.ix_(kept, kept)] = block
+        self._check_left(float(np.abs(values[count])), error)
         slowest = describe_slowest(z, left[:, count], right[:, count])
         return ExponentialRate(
             self.period, self.start, values, describe_unexcited(z), slowest, error, Phi, right, left, z
         )
 
+    def _check_left(self, largest: float, error: float) -> None:
+        """Refuse a period after which nothing is left but rounding."""
+        if largest <= (least := max(error, LEAST)):
+            shown = f"{self.period:g} s, after which less than {least:.2g} of them is left"
+            wanted = "a period in which small errors do not vanish"
+            raise InputError.expected(wanted, self.period, "period", shown=shown)
 
-def _eigen(Phi: np.ndarray, excited: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Multipliers, left and right eigenvectors as columns; what is not excited keeps to itself."""
+
+def _eigen(block: np.ndarray, excited: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Multipliers, left and right eigenvectors as columns; what is not excited keeps to itself.
+
+    Args:
+        block: Phi of what is excited.
+        excited: where in z that is, (k,).
+    """
     from scipy.linalg import eig
 
-    values, left, right = eig(Phi[np.ix_(excited, excited)], left=True)
+    scale = max(float(np.abs(block).max()), LEAST)  # LAPACK does not tell numbers far below 1 apart
+    values, left, right = eig(block / scale, left=True)
     order = np.argsort(-np.abs(values), kind="stable")
     rest = np.flatnonzero(~excited)
-    whole = np.zeros((2, len(Phi), len(Phi)), complex)
+    size = len(excited)
+    whole = np.zeros((2, size, size), complex)
     whole[:, rest, np.arange(len(rest))] = 1.0
     for vectors, found in zip(whole, (left, right), strict=True):
-        vectors[np.ix_(excited, np.arange(len(rest), len(Phi)))] = found[:, order]
-    return np.concatenate([np.ones(len(rest)), values[order]]), *whole
+        vectors[np.ix_(excited, np.arange(len(rest), size))] = found[:, order]
+    return np.concatenate([np.ones(len(rest)), scale * values[order]]), *whole

@@ -7,17 +7,17 @@ instants, an event parts the log. What V does there is no part of V', and nothin
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from ..control.network.messages import GRID
 from ..coupling.cell import Cell
-from ..simulation.clock import before
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.schedules import DisturbanceSchedule
 
+#: how long before a break a desired motion is looked at, s: more than times and clocks are rounded
+JUST_BEFORE = 1e-11
 #: relative size from which a difference between the two sides of a break is a jump, and not rounding
 JUMP = 1e-9
 
@@ -28,6 +28,32 @@ class SmoothPart(NamedTuple):
     first: int
     last: int
     rows: slice
+
+
+class DesiredJump(NamedTuple):
+    """A jump of what is desired of a robot: its number, "position" or "velocity", the size, and when, s."""
+
+    robot: int
+    what: str
+    size: float
+    time: float
+
+
+def desired_jumps(cell: Cell, end: float) -> list[DesiredJump]:
+    """Jumps of desired positions and velocities after 0 and until the end, s; s_q and V jump there, too.
+
+    Of all robots the one that jumps most.
+    """
+    found = []
+    for time in (time for time in cell.breaks if 0.0 < time <= end):
+        instants = np.array([time - JUST_BEFORE, time])
+        left, right = (reference.desired for reference in cell.references(instants))
+        for row, what in enumerate(("position", "velocity")):
+            jump, passed = np.abs(right[row] - left[row]).max(axis=-1), JUST_BEFORE * np.abs(left[row + 1])
+            i = int(jump.argmax())
+            if jump[i] > JUMP * max(1.0, np.abs(right[row]).max()) + 2 * passed.max():
+                found.append(DesiredJump(i, what, float(jump[i]), time))
+    return found
 
 
 def jumps_in(
@@ -65,26 +91,6 @@ def _events_in(t: np.ndarray, loop: ClosedLoop, period: float | None) -> list[in
     if period is not None:
         messages = period * np.ceil(messages / period - GRID)
     return list(ends_before(t, np.concatenate((events, messages))))
-
-
-class DesiredJump(NamedTuple):
-    """A break at which the desired "position" or "velocity" jumps, by `size`, most of robot `robot`."""
-
-    time: float
-    what: str
-    robot: int
-    size: float
-
-
-def desired_jumps(cell: Cell, end: float) -> Iterator[DesiredJump]:
-    """Breaks until `end`, s, at which the desired motion or its velocity jumps, and s_q and V with them."""
-    for time in (time for time in cell.breaks if 0.0 < time <= end):
-        left, right = cell.references(np.array([before(time), time]))
-        for row, what in ((0, "position"), (1, "velocity")):
-            jump = np.abs(right.desired[row] - left.desired[row]).max(axis=-1)
-            if jump.max() > JUMP * max(1.0, np.abs(right.desired[row]).max()):
-                i = int(jump.argmax())
-                yield DesiredJump(time, what, i, float(jump[i]))
 
 
 def jumps_of_v(t: np.ndarray, cell: Cell, events: tuple[int, ...]) -> tuple[int, ...]:

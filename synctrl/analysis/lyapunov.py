@@ -117,23 +117,6 @@ class Lyapunov:
         return error <= max(RESOLVED * float(np.ptp(V)), ROUNDED * float(V.max()))
 
 
-@dataclass(frozen=True)
-class Growth:
-    """The first instant at which V grows.
-
-    Attributes:
-        time: s.
-        index: of that instant in the log.
-        rate: V' there, or the increase to the next instant over the step if V' is not positive.
-        term: the largest positive power there; "integration" if there is none, and the step is too long.
-    """
-
-    time: float
-    index: int
-    rate: float
-    term: str
-
-
 def lyapunov(result: Result | Replay, experiment: Experiment | None = None) -> Lyapunov:
     """V and V' at every logged instant of a run.
 
@@ -169,28 +152,6 @@ def lyapunov(result: Result | Replay, experiment: Experiment | None = None) -> L
         jumped(run, V),
         run.loop.messages.sent and not run.events,
     )
-
-
-def first_growth(record: Lyapunov) -> Growth | None:
-    """The first instant at which V grows beyond rounding, and the term that did it; None if it never does.
-
-    Jumps of V, at events of plant or network or of what is desired, do not count: they are no matter of V'.
-    """
-    V, V_dot = record.V, record.V_dot
-    rising = V_dot > record.rounding
-    gained = np.diff(V, append=V[-1])
-    gained[list(record.events)] = 0.0  # a jump at an event is no growth by V'
-    rising |= gained > 8 * EPS * V + record.rounding * np.diff(record.t, append=record.t[-1])
-    if not rising.any():
-        return None
-    k = int(np.argmax(rising))
-    if V_dot[k] > record.rounding[k]:
-        term = max(record.power, key=lambda name: record.power[name][k])
-        return Growth(float(record.t[k]), k, float(V_dot[k]), term)
-    rate = float(gained[k] / (record.t[k + 1] - record.t[k]))
-    term = max(record.power, key=lambda name: record.power[name][k + 1])
-    grows = record.power[term][k + 1] > record.rounding[k + 1]
-    return Growth(float(record.t[k]), k, rate, term if grows else "integration")
 
 
 def outside(network: BoundNetwork) -> str | None:
@@ -229,6 +190,13 @@ def inside_of(run: Replay, proof: Proof) -> tuple[str, ...]:
     return ("damping", *known, "friction in Y", *GIVING)
 
 
+def damping(run: Replay) -> np.ndarray:
+    """s_q^T K_r s_q joint by joint, (R, n, nv), or of J s_q axis by axis where K_r acts in task space."""
+    x, controller = run.rows, run.loop.controller
+    s = x.s_q if controller.k_r_space == "joint" else np.matvec(x.J, x.s_q)
+    return np.asarray(s * controller.K_r * s)
+
+
 def _rates(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
     """Time derivatives of the terms of V by the chain rule, (R,) each."""
     return (*map(_sum, _summands(run, proof)), run.rows.storage_rate, *run.rows.stored_rate.T)
@@ -244,12 +212,11 @@ def _summands(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
 def _power(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
     """Terms of V', one value per row; "other" is what the chain rule has beyond those with a name."""
     x, controller = run.rows, run.loop.controller
-    K_r, s, moved = controller.K_r, np.matvec(x.c_inv, x.r), np.matvec(x.J, x.s_q)
+    s, moved = np.matvec(x.c_inv, x.r), np.matvec(x.J, x.s_q)
     in_task = controller.k_r_space == "task"
-    damping = moved * K_r * moved if in_task else x.s_q * K_r * x.s_q
-    unfollowed = x.force - K_r * moved if in_task else x.force  # what acts on s where J s_q is meant
+    unfollowed = x.force - controller.K_r * moved if in_task else x.force  # acts on s where J s_q is meant
     terms = {
-        "damping": -damping,
+        "damping": -damping(run),
         **proof.powers,
         "friction in Y": -x.s_q * x.friction_damping,
         "friction": x.s_q * x.friction,

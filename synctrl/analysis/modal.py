@@ -24,12 +24,15 @@ from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .balance import accumulated
 from .dissipation import dissipation
+from .in_words import InWords, units_in_words
 from .modal_filter import ModalFilter
 from .modal_signals import run_signals, slip_matrices
 from .replay import Replay, replay
 
 #: share of the largest bound below which another says nothing
 ROUNDING = 1e-9
+#: what the second bound is
+PRIORI = "; a priori: with what Theorem A knows of r before it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +60,8 @@ class Bounded:
         return {"actual": self.actual.tolist(), "bound": self.bound.tolist(), "a_priori": a_priori}
 
 
-@dataclass(frozen=True, eq=False)
-class ModalBounds:
+@dataclass(frozen=True, eq=False, repr=False)
+class ModalBounds(InWords):
     """Bounds of w_j beside w_j, n modes, m axes, T logged instants; w in the unit of c e.
 
     Attributes:
@@ -66,7 +69,8 @@ class ModalBounds:
         t: (T,), s.
         filter: from r_j to w_j, with its `gain`, `h2` and `static`, (n, m) each.
         axes, names: of the task coordinates, and of the robots.
-        unit: of w.
+        unit, units: of w; all that occur, and that of each axis.
+        error_unit: of e, all that occur.
         w: modal errors of the run, (T, n, m).
         r: modal coupled velocity errors, of true sigma and E, (T, n, m), in the unit of w per s.
         free: what the modal errors would be without r, (T, n, m).
@@ -81,6 +85,7 @@ class ModalBounds:
         errors: sup |e_i|, (n,).
         reason: why r is not c J s_q, in words, or None.
         unbounded: why Theorem A does not reach the run, in words, or None.
+        unresolved: why integrals over the log are not to be trusted, in words, or None.
     """
 
     title: str
@@ -89,6 +94,8 @@ class ModalBounds:
     axes: tuple[str, ...]
     names: tuple[str, ...]
     unit: str
+    units: tuple[str, ...]
+    error_unit: str
     w: np.ndarray
     r: np.ndarray
     free: np.ndarray
@@ -103,6 +110,7 @@ class ModalBounds:
     errors: Bounded
     reason: str | None
     unbounded: str | None
+    unresolved: str | None = None
 
     @property
     def rho_a_priori(self) -> np.ndarray | None:
@@ -134,20 +142,26 @@ class ModalBounds:
             **{name: getattr(self, name).as_dict() for name in ("l2", "peak", "errors")},
             "reason": self.reason,
             "unbounded": self.unbounded,
+            "unresolved": self.unresolved,
             "sentence": self.sentence,
         }
 
     def __str__(self) -> str:
         lines = [f"{self.title}: {self.sentence}"]
+        lines.append("  at most: with the r of this run" + PRIORI * (self.peak.a_priori is not None))
         for j, value in enumerate(self.filter.eigenvalues):
             for a, axis in enumerate(self.axes):
                 gain = f"gain {self.filter.gain[j, a]:.4g} s"
-                lines.append(f"  lambda {value:.4g}, {axis}: {gain}, sup |w| {_row(self.peak, (j, a))}")
-        lines += [f"  {name}: sup |e| {_row(self.errors, (i,))}" for i, name in enumerate(self.names)]
+                told = _row(self.peak, (j, a), self.units[a])
+                lines.append(f"  mode {j + 1}, lambda {value:.4g}, {axis}: {gain}, sup |w| {told}")
+        for i, name in enumerate(self.names):
+            lines.append(f"  {name}: sup |e| {_row(self.errors, (i,), self.error_unit)}")
         if self.reason is not None:
             lines.append(f"  r is more than c J s_q, by what was measured: {self.reason}")
         if self.unbounded is not None:
             lines.append(f"  nothing is known a priori: {self.unbounded}")
+        if self.unresolved is not None:
+            lines.append(f"  {self.unresolved}")
         return "\n".join(lines)
 
 
@@ -163,29 +177,25 @@ def modal_bounds(result: Result | Replay, experiment: Experiment | None = None) 
             positions at once.
     """
     run = replay(result, experiment)
-    signals, slip, modes, result = run_signals(run), dissipation(run), modal_filter(run), run.result
+    signals, slip, modes = run_signals(run), dissipation(run), ModalFilter.of(run.loop.controller)
+    result = run.result
     w, E, r, driven = (modes.to_modes(rows) for rows in signals[:4])
     free = modes.free(result.t - result.t[0], w[0], E[0])
     rho, gap = np.sqrt(_grown(run, r**2)), np.sqrt(_grown(run, (r - driven) ** 2)[-1])
     kappa, kappas = _kappas(run, modes)
     X_bound = slip.X_bound if slip.reason is None else None
     ahead = None if X_bound is None else kappas * X_bound + gap
-    most = None if X_bound is None else kappa * X_bound + float(np.linalg.norm(gap))
+    total = None if X_bound is None else kappa * X_bound + float(np.linalg.norm(gap))
     norm, peak = modes.free_norm(w[0], E[0]), np.abs(free)
     l2 = Bounded(np.sqrt(_grown(run, w**2)[-1]), norm + modes.gain * rho[-1], _sum(norm, modes.gain, ahead))
     largest = (peak + modes.h2 * rho).max(axis=0), _sum(peak.max(axis=0), modes.h2, ahead)
     return ModalBounds(
         str(result.info["title"]), result.t, modes, tuple(result.info["axes"]), tuple(result.names),
-        result.unit("coupled_error"), w[run.logged], r[run.logged], free, rho, kappa, kappas,
+        result.unit("coupled_error"), result.units("coupled_error")[0], result.unit("tracking_error"),
+        w[run.logged], r[run.logged], free, rho, kappa, kappas,
         slip.X, X_bound, gap, l2, Bounded(np.abs(w).max(axis=0), *largest),
-        _errors(run, modes, free, rho, most, ahead), signals.reason, slip.reason,
+        _errors(run, modes, free, rho, total, ahead), signals.reason, slip.reason, slip.unresolved,
     )  # fmt: skip
-
-
-def modal_filter(run: Replay) -> ModalFilter:
-    """The filters of the cell and the gains of a run."""
-    controller, S = run.loop.controller, run.loop.cell.coupling.matrix
-    return ModalFilter.from_matrix(S, controller.Lambda, controller.beta, controller.leak)
 
 
 def _sum(free: np.ndarray, gain: np.ndarray, rho: np.ndarray | None) -> np.ndarray | None:
@@ -210,13 +220,13 @@ def _errors(
     modes: ModalFilter,
     free: np.ndarray,
     rho: np.ndarray,
-    most: float | None,
+    total: float | None,
     ahead: np.ndarray | None,
 ) -> Bounded:
     """sup |e_i| <= sup |c_i^-1| (|free_i(t)| + |sum_j |q_ij| h2_j rho_j(t)|).
 
-    A priori each |r_j| is at most `ahead`, and all of them together at most `most`, of which a robot gets
-    h_i^2 = sum_j q_ij^2 h2_j^2: the smaller bound counts.
+    A priori each |r_j| is at most `ahead`, and all of them together at most `total`, of which a robot gets
+    h_i^2 = sum_j q_ij^2 h2_j^2 of the axis with the largest: the smaller bound counts.
     """
     c_inv, w = run.rows.c_inv[run.logged], run.rows.weighted[run.logged, 0]
     inverse, apart = np.linalg.norm(c_inv, 2, axis=(-2, -1)), np.linalg.norm(modes.vectors @ free, axis=-1)
@@ -230,12 +240,12 @@ def _errors(
         return (inverse * (apart + pushed)).max(axis=0)
 
     e, a_priori = np.linalg.norm(np.matvec(c_inv, w), axis=-1).max(axis=0), None
-    if ahead is not None and most is not None:
-        a_priori = largest(np.minimum(pushed(ahead), h.max(axis=-1) * most))
+    if ahead is not None and total is not None:
+        a_priori = largest(np.minimum(pushed(ahead), h.max(axis=-1) * total))
     return Bounded(e, largest(pushed(rho)), a_priori)
 
 
-def _row(bounded: Bounded, at: tuple[int, ...]) -> str:
+def _row(bounded: Bounded, at: tuple[int, ...], unit: str) -> str:
     """One of the numbers with its bounds, in words."""
     ahead = "" if bounded.a_priori is None else f", a priori {bounded.a_priori[at]:.3g}"
-    return f"{bounded.actual[at]:.3g}, at most {bounded.bound[at]:.3g}{ahead}"
+    return f"{bounded.actual[at]:.3g}, at most {bounded.bound[at]:.3g}{ahead} {units_in_words(unit)}"

@@ -9,7 +9,11 @@ falls apart into modes, because sigma_j = lambda_j w_j:
     w_j = [(p + l) (r_j + w_j(0)) - (Lambda - l) beta E_j(0)] / [(p + a) (p + b)],
     a = Lambda,   b = l + beta lambda_j.
 
-Lambda, beta and the leak are diagonal, so axes do not mix.
+Lambda, beta and the leak are diagonal, so axes do not mix. Robot i has w_i = sum_k g_ik * r_k beside the free
+response, where g_ik = sum_j q_ij q_kj g_j and g_j is the impulse response of (p + l)/[(p + a) (p + b)]. With
+another mode g', of c = l + beta lambda', residues give
+
+    int g_j g' dt = (a b (a + c) + a c (a + b) + l^2 (2 a + b + c)) / (2 a (a + b) (a + c) (b + c)).
 """
 
 from __future__ import annotations
@@ -18,8 +22,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..control.controller import Controller
+
 #: share of the largest eigenvalue of S^T S up to which an eigenvalue counts as 0
 ZERO = 1e-12
+#: stands for a pole at 0, whose limit is meant: small against every rate, and far from what is too small
+NEAR_ZERO = 1e-100
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +45,12 @@ class ModalFilter:
     Lambda: np.ndarray
     beta: np.ndarray
     leak: np.ndarray
+
+    @classmethod
+    def of(cls, controller: Controller) -> ModalFilter:
+        """The filters of a controller whose law has that r, such as `SunMills`."""
+        S = controller.cell.coupling.matrix
+        return cls.from_matrix(S, controller.Lambda, controller.beta, controller.leak)
 
     @classmethod
     def from_matrix(
@@ -116,6 +130,24 @@ class ModalFilter:
     def free_norm(self, w0: np.ndarray, E0: np.ndarray) -> np.ndarray:
         """L2 norm of `free` over all times, (n, m)."""
         return self._norm(w0, self._rest(w0, E0))
+
+    def free_rate_norm(self) -> np.ndarray:
+        """The most that the L2 norm of w' without r can be of |w(0)| if E(0) is 0, (m,), 1/s^1/2.
+
+        Of a mode it is the norm of p (p + l)/[(p + a) (p + b)] - 1.
+        """
+        a, b = np.broadcast_arrays(self.Lambda, self.leak + self.pull)
+        return np.asarray(self._norm(a + b - self.leak, a * b).max(axis=0))
+
+    def spread(self, axis: int) -> np.ndarray:
+        """h^2, (n, n), s: |w_i| on an axis is at most sum_k h_ik |r_k|_L2, beside the free response."""
+        a, l = self.Lambda[axis], self.leak[axis]
+        b = c = np.maximum(l + self.pull[:, axis], NEAR_ZERO)
+        b = b[:, None]
+        inner = a * b * (a + c) + a * c * (a + b) + l * l * (2 * a + b + c)
+        inner /= 2 * a * (a + b) * (a + c) * (b + c)
+        pairs = self.vectors[:, None] * self.vectors[None]  # q_ij q_kj, (n, n, modes)
+        return np.maximum(np.einsum("ikj,jl,ikl->ik", pairs, inner, pairs, optimize=True), 0.0)
 
     def _rest(self, w0: np.ndarray, E0: np.ndarray) -> np.ndarray:
         """n_0, (n, m): E_j is 0 in the modes of which S knows nothing, and unseen without beta."""

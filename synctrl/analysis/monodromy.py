@@ -46,8 +46,8 @@ def monodromy(matrices: Matrices, edges: Sequence[float]) -> tuple[np.ndarray, f
         InputError: A changes too fast, or too often, for the period that is looked at.
     """
     steps = _first(matrices, edges)
-    coarse = _product(matrices, edges, steps)
-    while steps < LAST:
+    coarse, error = _product(matrices, edges, steps), np.inf
+    while steps < LAST and np.isfinite(coarse).all():
         steps *= 2
         fine = _product(matrices, edges, steps)
         gap = (fine - coarse) / GAIN
@@ -55,7 +55,7 @@ def monodromy(matrices: Matrices, edges: Sequence[float]) -> tuple[np.ndarray, f
         if GAIN * error <= PRECISION * np.abs(fine).max():
             return fine + gap, error
         coarse = fine
-    text = f"the linear system is not resolved by {LAST} steps: Phi still changes by {GAIN * error:.2g}"
+    text = f"the linear system is not resolved by {steps} steps: Phi still changes by {GAIN * error:.2g}"
     raise InputError(text, subject="period", found=float(edges[-1] - edges[0]))
 
 
@@ -72,8 +72,9 @@ def _product(matrices: Matrices, edges: Sequence[float], steps: int) -> np.ndarr
     A = matrices(instants(edges, steps))
     h = np.repeat(np.diff(edges) / steps, steps)
     Phi = np.eye(A.shape[-1])
-    for step in expm(_exponents(h[:, None, None] * A.reshape(len(h), 3, *Phi.shape).swapaxes(0, 1))):
-        Phi = step @ Phi
+    with np.errstate(over="ignore", invalid="ignore"):  # of a step that is far too long
+        for step in expm(_exponents(h[:, None, None] * A.reshape(len(h), 3, *Phi.shape).swapaxes(0, 1))):
+            Phi = step @ Phi
     return Phi
 
 

@@ -53,7 +53,7 @@ def check_settings(result: Result, loop: ClosedLoop) -> None:
     """
     ours, its = (_settings(info) for info in (describe_run(loop), result.info))
     for name in its:
-        if not _alike(ours[name], its[name]):
+        if not alike(ours[name], its[name]):
             raise another(f"it has {name}: {ours[name]!r:.200}, the result {its[name]!r:.200}", name)
 
 
@@ -66,12 +66,12 @@ def _settings(info: Mapping[str, Any]) -> dict[str, Any]:
     return {"adaptation": learning, "gains": gains, **optional, **parts}
 
 
-def _alike(a: Any, b: Any) -> bool:
+def alike(a: Any, b: Any) -> bool:
     """Whether settings are the same but for rounding; a file makes tuples lists."""
     if isinstance(a, Mapping) and isinstance(b, Mapping):
-        return a.keys() == b.keys() and all(_alike(a[key], b[key]) for key in a)
+        return a.keys() == b.keys() and all(alike(a[key], b[key]) for key in a)
     if isinstance(a, list | tuple) and isinstance(b, list | tuple):
-        return len(a) == len(b) and all(map(_alike, a, b))
+        return len(a) == len(b) and all(map(alike, a, b))
     if isinstance(a, float) and isinstance(b, float):
         return isclose(a, b, rel_tol=ROUNDING)
     return bool(np.array_equal(a, b))

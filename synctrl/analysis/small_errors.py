@@ -20,6 +20,7 @@ import numpy as np
 
 from ..control.controller import Controller
 from ..robots.base_parameters import Grouping, grouping
+from .base_storage import base_rate
 from .on_motion import OnMotion
 
 #: eigenvalues below this share of the largest count as 0
@@ -113,21 +114,16 @@ def make_coordinates(controller: Controller, on: OnMotion) -> Coordinates:
         grouping(p, robot.nv, name)
         for p, robot, name in zip(cell.parameters, cell.robots, cell.names, strict=True)
     )
-    pairs = [_adapted(on.Y[:, i], each, _gamma(controller, i)) for i, each in enumerate(found)]
+    Gamma = controller.adaptation.Gamma  # type: ignore[attr-defined]
+    pairs = [_adapted(on.Y[:, i], each, Gamma[i]) for i, each in enumerate(found)]
     L, unexcited = zip(*pairs, strict=True)
     U, values, _ = np.linalg.svd(cell.coupling.matrix, full_matrices=False)
     return Coordinates(controller, found, L, unexcited, U[:, values > ZERO * values[0]])
 
 
-def _gamma(controller: Controller, i: int) -> np.ndarray:
-    """Gamma of one robot, (P, P)."""
-    P, Gamma = controller.cell.parameters[i].theta.size, controller.adaptation.Gamma[i]  # type: ignore[attr-defined]
-    return np.diag(Gamma[:P]) if Gamma.ndim == 1 else Gamma[:P, :P]
-
-
 def _adapted(Y: np.ndarray, found: Grouping, Gamma: np.ndarray) -> tuple[np.ndarray, int]:
     """L of one robot, with the directions that are not excited last, and how many there are."""
-    values, vectors = np.linalg.eigh(found.K @ Gamma @ found.K.T)
+    values, vectors = np.linalg.eigh(base_rate(found, Gamma))
     used = values > ZERO * max(values[-1], np.finfo(float).tiny)
     L = vectors[:, used] * np.sqrt(values[used])
     Y_u = Y[:, :, found.columns] @ L

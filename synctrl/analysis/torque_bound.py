@@ -29,7 +29,7 @@ from ..errors import InputError
 from ..robots.parameters import FrictionParameters
 from ..simulation.schedules import Disturbance, DisturbanceSchedule
 from ..tasks.spaces import JointSpace
-from .error_modes import ErrorModes
+from .modal_filter import ModalFilter
 
 #: instants at which desired speeds are looked at
 INSTANTS = 1001
@@ -124,7 +124,7 @@ def _fed_back(controller: Controller, viscous: np.ndarray, w: np.ndarray) -> tup
     if gamma >= 1:
         wanted = "a bound of joint speeds, or damping above the viscous friction outside the regressor"
         raise InputError.expected(wanted, gamma, "speed", shown=f"friction of {gamma:.3g} times the damping")
-    rates = ErrorModes.of(controller).free_rates()
+    rates = ModalFilter.of(controller).free_rate_norm()
     return gamma, float(np.linalg.norm(felt * rates * np.linalg.norm(w, axis=0)))
 
 

@@ -3,10 +3,10 @@
     V(0) = sum_i (1/2 s_q^T M s_q + 1/2 t^T (K Gamma K^T)^+ t) + sum_k 1/2 eps_k^T K_eps eps_k
     X <= D/2 + (D^2/4 + V(0))^1/2,    |w_i - w_i of r = 0| <= X (max over axes of sum_k h_ik^2 kappa_k^2)^1/2
 
-with h of `ErrorModes`, kappa_k = sup |c_k J_k K_r^-1/2| and e = c^-1 w. kappa is a bound by lengths of links
-for all joint positions, so that nothing is assumed of J but that J^-1 exists; and that the tube itself may
-show: errors stay in the tube as long as J^-1 exists, and in the tube it does. The page about the tube in
-`docs` has the proofs.
+with h^2 of `ModalFilter.spread`, kappa_k = sup |c_k J_k K_r^-1/2| and e = c^-1 w. kappa is a bound by lengths
+of links for all joint positions, so that nothing is assumed of J but that J^-1 exists; and that the tube
+itself may show: errors stay in the tube as long as J^-1 exists, and in the tube it does. The page about the
+tube in `docs` has the proofs.
 """
 
 from __future__ import annotations
@@ -18,18 +18,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, positive_number
+from ..checks import finite_array, numbers, positive_number
 from ..control.controller import Controller
 from ..control.gains import Gains
 from ..coupling.cell import Cell
+from ..errors import InputError
 from ..simulation.schedules import Disturbance
 from ..tasks.pose import MAX_ANGLE
 from ..tasks.spaces import JointSpace
 from .clearance import clearance
+from .in_words import InWords
 from .jacobian_size import sizes_of
 from .torque_bound import Outside, largest_norm, outside
 from .tube_radius import Known, Radii, radii, radii_with
-from .tube_start import check_velocities, read_instants, start
+from .tube_start import check_motions, read_instants, start
 
 #: what has to be true where kappa is given
 KAPPA_GIVEN = "kappa is as given"
@@ -44,8 +46,8 @@ class Part(NamedTuple):
     stop: int
 
 
-@dataclass(frozen=True, eq=False)
-class Tube:
+@dataclass(frozen=True, eq=False, repr=False)
+class Tube(InWords):
     """Bounds of the errors of n robots, at T instants and part by part.
 
     A part is what is measured together: a joint alone; in other spaces coordinates of one unit, such as a
@@ -102,8 +104,15 @@ class Tube:
         return bool(self.excludes_singularities) and not (self.sampled or open_turn)
 
     def sizes(self, e: ArrayLike) -> np.ndarray:
-        """Lengths of errors part by part, (..., n, parts), of (..., n, m): what the radius is a bound of."""
-        return sizes_of(np.asarray(e), [slice(part.start, part.stop) for part in self.parts])
+        """Lengths of errors part by part, (..., n, parts), of (..., n, m): what the radius is a bound of.
+
+        Raises:
+            InputError: no numbers, or another number of robots or coordinates.
+        """
+        errors, shape = numbers("e", e), (len(self.names), self.parts[-1].stop)
+        if errors.shape[-2:] != shape:
+            raise InputError.expected(f"shape (..., {shape[0]}, {shape[1]})", errors.shape, "e")
+        return sizes_of(errors, [slice(part.start, part.stop) for part in self.parts])
 
     def as_dict(self) -> dict[str, Any]:
         """The same as plain data, of the radius only the largest over time."""
@@ -145,7 +154,8 @@ def tube(
 
     Raises:
         InputError: gains or numbers of another size or sign, viscous friction without a bound of speeds, an
-            error that is never learned, a desired velocity that jumps, or slides without limits on an arm.
+            error that is never learned, a desired position or velocity that jumps, or slides without limits
+            on an arm.
     """
     controller, end = Controller(cell, gains), positive_number("duration", duration)
     acting = outside(cell, torque, disturbances, speed)
@@ -153,13 +163,15 @@ def tube(
     if kappa is None:
         return _tube(known, radii(known), speed is not None)
     given = finite_array("kappa", kappa, (cell.n, len(known.parts)))
+    if given.min() < 0:
+        raise InputError.expected("bounds of at least 0", float(given.min()), "kappa")
     return _tube(known, radii_with(known, given), speed is not None, KAPPA_GIVEN)
 
 
 def _known(controller: Controller, instants: np.ndarray, acting: Outside, end: float) -> Known:
     """What is known of a cell before a run that ends at a time, s."""
     cell = controller.cell
-    check_velocities(cell, end)
+    check_motions(cell, end)
     energy, w = start(controller, cell.references(np.array([0.0]))[0])
     D = largest_norm(controller, acting, sum(energy.values()), w, end)
     return Known(controller, instants, cell.reference_table(instants), w, energy, D)
@@ -211,7 +223,7 @@ def _assumed(cell: Cell, slow: bool, sampled: bool) -> tuple[str, ...]:
         "joints are no faster than stated": slow,
         "slides stay within their limits": slides,
         "kappa is no larger than where it was sampled": sampled,
-        "weights and paths do nothing new between these instants": True,
+        "weights and paths do nothing new between the instants looked at": True,
     }
     return tuple(words for words, true in said.items() if true)
 
@@ -236,5 +248,11 @@ def in_words(tube: Tube) -> list[str]:
     until = ["J^-1 exists"] * (not singular)
     until += [f"orientation errors are below {MAX_ANGLE:g} rad"] * (tube.excludes_half_turns is False)
     while_so = " as long as " + " and ".join(until) if until else ""
-    lines.append(f"Errors stay in it{while_so}, if " + ", ".join(tube.assumed) + ".")
+    lines.append(f"Errors stay in it{while_so}, if {_listed(tube.assumed)}.")
     return lines
+
+
+def _listed(words: Sequence[str]) -> str:
+    """As in `a, b, and c`."""
+    *others, last = words
+    return ", ".join([*others, f"and {last}" if others else last])

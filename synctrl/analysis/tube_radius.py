@@ -11,8 +11,8 @@ from ..control.controller import Controller
 from ..coupling.cell import Reference
 from ..errors import InputError
 from ..tasks.pose import MAX_ANGLE, PoseSpace
-from .error_modes import ErrorModes
 from .jacobian_size import block_norms, jacobian_sizes, kappas, parts_of, sizes_of
+from .modal_filter import ModalFilter
 
 #: how often a bound of the orientation error is put into its own bound; each time it holds
 ROUNDS = 20
@@ -65,8 +65,9 @@ class Radii(NamedTuple):
 
 def radius_of(known: Known, kappa: np.ndarray) -> np.ndarray:
     """Bounds of the errors, (T, n, parts), for a kappa, (n, parts)."""
-    modes, c_inv, parts = ErrorModes.of(known.controller), known.told.c_inv, known.parts
-    free = sizes_of(np.matvec(c_inv, modes.free(known.w, known.instants)), parts)
+    modes, c_inv, parts = ModalFilter.of(known.controller), known.told.c_inv, known.parts
+    w = modes.vectors @ modes.free(known.instants, modes.to_modes(known.w), np.zeros_like(known.w))
+    free = sizes_of(np.matvec(c_inv, w), parts)
     seen = np.empty_like(kappa)
     for k, part in enumerate(parts):
         axes = range(part.start, part.stop)

@@ -10,13 +10,12 @@ from ..control.controller import Controller
 from ..coupling.cell import Cell, Reference
 from ..errors import InputError
 from .base_storage import BaseStorage, base_storages
+from .jumps import desired_jumps
 
 #: instants at which a tube is computed where nobody says which
 INSTANTS = 201
 #: share of the errors of parameters up to which what is never learned counts as rounding
 FROZEN = 1e-9
-#: how long before a break a velocity is looked at, s, and from which share of it on a change is a jump
-JUST_BEFORE, JUMP = 1e-7, 1e-5
 
 
 def start(controller: Controller, reference: Reference) -> tuple[dict[str, float], np.ndarray]:
@@ -55,20 +54,16 @@ def _check_learned(name: str, base: BaseStorage, tilde: np.ndarray) -> None:
         raise InputError.expected(wanted, found, "Gamma", shown=shown)
 
 
-def check_velocities(cell: Cell, end: float) -> None:
-    """Refuse a desired velocity that jumps before the end, s: V jumps with it.
+def check_motions(cell: Cell, end: float) -> None:
+    """Refuse a desired motion that jumps, or whose velocity does, until the end, s: V jumps with it.
 
     Raises:
         InputError: with robot and time.
     """
-    for i, name in enumerate(cell.names):
-        for at in (b for b in cell.breaks if 0 < b < end):
-            velocity = cell.motion(i, np.array([at - JUST_BEFORE, at])).x_dot
-            jump = float(np.abs(np.diff(velocity, axis=0)).max())
-            if jump > JUMP * (1 + np.abs(velocity).max()):
-                wanted = "a desired velocity without jumps, at each of which V jumps too"
-                shown = f"one of {jump:.3g} at t = {at:g} s"
-                raise InputError.expected(wanted, jump, f"{name}, trajectory", shown=shown)
+    for i, what, size, time in desired_jumps(cell, end):
+        wanted = f"a desired {what} without jumps, at each of which V jumps too"
+        shown = f"one of {size:.3g} at t = {time:g} s"
+        raise InputError.expected(wanted, size, f"{cell.names[i]}, trajectory", shown=shown)
 
 
 def read_instants(times: ArrayLike | None, end: float) -> np.ndarray:
