@@ -348,3 +348,19 @@ def test_each_verdict_says_what_it_means_and_what_it_does_not() -> None:
     assert "nothing outside the theorem acted" in certificate.meaning
     assert "does not say that errors are small" in certificate.meaning
     assert certificate.as_dict()["meaning"] == certificate.meaning
+
+
+def test_errors_and_energies_have_units() -> None:
+    text = str(small())
+    for line in ("V goes from", "by term", "balance", "Theorem A"):
+        assert any(line in told and told.endswith(" N·m") for told in text.splitlines())
+    units = small().convergence.units
+    assert units == dict.fromkeys(("tracking error", "sync error", "coupled error"), "rad") | {
+        "coupled velocity error": "rad/s"
+    }
+
+
+def test_a_console_shows_what_a_report_says() -> None:
+    certificate = small()
+    for report in (certificate, certificate.dissipation):
+        assert repr(report) == str(report)

@@ -141,7 +141,8 @@ def test_the_verdict_follows_the_numbers(found: Comparison) -> None:
     for power, word in ((1, "larger"), (-1, "smaller")):
         sizes = {name: factor**power * getattr(ours.quiet, name) for name, factor in factors.items()}
         changed = [ours, replace(row, quiet=replace(row.quiet, **sizes))]
-        (first,) = sentences(changed, ["quiet"])
+        (first,) = sentences(changed, ["quiet"], "N·m")
+        assert first.endswith(" N·m of torque.")
         for said in ("RMS e 4", "peak e 3", "RMS ε 8", "peak ε 5"):
             assert f"{said} times {word}" in first
         assert summary(changed, ["quiet"]).startswith("Better") == (word == "smaller")

@@ -392,3 +392,8 @@ def test_the_figure_has_the_sum_below_its_bound_and_no_bound_where_there_is_none
     assert (found.bound**2 >= total * (1 - ROUNDING)).all()
     without = dissipation_figure(replace(found, reason="no law"))
     assert "at most" not in [line.get_label() for panel in without.axes for line in panel.get_lines()]
+
+
+def test_where_nothing_acts_d_is_said_to_be_0() -> None:
+    found = dissipation(experiment(coupling("pair", 2, 1), joints=1).simulate(0.02, 1e-3))
+    assert found.D < 1e-9 and "D = 0 sqrt(N·m) (nothing)" in str(found)

@@ -15,7 +15,8 @@ from theory_cells import GAINS, coupling, experiment, planar_arm
 from synctrl import Cell, Coupling, Disturbance, Experiment, Friction, FunctionTrajectory, Hold, Member
 from synctrl.analysis import certify
 from synctrl.analysis.gain_condition import margins, rate_matrix
-from synctrl.analysis.lyapunov import first_growth, lyapunov
+from synctrl.analysis.growth import first_growth
+from synctrl.analysis.lyapunov import lyapunov
 from synctrl.assembly.grasp import Fixture
 from synctrl.control.controller import Controller
 from synctrl.coupling.synchronization import SynchronizationFunction

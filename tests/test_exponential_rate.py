@@ -390,6 +390,12 @@ def test_what_the_theorem_does_not_reach_is_refused_by_name(subject: str, change
         exponential_rate(replace(rods(), **change), PERIOD)
 
 
+def test_saturation_is_named_and_not_the_adaptation_that_comes_with_it() -> None:
+    limited = a460_pair(friction=False)
+    with refused(InputError, "saturate"):
+        exponential_rate(replace(limited, saturate=True), 1.0, start=5.0)
+
+
 def test_friction_that_is_not_adapted_is_refused_even_at_rest() -> None:
     with refused(InputError, "arm 1, parameters"):
         exponential_rate(rods(size=(0.0, 0.0), friction=Friction(viscous=0.5)), PERIOD)
@@ -425,6 +431,35 @@ def test_the_figure_marks_the_best_gamma() -> None:
         assert panel.get_ylim()[1] > found.rates.max()
 
 
+def test_rates_far_below_lambda_are_drawn_on_a_logarithmic_axis() -> None:
+    found = RatesOverGamma(np.array([0.1, 1.0, 10.0]), np.array([1e-6, 3e-6, 2e-5]), 6.0, ())
+    (panel,) = rates_figure({"two arms": found}).axes
+    low, high = panel.get_ylim()
+    assert panel.get_yscale() == "log" and 0 < low < found.rates.min() and high > found.limit
+    with refused(InputError, "found"):
+        rates_figure(found)  # type: ignore[arg-type]
+
+
+def test_rates_over_gamma_say_which_is_best_and_whether_it_is_at_an_end() -> None:
+    found = RatesOverGamma(np.array([0.1, 1.0, 10.0]), np.array([1.0, 3.0, 2.0]), 6.0, ("arm 1: m",))
+    for words in (
+        "Gamma times 10: 2 1/s",
+        "best: times 1\n",
+        "6 1/s whatever Gamma",
+        "not learned: arm 1: m",
+    ):
+        assert words in str(found)
+    growing = replace(found, rates=np.array([1.0, 2.0, 3.0]), limit=np.inf, unexcited=())
+    assert "beyond" in str(growing) and "whatever" not in str(growing)
+    assert repr(found) == str(found)
+
+
+def test_a_rate_within_its_own_error_is_said_not_to_tell() -> None:
+    _, rate = rate_of("straight arm")
+    assert "cannot be told" not in str(rate)
+    assert "cannot be told" in str(replace(rate, error=1.0))
+
+
 def test_factors_that_are_not_above_0_are_refused() -> None:
     with refused(InputError, "factors"):
         rates_over_gamma(rods(), PERIOD, [0.0, 1.0])
@@ -439,6 +474,9 @@ def test_the_page_of_the_theorem_runs_and_has_the_numbers_that_it_shows() -> Non
     shown = re.findall(r"^\| rate, 1/s \| (.*) \|$", page, flags=re.MULTILINE)[0].split(" | ")
     np.testing.assert_allclose(names["rates"].rates, np.array(shown, float), atol=0.006)
     assert names["check"].misfit < 0.01
+    for line in str(names["rates"]).splitlines()[-2:]:
+        assert f"    {line}\n" in page
+    assert repr(names["check"]).partition("they differ")[0] in page
     assert set(re.findall(r"`(test_\w+)`", page)) <= {*globals(), *TESTS_ELSEWHERE}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from importlib import import_module
 from pathlib import Path
 
 from synctrl.show.run_figures import FIGURES, OF_TASKS
@@ -20,3 +21,10 @@ def test_the_page_runs_and_leaves_what_it_says(tmp_path, monkeypatch):
 
 def test_the_page_names_all_figures():
     assert re.findall(r"^\| `(\w+)` \|", PAGE, flags=re.MULTILINE) == [*FIGURES, *OF_TASKS]
+
+
+def test_the_page_names_all_figures_of_the_proof():
+    rows = re.findall(r"^\| `(\w+)\(.*\)` \| `(\w+)` \|", PAGE, flags=re.MULTILINE)
+    modules = ("lyapunov_plots", "dissipation_figures", "modal_figures", "tube_figures", "rate_figures")
+    assert [module for _, module in rows] == [*modules]
+    assert all(hasattr(import_module(f"synctrl.show.{module}"), name) for name, module in rows)

@@ -25,7 +25,8 @@ from synctrl import (
     Result,
     Robot,
 )
-from synctrl.analysis.lyapunov import ENERGIES, POWERS, THEOREM, Lyapunov, first_growth, lyapunov
+from synctrl.analysis.growth import first_growth
+from synctrl.analysis.lyapunov import ENERGIES, POWERS, THEOREM, Lyapunov, lyapunov
 from synctrl.errors import InputError
 from synctrl.robots import documents
 from synctrl.robots.parameters import LinearParameters

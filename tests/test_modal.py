@@ -386,6 +386,17 @@ def test_bounds_are_plain_data_and_words():
     told = json.loads(json.dumps(bounds.as_dict(), allow_nan=False))
     assert np.shape(told["peak"]["bound"]) == (2, 2) and told["reason"] is None
     assert bounds.sentence in str(bounds) and all(name in str(bounds) for name in bounds.names)
+    assert repr(bounds) == str(bounds)
+
+
+def test_modes_of_one_eigenvalue_are_told_apart_and_every_number_has_its_unit():
+    run = experiment(coupling("signed graph", 4, 2)).simulate(0.05, dt=1e-3)
+    bounds = modal_bounds(replace(run, info=run.info | {"weighted_units": ["m", "rad"]}), run.experiment)
+    rows = [line.strip() for line in str(bounds).splitlines() if "sup |w|" in line]
+    assert [row.partition(",")[0] for row in rows] == [f"mode {j}" for j in (1, 1, 2, 2, 3, 3, 4, 4)]
+    assert [row.rpartition(" ")[2] for row in rows] == ["m", "rad"] * 4
+    mixed = str(replace(bounds, error_unit="m, rad"))
+    assert all(row.endswith(" (m, rad)") for row in mixed.splitlines() if "sup |e|" in row)
 
 
 @pytest.mark.parametrize("known", [0.6, 1.0])
@@ -401,3 +412,5 @@ def test_the_figure_has_a_panel_for_each_eigenvalue_with_the_run_inside_the_band
         line = panel.lines[0].get_ydata()
         assert line.max() <= inner <= outer
         assert panel.get_ylim() == panels[0].get_ylim() and panel.get_ylim()[0] < line.max()
+    still = replace(bounds, w=bounds.w * np.array([1.0, 1, 1, 1e-7])[:, None])
+    assert all(panel.get_ylim()[0] < panel.lines[0].get_ydata().max() for panel in modal_figure(still).axes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -31,6 +32,10 @@ from synctrl.show.style import display
 from synctrl.simulation.result import Result
 
 ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "scripts"))
+
+import reproduce as script  # noqa: E402
+
 NASTY = "</p><script>alert('x')</script><img src=x onerror=alert(1)>"
 
 
@@ -107,7 +112,9 @@ def test_numbers_are_short(value, text):
 
 @pytest.fixture(scope="module")
 def reproduced(tmp_path_factory):
-    """Everything that the script writes, of runs cut off after a second."""
+    """Everything that the script writes: what CI has made already, or of runs cut off after a second."""
+    if made := os.environ.get("SYNCTRL_REPRODUCED"):
+        return Path(made)
     out = tmp_path_factory.mktemp("reproduced") / "out"
     done = run_script("--out", str(out), "--quick")
     assert done.returncode == 0, done.stderr[-2000:]
@@ -186,8 +193,21 @@ def section_of(text, title):
     return text[start : text.index("Peak torque", start)]
 
 
-def test_a_page_of_shortened_runs_says_so(reproduced):
-    assert "This page is a trial" in (reproduced / "index.html").read_text("utf-8")
+@pytest.mark.parametrize(("longest", "trial"), [(script.TRIAL, True), (1.1 * script.TRIAL, False)])
+def test_a_page_of_shortened_runs_says_so(tmp_path, longest, trial):
+    text = script.write(tmp_path / "page.html", [], longest).read_text("utf-8")
+    assert ("This page is a trial" in text) == trial
+
+
+def test_a_trial_shortens_every_run_and_every_comparison(monkeypatch, tmp_path):
+    asked = []
+    monkeypatch.setattr(script, "reproduce", lambda *arguments: asked.extend(arguments) or tmp_path)
+    monkeypatch.setattr(sys, "argv", ["reproduce.py", "--out", str(tmp_path), "--quick"])
+    assert script.main() == 0
+    out, _, planned, limit = asked
+    assert out == tmp_path and limit < script.TRIAL
+    assert len(planned) > len(script.PLANNED)
+    assert all(run.duration <= script.TRIAL for run in planned.values())
 
 
 @pytest.mark.parametrize("workers", ["0", "-1", "two", "1.5"])

@@ -13,7 +13,7 @@ from seams.posted_network import BoundPosted, Posted
 
 from synctrl import Experiment, Payload, Result
 from synctrl.analysis.certify import certify
-from synctrl.analysis.lyapunov import first_growth
+from synctrl.analysis.growth import first_growth
 from synctrl.errors import InputError, NonFiniteError, ResultError, SimulationError
 from synctrl.experiments import a460_pair
 from synctrl.simulation.plant import Plant

@@ -17,7 +17,8 @@ from theory_cells import coupling, experiment
 
 from synctrl import Controller, Gains, Result, simulate
 from synctrl.analysis.certify import certify
-from synctrl.analysis.lyapunov import first_growth, lyapunov
+from synctrl.analysis.growth import first_growth
+from synctrl.analysis.lyapunov import lyapunov
 from synctrl.control.adaptation import Gradient
 from synctrl.control.laws import Along, Asked, ChungSlotine, Errors, Proof, SunMills
 from synctrl.control.network import Ideal

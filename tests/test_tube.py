@@ -344,3 +344,4 @@ def test_it_says_in_words_and_numbers_what_it_found() -> None:
     for name, r in zip(told.names, told.largest[:, 0], strict=True):
         assert f"{name}: |e(x, y)| <= {r:.4g} m" in text
     assert "as long as J^-1 exists" in text
+    assert "if no other torque acts, and weights" in text and repr(told) == text

@@ -32,12 +32,23 @@ def test_it_shows_the_radius_the_run_and_where_the_arm_is_singular() -> None:
     assert shown == pytest.approx(1e3 * np.linalg.norm(result.tracking_error[:, 1], axis=-1))
 
 
-def test_a_cell_that_is_not_in_a_plane_is_refused() -> None:
-    one = a460_pair()
+def test_outside_a_plane_it_has_the_errors_of_every_part_below_their_radii() -> None:
+    one = a460_pair(friction=False)
+    result = one.simulate(4e-3, 1e-3)
+    found = tube(one.cell, one.gains, duration=4e-3, times=result.t)
+    panels = tube_figure(found, one.cell, result, 1).axes
+    assert [panel.get_ylabel() for panel in panels] == [f"|e({part.name})|, deg" for part in found.parts]
+    for k, panel in enumerate(panels):
+        error, (band,) = panel.lines[0].get_ydata(), panel.collections
+        np.testing.assert_allclose(error, np.rad2deg(np.abs(result.tracking_error[:, 1, k])))
+        assert error.max() < band.get_paths()[0].vertices[:, 1].max()
+
+
+def test_a_tube_of_another_cell_or_robot_is_refused() -> None:
+    one, flat = a460_pair(), rigid_object(disturbed=False)
     result = one.simulate(2e-3, 1e-3)
     found = tube(one.cell, one.gains, times=[0.0])
-    with refused(InputError, "cell"):
-        tube_figure(found, one.cell, result)
-    flat = rigid_object(disturbed=False)
+    with refused(InputError, "tube"):
+        tube_figure(found, flat.cell, result)
     with refused(InputError, "robot"):
-        tube_figure(found, flat.cell, result, 2)
+        tube_figure(found, one.cell, result, 2)

@@ -59,8 +59,8 @@ def grid_of(left, factor) -> dict[Case, Judged]:
 def test_cases_are_counted_and_flips_are_where_the_size_crosses_its_threshold() -> None:
     """Sizes that are powers of the values are interpolated exactly."""
     grid = grid_of(lambda case: REACHED * (case.friction / 1.5) ** 2, lambda case: MUCH * case.motion / 1.25)
-    assert [*flips(grid, "left", REACHED)] == ["friction 1.5"]
-    assert [*flips(grid, "factor", MUCH)] == ["motion 1.25"]
+    assert [*flips(grid, "left", REACHED)] == ["friction × 1.5"]
+    assert [*flips(grid, "factor", MUCH)] == ["a motion of 1.25 s"]
     said = verdict(grid, 4.0)
     assert "in 18 of 27 cases" in said
     assert "all of them, in 18" in said

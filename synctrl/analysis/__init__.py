@@ -1,4 +1,4 @@
-"""How well: metrics, the Lyapunov proof, certificates, laws side by side."""
+"""How well: metrics, the Lyapunov proof, certificates, bounds and rates, laws side by side."""
 
 from .certify import Certificate, certify
 from .comparison import Comparison, compare, side_by_side

@@ -110,7 +110,7 @@ def _in_words(run: Replay, record: Lyapunov, name: str) -> str:
     special = name == "other" and plant is not Plant
     words = _WORDS.get(name, f"the adaptation's {name}")
     words += f", of the plant {plant.__qualname__}" if special else ""
-    return f"{words}: power from {power.min():.3g} to {power.max():.3g}"
+    return f"{words}: power from {power.min():.3g} to {power.max():.3g} W"
 
 
 _WORDS = {

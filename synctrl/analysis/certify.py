@@ -17,7 +17,9 @@ from .convergence import Convergence, convergence
 from .delay_condition import DelayCondition, delay_condition
 from .dissipation import Dissipation, balanced
 from .gain_condition import GainCondition, gain_condition
-from .lyapunov import RESOLVED, Growth, Lyapunov, first_growth, lyapunov
+from .growth import Growth, first_growth
+from .in_words import InWords, units_in_words
+from .lyapunov import RESOLVED, Lyapunov, lyapunov
 from .metrics import finite_or_none
 from .replay import Replay, replay
 
@@ -32,8 +34,8 @@ MEANINGS = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Certificate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Certificate(InWords):
     """What the proof of convergence says about one run.
 
     Attributes:
@@ -127,15 +129,16 @@ class Certificate:
         record, errors = self.lyapunov, self.convergence
         acting = [name for name, power in record.power.items() if (np.abs(power) > record.rounding).any()]
         supplied = ", ".join(f"{name} {record.supplied[name]:.3g}" for name in acting)
-        final = ", ".join(f"{name} {value:.3g}" for name, value in errors.final.items())
+        units = {name: units_in_words(unit) for name, unit in errors.units.items()}
+        final = ", ".join(f"{name} {x:.3g} {units[name]}" for name, x in errors.final.items())
         lines = [
             f"{self.title}: {self.verdict}",
             f"  that is: {self.meaning}",
             *(f"  outside: {text}" for text in self.outside),
             *(f"  doubt: {text}" for text in self.doubts),
-            f"  V goes from {record.V[0]:.5g} to {record.V[-1]:.5g}",
-            f"  by term: {supplied or 'no change'}",
-            f"  V' is at most {record.V_dot.max():.3g} (rounding {record.rounding.max():.1g})",
+            f"  V goes from {record.V[0]:.5g} to {record.V[-1]:.5g} N·m",
+            f"  by term: {f'{supplied} N·m' if supplied else 'no change'}",
+            f"  V' is at most {record.V_dot.max():.3g} W (rounding {record.rounding.max():.1g})",
             f"  balance: {_balance(self)}",
             *([] if self.dissipation is None else [f"  {line}" for line in self.dissipation.lines]),
             f"  gain condition: {_state(self.gain_condition)}",
@@ -240,7 +243,7 @@ def _balance(c: Certificate) -> str:
     if c.closes is None:
         return f"cannot be seen in a log of one of {c.every} steps"
     record = c.lyapunov
-    return f"off by {record.largest_drift:.2g}, numerical errors explain {record.drift_bound:.2g}"
+    return f"off by {record.largest_drift:.2g}, numerical errors explain {record.drift_bound:.2g} N·m"
 
 
 def _state(condition: GainCondition) -> str:

@@ -152,10 +152,10 @@ def _near(cell: Cell, i: int, told: Reference, radius: np.ndarray) -> Clearance:
     if found.size < found.room and (found.jumps or found.elsewhere):
         words = "joint positions jump along the path" if found.jumps else "the start is on another branch"
         return Clearance(None, f"{words} of {name}", np.inf)
-    unit = "m" if radius.shape[-1] == 1 else f"rad, with {found.scale:.2g} m for 1 rad"
-    words = f"{name} may be singular from errors of {found.room:.3g} {unit}, at t = {found.time:.3g} s"
+    unit, scale = ("m", "") if radius.shape[-1] == 1 else ("rad", f", with {found.scale:.2g} m for 1 rad")
+    words = f"{name} may be singular from errors of {found.room:.3g} {unit}{scale}, at t = {found.time:.3g} s"
     share = found.size / found.room if found.room > 0 else np.inf
-    return Clearance(share < 1, f"{words}, and its tube allows {found.size:.3g}", share)
+    return Clearance(share < 1, f"{words}, and its tube allows {found.size:.3g} {unit}", share)
 
 
 def _along(cell: Cell, i: int, times: np.ndarray, path: np.ndarray, radius: np.ndarray) -> Along | None:

@@ -74,7 +74,7 @@ class Comparison:
     @property
     def sentences(self) -> tuple[str, ...]:
         """What the numbers of each row say beside the first, a sentence each."""
-        return tuple(sentences(self.rows, self.situations))
+        return tuple(sentences(self.rows, self.situations, self.units[2]))
 
     @property
     def verdict(self) -> tuple[str, ...]:

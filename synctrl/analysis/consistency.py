@@ -64,7 +64,8 @@ class Consistency:
         if self.holds:
             return "physically consistent throughout"
         return "; ".join(
-            f"{name}: body {body + 1} is none that can exist from t = {t:.3g} s on (eigenvalue {worst:.2g})"
+            f"{name}: body {body + 1} is none that can exist from t = {t:.3g} s on "
+            f"(eigenvalue {worst:.2g} of its pseudo-inertia)"
             for name, (t, body, worst) in self.left.items()
         )
 

@@ -38,6 +38,7 @@ class Convergence:
 
     Attributes:
         final, peak: per error.
+        units: of each, all that occur.
         identity: largest entry of w - (N e* + S+ epsilon) over the run.
         identity_rounding: what rounding may amount to in it.
         modes: dimension of the null space of S: common motions of the weighted errors that no synchronization
@@ -46,6 +47,7 @@ class Convergence:
 
     final: dict[str, float]
     peak: dict[str, float]
+    units: dict[str, str]
     identity: float
     identity_rounding: float
     modes: int
@@ -89,10 +91,19 @@ def convergence(result: Result | Replay, experiment: Experiment | None = None) -
     return Convergence(
         {name: float(np.abs(error[-1]).max()) for name, error in errors.items()},
         {name: float(np.abs(error).max()) for name, error in errors.items()},
+        _units(result),
         float(gap.max()),
         float(4 * sum(S.shape) * EPS * size.max()),
         round(float(np.trace(N))),
     )
+
+
+def _units(result: Result) -> dict[str, str]:
+    """Units of the errors of `Convergence`."""
+    arrays = ("tracking_error", "sync_error", "coupled_error")
+    found = {name.replace("_", " "): result.unit(name) for name in arrays}
+    rates = (f"{unit}/s" for unit in found["coupled error"].split(", "))
+    return found | {"coupled velocity error": ", ".join(rates)}
 
 
 # -- parameters --------------------------------------------------------------------------------------------

@@ -15,13 +15,14 @@ from ..simulation.engines import Engine
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .exponential_rate import ExponentialRate
+from .in_words import InWords
 from .on_motion import DesiredMotion
 from .origin import alike
 from .small_errors import Coordinates
 
 
-@dataclass(frozen=True, eq=False)
-class Decay:
+@dataclass(frozen=True, eq=False, repr=False)
+class Decay(InWords):
     """What a small error became in the nonlinear closed loop.
 
     Attributes:
@@ -41,6 +42,12 @@ class Decay:
     def misfit(self) -> float:
         """|simulated - multiplier| / |multiplier|."""
         return abs(self.simulated - self.multiplier) / abs(self.multiplier)
+
+    def __str__(self) -> str:
+        return (
+            f"of a small error a period leaves {_number(self.multiplier)} by the theorem, and "
+            f"{_number(self.simulated)} in the simulation; they differ by {self.misfit:.2g} of that"
+        )
 
 
 def simulated_decay(
@@ -84,6 +91,11 @@ def simulated_decay(
     simulated = multiplier * share ** (1 / periods)  # of all roots the one nearest to the multiplier
     expected = np.linalg.matrix_power(rate.Phi, periods) @ before
     return Decay(multiplier, simulated, before, after, expected)
+
+
+def _number(value: complex) -> str:
+    """Without an imaginary part where there is none."""
+    return f"{value.real:.6g}" if value.imag == 0 else f"({value:.6g})"
 
 
 def _check_origin(experiment: Experiment, rate: ExponentialRate) -> None:

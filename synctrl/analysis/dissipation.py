@@ -30,6 +30,7 @@ from .balance import accumulated
 from .base_storage import base_storages
 from .gain_condition import gain_condition
 from .held import held
+from .in_words import InWords
 from .lyapunov import damping, inside_of, proof_along
 from .metrics import finite_or_none
 from .model_torques import frozen_error
@@ -44,8 +45,8 @@ COARSE = 1e-2
 BASE, OWN = "base parameters", "the adaptation's own"
 
 
-@dataclass(frozen=True, eq=False)
-class Dissipation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Dissipation(InWords):
     """The balance of V along a run, and what Theorem A promises of it; N·m if weights have no unit.
 
     Attributes:
@@ -172,12 +173,14 @@ class Dissipation:
         floor = SEEN * max(self.X, self.D)
         acting = {name: D for name, D in self.sources.items() if floor < D}
         named = ", ".join(f"{name} {D:.3g}" for name, D in acting.items())
-        entered = f", R = {self.entered:.3g}" if self.entered > SEEN * self.V0 else ""
+        D = self.D if acting else 0.0  # the rest is rounding
+        entered = f", R = {self.entered:.3g} N·m" if self.entered > SEEN * self.V0 else ""
         doubt = [] if self.unresolved is None else [f"  {self.unresolved}"]
         return [
-            f"Theorem A: X = {self.X:.3g} of at most {self.X_bound:.3g}, Z^2 + V(T) = {self.rest:.3g} of at "
-            f"most {self.rest_bound:.3g}",
-            f"  by V(0) = {self.V0:.3g} ({self.storage}){entered}, D = {self.D:.3g} ({named or 'nothing'})",
+            f"Theorem A: X = {self.X:.3g} of at most {self.X_bound:.3g} sqrt(N·m), Z^2 + V(T) = "
+            f"{self.rest:.3g} of at most {self.rest_bound:.3g} N·m",
+            f"  by V(0) = {self.V0:.3g} N·m ({self.storage}){entered}, "
+            f"D = {D:.3g} sqrt(N·m) ({named or 'nothing'})",
             *doubt,
         ]
 

@@ -18,6 +18,7 @@ from ..checks import finite_array, instance, non_negative_number, positive_numbe
 from ..errors import InputError
 from ..simulation.simulate import Experiment
 from .directions import describe_slowest, describe_unexcited
+from .in_words import InWords
 from .interpolated import Interpolated
 from .monodromy import FIRST, instants, monodromy
 from .on_motion import DesiredMotion, check_period, check_reach
@@ -27,8 +28,8 @@ from .small_errors import Coordinates, error_matrices, make_coordinates
 LEAST = float(np.finfo(float).tiny / np.finfo(float).eps)
 
 
-@dataclass(frozen=True, eq=False)
-class ExponentialRate:
+@dataclass(frozen=True, eq=False, repr=False)
+class ExponentialRate(InWords):
     """What one period makes of small errors, to first order.
 
     Attributes:
@@ -87,18 +88,20 @@ class ExponentialRate:
         }
 
     def __str__(self) -> str:
-        what = "what the motion excites" if self.unexcited else "small errors"
+        what = "errors of what the motion excites" if self.unexcited else "small errors"
         left = np.exp(-self.excited_rate * self.period)
         told = (
-            f"{what}: {self.excited_rate:.4g} 1/s, {left:.4g} is left after a period of {self.period:g} s; "
-            f"slowest: {self.slowest}"
+            f"{what} fall at {self.excited_rate:.4g} 1/s, after a period of {self.period:g} s "
+            f"{left:.4g} of them is left; slowest: {self.slowest}"
         )
+        if left >= 1 - self.error:
+            told += f"\nthis cannot be told from no rate: what is left is known to {self.error:.1g}"
         frozen = f"\nnot excited, and so not learned: {'; '.join(self.unexcited)}"
         return told + frozen * bool(self.unexcited)
 
 
-@dataclass(frozen=True, eq=False)
-class RatesOverGamma:
+@dataclass(frozen=True, eq=False, repr=False)
+class RatesOverGamma(InWords):
     """How the rate depends on how fast robots learn.
 
     Attributes:
@@ -118,6 +121,21 @@ class RatesOverGamma:
     def best(self) -> float:
         """The factor with the largest rate."""
         return float(self.factors[np.argmax(self.rates)])
+
+    def __str__(self) -> str:
+        lines = [
+            f"Gamma times {k:.3g}: {rate:.3g} 1/s" for k, rate in zip(self.factors, self.rates, strict=True)
+        ]
+        lines.append(f"best: times {self.best:.3g}")
+        if self.best in self.factors[[0, -1]]:
+            lines[-1] += ", at an end of the factors; a better one may lie beyond"
+        if np.isfinite(self.limit):
+            lines.append(
+                f"errors that no synchronization error sees fall at {self.limit:g} 1/s whatever Gamma"
+            )
+        if self.unexcited:
+            lines.append(f"not excited, and so not learned: {'; '.join(self.unexcited)}")
+        return "\n".join(lines)
 
 
 def exponential_rate(experiment: Experiment, period: float, start: float = 0.0) -> ExponentialRate:

@@ -24,12 +24,15 @@ from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .balance import accumulated
 from .dissipation import dissipation
+from .in_words import InWords, units_in_words
 from .modal_filter import ModalFilter
 from .modal_signals import run_signals, slip_matrices
 from .replay import Replay, replay
 
 #: share of the largest bound below which another says nothing
 ROUNDING = 1e-9
+#: what the second bound is
+PRIORI = "; a priori: with what Theorem A knows of r before it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +60,8 @@ class Bounded:
         return {"actual": self.actual.tolist(), "bound": self.bound.tolist(), "a_priori": a_priori}
 
 
-@dataclass(frozen=True, eq=False)
-class ModalBounds:
+@dataclass(frozen=True, eq=False, repr=False)
+class ModalBounds(InWords):
     """Bounds of w_j beside w_j, n modes, m axes, T logged instants; w in the unit of c e.
 
     Attributes:
@@ -66,7 +69,8 @@ class ModalBounds:
         t: (T,), s.
         filter: from r_j to w_j, with its `gain`, `h2` and `static`, (n, m) each.
         axes, names: of the task coordinates, and of the robots.
-        unit: of w.
+        unit, units: of w; all that occur, and that of each axis.
+        error_unit: of e, all that occur.
         w: modal errors of the run, (T, n, m).
         r: modal coupled velocity errors, of true sigma and E, (T, n, m), in the unit of w per s.
         free: what the modal errors would be without r, (T, n, m).
@@ -90,6 +94,8 @@ class ModalBounds:
     axes: tuple[str, ...]
     names: tuple[str, ...]
     unit: str
+    units: tuple[str, ...]
+    error_unit: str
     w: np.ndarray
     r: np.ndarray
     free: np.ndarray
@@ -142,11 +148,14 @@ class ModalBounds:
 
     def __str__(self) -> str:
         lines = [f"{self.title}: {self.sentence}"]
+        lines.append("  at most: with the r of this run" + PRIORI * (self.peak.a_priori is not None))
         for j, value in enumerate(self.filter.eigenvalues):
             for a, axis in enumerate(self.axes):
                 gain = f"gain {self.filter.gain[j, a]:.4g} s"
-                lines.append(f"  lambda {value:.4g}, {axis}: {gain}, sup |w| {_row(self.peak, (j, a))}")
-        lines += [f"  {name}: sup |e| {_row(self.errors, (i,))}" for i, name in enumerate(self.names)]
+                told = _row(self.peak, (j, a), self.units[a])
+                lines.append(f"  mode {j + 1}, lambda {value:.4g}, {axis}: {gain}, sup |w| {told}")
+        for i, name in enumerate(self.names):
+            lines.append(f"  {name}: sup |e| {_row(self.errors, (i,), self.error_unit)}")
         if self.reason is not None:
             lines.append(f"  r is more than c J s_q, by what was measured: {self.reason}")
         if self.unbounded is not None:
@@ -182,7 +191,8 @@ def modal_bounds(result: Result | Replay, experiment: Experiment | None = None) 
     largest = (peak + modes.h2 * rho).max(axis=0), _sum(peak.max(axis=0), modes.h2, ahead)
     return ModalBounds(
         str(result.info["title"]), result.t, modes, tuple(result.info["axes"]), tuple(result.names),
-        result.unit("coupled_error"), w[run.logged], r[run.logged], free, rho, kappa, kappas,
+        result.unit("coupled_error"), result.units("coupled_error")[0], result.unit("tracking_error"),
+        w[run.logged], r[run.logged], free, rho, kappa, kappas,
         slip.X, X_bound, gap, l2, Bounded(np.abs(w).max(axis=0), *largest),
         _errors(run, modes, free, rho, total), signals.reason, slip.reason, slip.unresolved,
     )  # fmt: skip
@@ -225,7 +235,7 @@ def _errors(
     return Bounded(e, most(pushed), None if total is None else most(h.max(axis=-1) * total))
 
 
-def _row(bounded: Bounded, at: tuple[int, ...]) -> str:
+def _row(bounded: Bounded, at: tuple[int, ...], unit: str) -> str:
     """One of the numbers with its bounds, in words."""
     ahead = "" if bounded.a_priori is None else f", a priori {bounded.a_priori[at]:.3g}"
-    return f"{bounded.actual[at]:.3g}, at most {bounded.bound[at]:.3g}{ahead}"
+    return f"{bounded.actual[at]:.3g}, at most {bounded.bound[at]:.3g}{ahead} {units_in_words(unit)}"

@@ -60,13 +60,13 @@ def check_reach(experiment: Experiment, loop: ClosedLoop) -> None:
         InputError: another law, adaptation or network, something from outside, a plant with a state of its
             own, arms with spare joints, or the printed x' of (13) under weights that move.
     """
-    for subject, (kinds, expected) in KNOWN.items():
-        part = getattr(loop.controller, subject)
-        if type(part) not in kinds:
-            raise InputError.expected(expected, type(part).__name__, subject)
     for subject in ABSENT:
         if getattr(experiment, subject):
             raise InputError.expected("none, for errors that are left alone", "some", subject, shown="some")
+    for subject, (kinds, expected) in KNOWN.items():
+        part = getattr(loop.controller, subject)
+        if type(part) not in kinds:
+            raise InputError.expected(expected, type(part).__name__.removeprefix("Bound"), subject)
     plant, cell = loop.plant, loop.cell
     if plant.hidden0.size or loop.chain is not None:
         raise InputError.expected(
@@ -74,7 +74,8 @@ def check_reach(experiment: Experiment, loop: ClosedLoop) -> None:
         )
     for name, robot in zip(cell.names, cell.robots, strict=True):
         if robot.nv != cell.m:
-            raise InputError.expected(f"{cell.m} joints, as many as task coordinates", robot.nv, name)
+            words = f"{cell.m} joints, as many as task coordinates, for errors say nothing of spare ones"
+            raise InputError.expected(words, robot.nv, name)
     if loop.controller.reference_acceleration == "paper" and not cell.coupling.is_constant:
         raise InputError.expected(
             "'exact' under weights that move", "paper", subject="reference_acceleration"
@@ -188,6 +189,7 @@ class DesiredMotion:
             i = int(gap.max(axis=1).argmax())
             text = (
                 f"expected a plant that moves as what is adapted says, found another acceleration, by "
-                f"{gap.max():.3g}, at t = {t:g} s: friction or rotors have to be among the parameters"
+                f"{gap.max():.3g} rad/s^2 or m/s^2, at t = {t:g} s: friction has to be among the parameters, "
+                "as with FrictionParameters, or left out, as with friction=Friction(); and so do rotors"
             )
             raise InputError(text, subject=f"{self.cell.names[i]}, parameters", found=float(gap.max()))

@@ -27,6 +27,7 @@ from ..simulation.schedules import Disturbance
 from ..tasks.pose import MAX_ANGLE
 from ..tasks.spaces import JointSpace
 from .clearance import clearance
+from .in_words import InWords
 from .jacobian_size import sizes_of
 from .torque_bound import Outside, largest_norm, outside
 from .tube_radius import Known, Radii, radii, radii_with
@@ -45,8 +46,8 @@ class Part(NamedTuple):
     stop: int
 
 
-@dataclass(frozen=True, eq=False)
-class Tube:
+@dataclass(frozen=True, eq=False, repr=False)
+class Tube(InWords):
     """Bounds of the errors of n robots, at T instants and part by part.
 
     A part is what is measured together: a joint alone; in other spaces coordinates of one unit, such as a
@@ -222,7 +223,7 @@ def _assumed(cell: Cell, slow: bool, sampled: bool) -> tuple[str, ...]:
         "joints are no faster than stated": slow,
         "slides stay within their limits": slides,
         "kappa is no larger than where it was sampled": sampled,
-        "weights and paths do nothing new between these instants": True,
+        "weights and paths do nothing new between the instants looked at": True,
     }
     return tuple(words for words, true in said.items() if true)
 
@@ -247,5 +248,11 @@ def in_words(tube: Tube) -> list[str]:
     until = ["J^-1 exists"] * (not singular)
     until += [f"orientation errors are below {MAX_ANGLE:g} rad"] * (tube.excludes_half_turns is False)
     while_so = " as long as " + " and ".join(until) if until else ""
-    lines.append(f"Errors stay in it{while_so}, if " + ", ".join(tube.assumed) + ".")
+    lines.append(f"Errors stay in it{while_so}, if {_listed(tube.assumed)}.")
     return lines
+
+
+def _listed(words: Sequence[str]) -> str:
+    """As in `a, b, and c`."""
+    *others, last = words
+    return ", ".join([*others, f"and {last}" if others else last])

@@ -23,10 +23,10 @@ ERRORS = {
 HEAVY = 0.5
 
 
-def sentences(rows: Sequence[Row], situations: Sequence[str]) -> list[str]:
-    """Each row beside the first, a sentence each."""
+def sentences(rows: Sequence[Row], situations: Sequence[str], unit: str) -> list[str]:
+    """Each row beside the first, a sentence each, with the unit of torque."""
     ours, *others = rows
-    return [_sentence(ours, row, situations) for row in others]
+    return [_sentence(ours, row, situations, unit) for row in others]
 
 
 def summary(rows: Sequence[Row], situations: Sequence[str]) -> str:
@@ -79,10 +79,10 @@ def gain_text(row: Row) -> str:
 # -- parts -------------------------------------------------------------------------------------------------
 
 
-def _sentence(ours: Row, row: Row, situations: Sequence[str]) -> str:
+def _sentence(ours: Row, row: Row, situations: Sequence[str], unit: str) -> str:
     if row.value is None:
         return f"{_at_rule(row)}: {row.remark}."
-    parts = [_compared(ours, row, situation) for situation in situations]
+    parts = [_compared(ours, row, situation, unit) for situation in situations]
     return f"{_at_rule(row)} ({gain_text(row)}), beside {ours.law}: {'; '.join(parts)}."
 
 
@@ -91,13 +91,13 @@ def _at_rule(row: Row) -> str:
     return row.law if row.rule == AS_GIVEN else f"{row.law} at {row.rule}"
 
 
-def _compared(ours: Row, row: Row, situation: str) -> str:
+def _compared(ours: Row, row: Row, situation: str, unit: str) -> str:
     ratios = _ratios(ours, row, situation)
     if not ratios:
         return row.remark or ours.remark
     errors = ", ".join(_times(ratio, name) for ratio, name in zip(ratios, ERRORS.values(), strict=True))
     here, there = getattr(row, situation), getattr(ours, situation)
-    torque = f"with {here.peak_torque:.4g} against {there.peak_torque:.4g} of torque"
+    torque = f"with {here.peak_torque:.4g} against {there.peak_torque:.4g} {unit} of torque"
     return f"{situation}, {errors}, {torque}"
 
 

@@ -50,14 +50,14 @@ def modal_table(bounds: ModalBounds) -> Table:
     """Gains from r with and without beta, and bounds of each mode and axis beside what they bound."""
     unit, factor = display(bounds.unit)
     three = ("run", "with its r", "a priori")
-    head = ("λ of SᵀS, axis", "with β", "β = 0", *three, *three)
+    head = ("mode, λ of SᵀS, axis", "with β", "β = 0", *three, *three)
     groups = (("gain from r, s", 2), (f"|w| in L₂, {unit}·√s", 3), (f"largest |w|, {unit}", 3))
     rows = []
     for j, value in enumerate(bounds.filter.eigenvalues):
         for a, axis in enumerate(bounds.axes):
             gains = bounds.filter.gain[j, a], bounds.filter.gain[0, a]
             cells = (cell for part in (bounds.l2, bounds.peak) for cell in _bounded(part, (j, a), factor))
-            rows.append((f"{value:.3g}, {axis}", *map(number, gains), *cells))
+            rows.append((f"{j + 1}, {value:.3g}, {axis}", *map(number, gains), *cells))
     return Table(head, tuple(rows), _MODES, groups)
 
 
@@ -69,7 +69,7 @@ def tube_table(bounds: ModalBounds, before: Tube, run: Result) -> Table:
     named = [f"{part.name}, {shown.unit}" for part, shown in zip(before.parts, parts, strict=True)]
     columns = (f"{name}: {what}" for name in named for what in ("run", "tube"))
     head = ("robot", *columns, "run", "with its r", "a priori")
-    groups = (("before the run", 2 * len(parts)), (f"all axes, Theorem B, {unit}", 3))
+    groups = (("beside the tube", 2 * len(parts)), (f"all axes, Theorem B, {unit}", 3))
     rows = []
     for i, name in enumerate(before.names):
         pairs = zip(largest[i], before.largest[i], parts, strict=True)

@@ -115,8 +115,8 @@ def _words(name: str) -> str:
 
 
 def _verdicts(certificates: Mapping[str, Certificate]) -> Table:
-    numbers = "largest V'", "rounding of V'", "balance off by", "explained by the step"
-    head = ("run", "verdict", *numbers, "bodies")
+    numbers = "largest V', W", "rounding of V', W", "balance off by, N·m", "explained by the step, N·m"
+    head = ("run", "verdict", *numbers, "of bodies that can exist")
     rows = []
     for name, c in certificates.items():
         found = c.lyapunov
@@ -126,5 +126,7 @@ def _verdicts(certificates: Mapping[str, Certificate]) -> Table:
 
 
 def _bodies(c: Certificate) -> str:
-    """Whether the estimated bodies can exist, in words."""
-    return "not estimated" if c.consistency is None else str(c.consistency)
+    """How long the estimates were those of bodies that can exist, in words."""
+    if c.consistency is None:
+        return "not estimated"
+    return "yes" if c.consistency.until is None else f"until {c.consistency.until:.3g} s"

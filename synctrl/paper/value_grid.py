@@ -31,6 +31,8 @@ VALUES: Mapping[str, tuple[float, ...]] = {
     "estimate": (0.5, 0.7, 0.9),
     "friction": (0.5, 1.0, 2.0),
 }
+#: how a value of each is said
+SAID = {"motion": "a motion of {} s", "estimate": "an estimate of {}", "friction": "friction × {}"}
 
 
 class Case(NamedTuple):
@@ -108,7 +110,7 @@ def flips(grid: Mapping[Case, Judged], size: str, threshold: float) -> Iterator[
         for (a, low), (b, high) in pairwise(line):
             if (low <= threshold) != (high <= threshold):
                 share = np.log(threshold / low) / np.log(high / low)
-                yield f"{name} {number(a * (b / a) ** share)}"
+                yield SAID[name].format(number(a * (b / a) ** share))
 
 
 def grid_section(grid: Mapping[Case, Judged], duration: float) -> Section:

@@ -46,14 +46,14 @@ def _energies(panel: Axes, found: Dissipation) -> None:
     panel.plot(found.t, np.sum(terms, axis=0), color=DESIRED, label="sum")
     panel.axhline(found.V0, color=DESIRED, linewidth=0.8, linestyle=":", label="V(0)")
     _bound(panel, found, found.bound**2)
-    panel.set_ylabel("energy of V")
+    panel.set_ylabel("energy, N·m")
 
 
 def _velocities(panel: Axes, found: Dissipation) -> None:
     panel.plot(found.t, np.sqrt(np.maximum(found.damped, 0.0)), color=PALETTE[1], label="X")
     panel.plot(found.t, np.sqrt(np.maximum(found.acted, 0.0)), color=PALETTE[3], label="D")
     _bound(panel, found, found.bound)
-    panel.set_ylabel("X and D")
+    panel.set_ylabel("X and D, √(N·m)")
 
 
 def _bound(panel: Axes, found: Dissipation, bound: np.ndarray) -> None:

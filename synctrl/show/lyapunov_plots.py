@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from ..analysis.lyapunov import Growth, Lyapunov
+from ..analysis.growth import Growth
+from ..analysis.lyapunov import Lyapunov
 from ..renamed import names_elsewhere
 from .panels import GAP, LEGEND, power_of_ten, stacked_panels
 from .plots import style
@@ -69,7 +70,7 @@ def _energies(panel: Axes, record: Lyapunov, shown: Terms) -> None:
         panel.plot(record.t, np.maximum(record.energy[name], floor), color=color, label=name)
     panel.plot(record.t, record.V, color=DESIRED, linewidth=2.0, label="V", zorder=1)
     panel.set_ylim(bottom=floor)
-    panel.set_ylabel("V and its terms")
+    panel.set_ylabel("V and its terms, N·m")
 
 
 def _powers(panel: Axes, record: Lyapunov, shown: Terms) -> None:
@@ -82,7 +83,7 @@ def _powers(panel: Axes, record: Lyapunov, shown: Terms) -> None:
         panel.plot(record.t, record.power[name], inside, color=color, label=name)
     panel.plot(record.t, record.V_dot, color=DESIRED, linewidth=2.0, label="V'", zorder=1)
     panel.axhline(0.0, color="#8a929c", linewidth=0.8)
-    panel.set_ylabel("V' and its terms, 1/s")
+    panel.set_ylabel("V' and its terms, W")
 
 
 def _visible(terms: Mapping[str, np.ndarray]) -> Terms:

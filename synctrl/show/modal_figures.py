@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 
 #: height of a panel, inches, and the most of them
 PANEL, MOST = 1.35, 6
-#: what is below this share of the largest bound is not drawn
-VISIBLE = 1e-5
+#: share of the largest bound where axes begin, and where at the lowest, to show a run that is smaller
+VISIBLE, LOWEST = 1e-5, 1e-9
+#: how far below the largest value of a run axes begin at least
+BELOW = 0.1
 #: where bands begin, below all that is seen
 TINY = 1e-300
 #: eigenvalues that differ by less than this share are one
@@ -42,8 +44,10 @@ def modal_figure(bounds: ModalBounds) -> Figure:
         figure, panels = stacked_panels([PANEL] * len(groups), above)
         tops = [_panel(*each, bounds) for each in zip(panels, groups, strict=True)]
         top = max(tops) or 1.0
+        peaks = [float(np.max(panel.get_lines()[0].get_ydata())) for panel in panels]
+        low = max(min(VISIBLE * top, BELOW * min(peaks)), LOWEST * top)
         for panel in panels:
-            panel.set_ylim(VISIBLE * top, 2 * top)
+            panel.set_ylim(low, 2 * top)
         legend(figure, panels[0].get_legend_handles_labels()[0])
     return figure
 

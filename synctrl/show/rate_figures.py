@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..analysis.exponential_rate import RatesOverGamma
+from ..checks import instance
 from .plots import new_figure, style
 from .style import robot_color
 
@@ -17,16 +18,23 @@ if TYPE_CHECKING:
 
 #: of the figure with one panel, and of a panel more, inches
 HEIGHT, WIDTH, COLUMN = 3.2, 5.2, 4.0
+#: rates below this share of Lambda would lie on the axis, and get a logarithmic one
+FLAT = 0.05
 
 
 def rates_figure(found: Mapping[str, RatesOverGamma]) -> Figure:
     """Rate over Gamma, the best one marked, a panel for each motion.
 
     A dotted line shows Lambda where a common motion of the errors falls no faster than that, whatever Gamma.
+    Where all rates are far below it the axis is logarithmic.
 
     Args:
         found: by what a panel shows.
+
+    Raises:
+        InputError: no mapping, such as the rates alone.
     """
+    instance("found", found, Mapping, "a mapping from titles to rates, as in {'two arms': rates}")
     with style():
         columns = len(found)
         figure, axes = new_figure(HEIGHT, 1, columns, width=WIDTH + COLUMN * (columns - 1))
@@ -51,4 +59,10 @@ def _panel(panel: Axes, rates: RatesOverGamma, color: str) -> None:
             "Λ", (1.0, rates.limit), (3, 0), ("axes fraction", "data"), "offset points", va="center"
         )
     panel.set(xscale="log", xlabel="Γ, as a multiple of the cell's own")
-    panel.set_ylim(0.0, 1.2 * max(rates.rates.max(), rates.limit if np.isfinite(rates.limit) else 0.0))
+    top = max(rates.rates.max(), rates.limit if np.isfinite(rates.limit) else 0.0)
+    if 0 < rates.rates.max() < FLAT * top:
+        low = rates.rates[rates.rates > 0].min()
+        panel.set_yscale("log")
+        panel.set_ylim(low / 2, top * (top / low) ** 0.2)
+    else:
+        panel.set_ylim(0.0, 1.2 * top)

@@ -1,4 +1,4 @@
-"""The tube of errors around a path, with a run inside it, and where the arm would be singular."""
+"""The tube of errors with a run inside it: over time, and in a plane where the arm would be singular, too."""
 
 from __future__ import annotations
 
@@ -23,27 +23,33 @@ TUBE, AROUND = "#d6e6f2", 0.06
 
 
 def tube_figure(tube: Tube, cell: Cell, result: Result, robot: int = 0) -> Figure:
-    """The tube of one robot's tip around its path in the plane, and over time, with a run inside it.
+    """The errors of one robot in a run below the radius of its tube, over time, a panel for each part.
 
-    Red are the circles on which an arm of two links is singular.
+    In two axes of `CartesianSpace` the first panel has the plane: the tube around the path of the tip, with
+    the run inside it, and in red the circles on which an arm of two links is singular.
 
     Args:
         tube: of `synctrl.analysis.tube`.
-        cell: the same cell, in two axes of `CartesianSpace`.
+        cell: the same cell.
         result: a run of it.
         robot: index of the robot, counted from 0.
 
     Raises:
-        InputError: no such robot, or another space.
+        InputError: no such robot, or a tube of another cell.
     """
     index("robot", robot, cell.n)
-    if not isinstance(cell.space, CartesianSpace) or cell.m != 2:
-        raise InputError.expected("a cell in two axes of a CartesianSpace", repr(cell.space), "cell")
+    if (tube.names, tube.parts[-1].stop) != (cell.names, cell.m):
+        raise InputError.expected(f"a tube of {cell.name!r}, with its robots and axes", tube.cell, "tube")
+    flat = isinstance(cell.space, CartesianSpace) and cell.m == 2
     with style():
-        figure, axes = new_figure(3.6, 1, 2)
-        _in_plane(axes[0][0], tube, cell, result, robot)
-        _over_time(axes[0][1], tube, cell, result, robot)
-        _legend(figure, robot)
+        figure, axes = new_figure(3.6 if flat else 2.6, 1, flat + len(tube.parts))
+        if flat:
+            _in_plane(axes[0][0], tube, cell, result, robot)
+        else:
+            axes[0][0].set_title(cell.names[robot])
+        for part, panel in enumerate(axes[0][flat:]):
+            _over_time(panel, tube, result, robot, part)
+        _legend(figure, robot, flat)
     return figure
 
 
@@ -68,20 +74,22 @@ def _in_plane(panel: Axes, tube: Tube, cell: Cell, result: Result, i: int) -> No
     )
 
 
-def _over_time(panel: Axes, tube: Tube, cell: Cell, result: Result, i: int) -> None:
+def _over_time(panel: Axes, tube: Tube, result: Result, i: int, part: int) -> None:
     """Radius of the tube and length of the error over time."""
-    unit, factor = display(tube.parts[0].unit)
-    panel.fill_between(tube.t, 0, factor * tube.radius[:, i, 0], color=TUBE, linewidth=0)
-    panel.plot(result.t, factor * tube.sizes(result.tracking_error)[:, i, 0], color=robot_color(i))
-    panel.set(xlim=(0, tube.t[-1]), xlabel="t, s", ylabel=f"|e|, {unit}")
+    unit, factor = display(tube.parts[part].unit)
+    panel.fill_between(tube.t, 0, factor * tube.radius[:, i, part], color=TUBE, linewidth=0)
+    panel.plot(result.t, factor * tube.sizes(result.tracking_error)[:, i, part], color=robot_color(i))
+    panel.set(xlim=(0, tube.t[-1] or 1), xlabel="t, s", ylabel=f"|e({tube.parts[part].name})|, {unit}")
     panel.set_ylim(bottom=0)
 
 
-def _legend(figure: Figure, i: int) -> None:
-    """Names of what both panels show."""
+def _legend(figure: Figure, i: int, flat: bool) -> None:
+    """Names of what the panels show."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    lines = {"desired": (DESIRED, "--"), "run": (robot_color(i), "-"), "singular": (ACCENT, "-")}
+    lines = {"run": (robot_color(i), "-")}
+    if flat:
+        lines |= {"desired": (DESIRED, "--"), "singular": (ACCENT, "-")}
     drawn = [Line2D([], [], color=color, ls=ls, label=name) for name, (color, ls) in lines.items()]
     figure.legend(handles=[Patch(color=TUBE, label="tube"), *drawn], loc="outside lower center", ncols=4)
