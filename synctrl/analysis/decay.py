@@ -89,8 +89,7 @@ def simulated_decay(
     dual, multiplier = rate.left[:, k].conj(), complex(rate.multipliers[k])
     share = complex(dual @ after) / complex(dual @ before) / multiplier**periods
     simulated = multiplier * share ** (1 / periods)  # of all roots the one nearest to the multiplier
-    expected = np.linalg.matrix_power(rate.Phi, periods) @ before
-    return Decay(multiplier, simulated, before, after, expected)
+    return Decay(multiplier, simulated, before, after, np.linalg.matrix_power(rate.Phi, periods) @ before)
 
 
 def _number(value: complex) -> str:

@@ -82,7 +82,7 @@ class ModalBounds(InWords):
         gap: L2 norm of what r_j has beyond c J s_q, (n, m); rounding if `reason` is None.
         l2: L2 norm of w_j over the run, (n, m).
         peak: sup |w_j|, (n, m).
-        errors: sup |e_i|, (n,).
+        errors: sup |e_i|, (n,), of all axes together; of poses that is metres beside radians.
         reason: why r is not c J s_q, in words, or None.
         unbounded: why Theorem A does not reach the run, in words, or None.
         unresolved: why integrals over the log are not to be trusted, in words, or None.

@@ -162,10 +162,15 @@ def tube(
     known = _known(controller, read_instants(times, end), acting, end)
     if kappa is None:
         return _tube(known, radii(known), speed is not None)
-    given = finite_array("kappa", kappa, (cell.n, len(known.parts)))
+    given = _check_kappa(kappa, (cell.n, len(known.parts)))
+    return _tube(known, radii_with(known, given), speed is not None, KAPPA_GIVEN)
+
+
+def _check_kappa(kappa: ArrayLike, shape: tuple[int, int]) -> np.ndarray:
+    given = finite_array("kappa", kappa, shape)
     if given.min() < 0:
         raise InputError.expected("bounds of at least 0", float(given.min()), "kappa")
-    return _tube(known, radii_with(known, given), speed is not None, KAPPA_GIVEN)
+    return given
 
 
 def _known(controller: Controller, instants: np.ndarray, acting: Outside, end: float) -> Known:
