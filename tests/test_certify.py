@@ -8,6 +8,8 @@ from dataclasses import FrozenInstanceError, replace
 import numpy as np
 import pytest
 from refusals import refused
+from test_devices import ALL
+from test_devices import small as small_devices
 from theory_cells import GAINS, coupling, experiment
 
 from synctrl import (
@@ -115,6 +117,14 @@ def test_a_run_under_sampled_control_is_not_covered_but_bounded() -> None:
     certificate = certify(run)
     assert certificate.verdict == "bounded by Theorem A"
     assert any("held for 0.002 s" in reason for reason in certificate.outside)
+
+
+def test_of_sampled_control_samples_are_named_and_not_the_step() -> None:
+    certificate = certify(small_devices(**ALL).simulate(0.3, 1e-3, control_period=2e-3))
+    assert certificate.growth is not None and certificate.growth.term == "sampling"
+    assert certificate.closes is None and "numerical errors explain" not in str(certificate)
+    assert certificate.dissipation is not None
+    assert f"with what is held, by {np.abs(certificate.dissipation.gap).max():.2g}" in str(certificate)
 
 
 def test_a_certificate_is_frozen_readable_and_plain_data() -> None:
@@ -332,6 +342,13 @@ def test_a_jump_of_the_desired_velocity_is_counted_and_called_outside() -> None:
     accounted = sum(record.supplied.values()) + record.jumped + record.drift[-1]
     np.testing.assert_allclose(accounted, record.V[-1] - record.V[0], rtol=1e-9, atol=1e-12)
     assert certificate.as_dict()["balance"]["jumped"] == record.jumped
+
+
+@pytest.mark.parametrize("dt", [1e-3, 7e-4], ids=["at an instant of the log", "between two"])
+def test_v_does_not_grow_by_integration_where_the_desired_velocity_jumps(dt: float) -> None:
+    certificate = certify(kinked().simulate(dt=dt))
+    assert np.diff(certificate.lyapunov.V).max() > 0.1
+    assert certificate.growth is None
 
 
 def test_a_balance_whose_bound_is_a_large_share_of_what_v_lost_says_nothing() -> None:

@@ -24,6 +24,7 @@ from synctrl import (
     Cell,
     Circle,
     Coupling,
+    Damping,
     Disturbance,
     Experiment,
     Friction,
@@ -399,6 +400,14 @@ def test_saturation_is_named_and_not_the_adaptation_that_comes_with_it() -> None
 def test_friction_that_is_not_adapted_is_refused_even_at_rest() -> None:
     with refused(InputError, "arm 1, parameters"):
         exponential_rate(rods(size=(0.0, 0.0), friction=Friction(viscous=0.5)), PERIOD)
+
+
+@pytest.mark.parametrize("damping", [Damping(0.6, 0.05), Damping(0.9, 0.3)], ids=["a little", "much"])
+def test_damped_inverse_kinematics_at_work_on_the_motion_are_refused(damping: Damping) -> None:
+    run = circles()
+    space = CartesianSpace("xy", singularity=damping)
+    with refused(InputError, "arm 1, singularity"):
+        exponential_rate(replace(run, cell=Cell(run.cell.members, run.cell.coupling, space)), 0.5)
 
 
 def test_arms_with_spare_joints_are_refused() -> None:

@@ -197,6 +197,18 @@ def test_no_bound_is_violated_for_poses_of_arms_under_an_unknown_payload():
     assert holds(bounds) and bounds.reason is None and bounds.w.shape[1:] == (2, 6)
 
 
+@pytest.mark.parametrize("cell", [ur5_payload, a460_pair], ids=["ur5", "a460"])
+def test_errors_are_bounded_a_priori_by_no_more_than_all_of_r_makes_of_them(cell):
+    """|c^-1| (|w(0)| + kappa X / sqrt(2 min Lambda)), for c = 1 and -1."""
+    bounds = modal_bounds(cell().simulate(0.1, dt=5e-4, engine="compiled"))
+    plain = np.linalg.norm(bounds.w[0]) + bounds.kappa * bounds.X_bound / np.sqrt(
+        2 * bounds.filter.Lambda.min()
+    )
+    assert (bounds.errors.actual <= bounds.errors.bound).all()
+    assert (bounds.errors.bound <= bounds.errors.a_priori).all()
+    assert (bounds.errors.a_priori <= plain).all()
+
+
 def filtered(bounds: ModalBounds, start: np.ndarray) -> np.ndarray:
     """w_j at the end, (n, m), of the law's differential equation with the r of a run."""
     modes, shape, r = bounds.filter, bounds.w[0].shape, CubicSpline(bounds.t, bounds.r)
@@ -335,13 +347,14 @@ def frozen_pair(Lambda: float, beta: float, K_r: float, known: tuple[float, floa
 
 @pytest.mark.parametrize(
     ("name", "mode", "cell", "duration"),
-    [  # a long push, one that begins slowly, one that swings at sqrt(a b), and one that begins fast
+    [  # a long push, one that begins slowly, one that swings at sqrt(a b), and two that begin fast or slowly
         ("l2", 0, lambda: frozen_pair(20.0, 3.0, 20.0, (0.5, 0.5)), 0.8),
         ("peak", 0, lambda: frozen_pair(4.0, 3.0, 2.0, (0.5, 0.5)), 0.3),
         ("l2", 1, lambda: frozen_pair(20.0, 10.0, 10.0, (0.5, 1.5), 0.1, 20.0), 1.0),
         ("peak", 1, lambda: frozen_pair(4.0, 1.0, 1.0, (1.0, 0.5)), 0.25),
+        ("errors", 0, lambda: frozen_pair(4.0, 3.0, 2.0, (0.5, 0.5)), 0.3),
     ],
-    ids=["energy of the common mode", "its peak", "energy of the differences", "their peak"],
+    ids=["energy of the common mode", "its peak", "energy of the differences", "their peak", "errors"],
 )
 def test_a_run_from_rest_reaches_nine_tenths_of_the_bound(name, mode, cell, duration):
     bounds = modal_bounds(cell().simulate(duration, dt=1e-3, engine="compiled"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,8 @@ from .metrics import finite_or_none
 from .replay import Replay, replay
 
 VERDICTS = ("covered by the theorem", "bounded by Theorem A", "outside the theorem")
+#: what makes V grow under sampled control where no power of the law does
+SAMPLING = "sampling"
 #: what each verdict says, in a sentence
 MEANINGS = (
     "along this run the proof's inequality held and nothing outside the theorem acted; it does not say that "
@@ -91,8 +93,12 @@ class Certificate(InWords):
 
     @property
     def closes(self) -> bool | None:
-        """Whether the balance of V closes; None if the log is thinned."""
-        return self.lyapunov.closes if self.every == 1 else None
+        """Whether the balance of V closes; None if the log is thinned, or torque is held."""
+        return None if self.every > 1 or self._held else self.lyapunov.closes
+
+    @property
+    def _held(self) -> bool:
+        return self.dissipation is not None and SAMPLING in self.dissipation.sources
 
     def as_dict(self) -> dict[str, Any]:
         """The same as plain numbers, words and lists, without the arrays over time."""
@@ -169,7 +175,7 @@ def certify(result: Result, experiment: Experiment | None = None) -> Certificate
     """
     run = replay(result, experiment)
     record, condition, errors = lyapunov(run), gain_condition(run), convergence(run)
-    growth, heard = first_growth(record), delay_condition(run)
+    growth, heard = _growth(run, record), delay_condition(run)
     found = broken(run, record, condition, heard)
     excused = any(found) or (growth is not None and covers(heard, growth.term))
     known = proven(run) and heard is None
@@ -181,6 +187,12 @@ def certify(result: Result, experiment: Experiment | None = None) -> Certificate
         getattr(run.loop.controller.law, "statement", None), getattr(run.loop.chain, "theorem", None), heard,
         found.unbounded, balanced(run, found.unbounded),
     )  # fmt: skip
+
+
+def _growth(run: Replay, record: Lyapunov) -> Growth | None:
+    """The first growth of V; where V' of the law does not explain it, what samples do does."""
+    growth, held = first_growth(record), run.result.info.get("control_period") is not None
+    return replace(growth, term=SAMPLING) if held and growth and growth.term == "integration" else growth
 
 
 def _consistency(run: Replay) -> Consistency | None:
@@ -240,9 +252,12 @@ def _ends(term: np.ndarray) -> dict[str, float]:
 
 
 def _balance(c: Certificate) -> str:
-    if c.closes is None:
+    if c.every > 1:
         return f"cannot be seen in a log of one of {c.every} steps"
-    record = c.lyapunov
+    record, a = c.lyapunov, c.dissipation
+    if c._held and a is not None:
+        off = f"off by {record.largest_drift:.2g}, as V' is that of nothing held"
+        return f"{off}; with what is held, by {float(np.abs(a.gap).max()):.2g} N·m"
     return f"off by {record.largest_drift:.2g}, numerical errors explain {record.drift_bound:.2g} N·m"
 
 

@@ -29,7 +29,7 @@ class Growth:
 def first_growth(record: Lyapunov) -> Growth | None:
     """The first instant at which V grows beyond rounding, and the term that did it; None if it never does.
 
-    Jumps of V at events of plant or network do not count: they are no matter of V'.
+    Jumps of V, at events of plant or network or of what is desired, do not count: they are no matter of V'.
     """
     V, V_dot = record.V, record.V_dot
     rising = V_dot > record.rounding

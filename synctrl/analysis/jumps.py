@@ -90,8 +90,19 @@ def _events_in(t: np.ndarray, loop: ClosedLoop, period: float | None) -> list[in
     messages = np.array(loop.messages.between(0.0, end) if jumps_at_messages(loop) else [])
     if period is not None:
         messages = period * np.ceil(messages / period - GRID)
-    after = np.searchsorted(t, np.concatenate((events, messages)) - tolerance(t))
-    return sorted({int(k) - 1 for k in after if 0 < k < len(t)})
+    return list(ends_before(t, np.concatenate((events, messages))))
+
+
+def jumps_of_v(t: np.ndarray, cell: Cell, events: tuple[int, ...]) -> tuple[int, ...]:
+    """Logged instants between which and the next one V jumps, at `events` or where what is desired jumps."""
+    times = np.array([jump.time for jump in desired_jumps(cell, float(t[-1]))])
+    return tuple(sorted({*events, *ends_before(t, times)}))
+
+
+def ends_before(t: np.ndarray, times: np.ndarray) -> tuple[int, ...]:
+    """Logged instants between which and the next one something happens, at that next one at the latest."""
+    after = np.searchsorted(t, times - tolerance(t))
+    return tuple(sorted({int(k) - 1 for k in after if 0 < k < len(t)}))
 
 
 def jumps_at_messages(loop: ClosedLoop) -> bool:

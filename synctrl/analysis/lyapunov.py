@@ -34,6 +34,7 @@ from ..simulation.closed_loop import ClosedLoop
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .balance import drift, jumped, supplied
+from .jumps import jumps_of_v
 from .replay import Replay, replay
 
 #: energies of the paper's law; those of another law stand in place of the last two
@@ -71,7 +72,7 @@ class Lyapunov:
         drift_bound: what these two errors and rounding may amount to.
         supplied: integral of every power over the run, by name; together the change of V.
         inside: names of the powers that the theorem knows.
-        events: instants between which and the next one V jumps, because plant or network move the state.
+        events: instants between which and the next one V jumps: by plant or network, or as xd' jumps.
         jumped: what V gained at jumps, of the state or of the desired velocity, in all: V(T) - V(0) is the
             sum of `supplied`, of this, and of the drift at the end.
         kinked: whether rates of terms jump at messages and their sum does not: `drift_bound` is too large.
@@ -147,7 +148,7 @@ def lyapunov(result: Result | Replay, experiment: Experiment | None = None) -> L
         bound + operations(run.loop) * EPS * float(np.max(V)),
         {name: supplied(run, term) for name, term in power.items()},
         inside_of(run, proof),
-        run.events,
+        jumps_of_v(run.result.t, run.loop.cell, run.events),
         jumped(run, V),
         run.loop.messages.sent and not run.events,
     )

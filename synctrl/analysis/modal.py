@@ -194,7 +194,7 @@ def modal_bounds(result: Result | Replay, experiment: Experiment | None = None) 
         result.unit("coupled_error"), result.units("coupled_error")[0], result.unit("tracking_error"),
         w[run.logged], r[run.logged], free, rho, kappa, kappas,
         slip.X, X_bound, gap, l2, Bounded(np.abs(w).max(axis=0), *largest),
-        _errors(run, modes, free, rho, total), signals.reason, slip.reason, slip.unresolved,
+        _errors(run, modes, free, rho, total, ahead), signals.reason, slip.reason, slip.unresolved,
     )  # fmt: skip
 
 
@@ -216,23 +216,33 @@ def _kappas(run: Replay, modes: ModalFilter) -> tuple[float, np.ndarray]:
 
 
 def _errors(
-    run: Replay, modes: ModalFilter, free: np.ndarray, rho: np.ndarray, total: float | None
+    run: Replay,
+    modes: ModalFilter,
+    free: np.ndarray,
+    rho: np.ndarray,
+    total: float | None,
+    ahead: np.ndarray | None,
 ) -> Bounded:
-    """sup |e_i| <= sup |c_i^-1| (|free_i(t)| + |h_i rho(t)|), with h_i^2 = sum_j q_ij^2 h2_j^2.
+    """sup |e_i| <= sup |c_i^-1| (|free_i(t)| + |sum_j |q_ij| h2_j rho_j(t)|).
 
-    A priori |h_i rho| is at most h_i of the axis with the largest times `total`, |r| of all robots and axes.
+    A priori each |r_j| is at most `ahead`, and all of them together at most `total`, of which a robot gets
+    h_i^2 = sum_j q_ij^2 h2_j^2 of the axis with the largest: the smaller bound counts.
     """
     c_inv, w = run.rows.c_inv[run.logged], run.rows.weighted[run.logged, 0]
     inverse, apart = np.linalg.norm(c_inv, 2, axis=(-2, -1)), np.linalg.norm(modes.vectors @ free, axis=-1)
     h = np.sqrt(modes.vectors**2 @ modes.h2**2)
 
-    def most(pushed: np.ndarray) -> np.ndarray:
-        """With |h_i rho|, (..., n)."""
-        return np.asarray((inverse * (apart + pushed)).max(axis=0))
+    def pushed(rho: np.ndarray) -> np.ndarray:
+        """What rho of all modes and axes, (..., n, m), makes of every robot's w at most, (..., n)."""
+        return np.linalg.norm(np.abs(modes.vectors) @ (modes.h2 * rho), axis=-1)
 
-    e = np.linalg.norm(np.matvec(c_inv, w), axis=-1).max(axis=0)
-    pushed = np.linalg.norm(h * np.linalg.norm(rho, axis=-2)[:, None], axis=-1)
-    return Bounded(e, most(pushed), None if total is None else most(h.max(axis=-1) * total))
+    def largest(pushed: np.ndarray) -> np.ndarray:
+        return (inverse * (apart + pushed)).max(axis=0)
+
+    e, a_priori = np.linalg.norm(np.matvec(c_inv, w), axis=-1).max(axis=0), None
+    if ahead is not None and total is not None:
+        a_priori = largest(np.minimum(pushed(ahead), h.max(axis=-1) * total))
+    return Bounded(e, largest(pushed(rho)), a_priori)
 
 
 def _row(bounded: Bounded, at: tuple[int, ...], unit: str) -> str:

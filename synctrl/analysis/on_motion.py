@@ -15,6 +15,7 @@ from ..errors import InputError, UnreachableError
 from ..robots.regressors import make_regressors
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.simulate import Experiment
+from ..tasks.measurement import Measurement
 
 #: times in a period at which a motion is held against itself one period later
 LOOKS = 64
@@ -146,6 +147,7 @@ class DesiredMotion:
 
         Raises:
             UnreachableError: there are none nearby.
+            InputError: inverse kinematics are damped there.
         """
         still = np.zeros_like(q)
         for _ in range(NEWTON):
@@ -154,7 +156,9 @@ class DesiredMotion:
             step = step if task.J_inv is None else np.matvec(task.J_inv, step)
             q = q + step
             if np.abs(step).max() <= ARRIVED:
+                self._check_exact(reference.t, task)
                 return q
+        self._check_exact(reference.t, task)
         text = f"no joint positions found for what is desired at t = {reference.t:g} s"
         raise UnreachableError(text, subject="cell")
 
@@ -174,6 +178,14 @@ class DesiredMotion:
         D = np.stack([gained(unit, 0.0) for unit in units], axis=-1) + self._damping(J)
         self._check_plant(reference.t, q, v, s.a_ref)
         return M, D, reference.c @ J, s.Y
+
+    def _check_exact(self, t: float, task: Measurement) -> None:
+        """Refuse damped inverse kinematics at work, with which J s_q is not c^-1 r."""
+        damping = np.ravel(task.inverse_damping)
+        if damping.any():
+            i = int(damping.argmax())
+            text = f"expected J^-1 without damping, found lambda = {damping[i]:.3g} at t = {t:g} s"
+            raise InputError(text, subject=f"{self.cell.names[i]}, singularity", found=float(damping[i]))
 
     def _damping(self, J: np.ndarray) -> np.ndarray:
         """K_r, or J^T K_r J where it acts in task space, (n, nv, nv)."""

@@ -123,8 +123,9 @@ def errors_converge(run: Result, source: str) -> Claim:
         (*figures, Finding("length of the run", run.t[-1], "s")),
         f"Asked: over the later half of the run, in {WINDOWS} windows, the largest errors fall from each "
         f"window to the next, and the exponential fitted to them to at most {FALLEN:.0%}. That does not "
-        "depend on how long the run is, as what is left at its end does. A run can show decay, not the "
-        "limit; the limit is the theorem's.",
+        "depend on how long the run is, as what is left at its end does, once the later half is past the "
+        "first swings and a motion that ends. A run can show decay, not the limit; the limit is the "
+        "theorem's.",
     )
 
 
