@@ -170,7 +170,7 @@ def test_adaptations_that_move_what_is_desired_are_refused_by_name(adaptation, s
 
 #: options of the cell and of the run, the number of the theorem, and what is outside beside the object
 CIRCUMSTANCES = {
-    "friction": ({"friction": True}, {}, 2, {"friction that the model does not contain"}),
+    "friction": ({"friction": True}, {"dt": 2.5e-4}, 2, {"friction that the model does not contain"}),
     "a push": ({"disturbances": [PUSH]}, {}, 2, {"torque from outside"}),
     "limits": (
         {"saturate": True, "gains": GAINS.replace(K_r=12 * np.array(GAINS.K_r))},
@@ -190,7 +190,7 @@ CIRCUMSTANCES = {
     ),
     "everything": (
         {"geometric_error": True, "friction": True, "tare": True, "admittance": True},
-        {},
+        {"dt": 2.5e-4},
         3,
         {"friction that the model does not contain"},
     ),

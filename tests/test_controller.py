@@ -96,7 +96,8 @@ def test_what_makes_use_of_gains_takes_rows() -> None:
     assert lyapunov(result).V.shape == result.t.shape
     assert gain_condition(result).K_r_min in (15.0, 20.0)
     assert len(identify(result)) == 2
-    assert len(side_by_side(taken_apart(experiment), duration=0.01).rows) == 9
+    apart = taken_apart(experiment)
+    assert len(side_by_side(apart, duration=0.01).rows) == len(apart) > 2**3
 
 
 def test_damping_in_task_space_has_as_many_entries_for_every_robot() -> None:
