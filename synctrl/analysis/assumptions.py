@@ -17,7 +17,7 @@ from .jumps import desired_jumps, jumps_at_messages
 from .lyapunov import Lyapunov, outside
 from .replay import Replay
 
-#: powers of which Theorem A says nothing: the proof itself is another, or there is none
+#: powers of which Theorem A says nothing, and which have reasons with words of their own below
 UNBOUNDED = ("law", "weight rate", "damped inverse")
 
 
