@@ -26,6 +26,7 @@ from .hooks import Hooks
 from .known import check_known
 from .program import Program, one_after_another
 from .quantities import DESIRED, LOGS, SLIDE
+from .report import Ending, Worst
 from .structs import Mark
 
 #: bytes of references that one block of steps may need
@@ -121,10 +122,17 @@ class Compiled:
     Args:
         libraries: what earlier runs have loaded, by what it was made for.
         tables: what was desired in earlier runs.
+        widest: most lanes in which robots stand; by default what the machine has.
     """
 
-    def __init__(self, libraries: dict[str, ctypes.CDLL] | None = None, tables: Tables | None = None):
+    def __init__(
+        self,
+        libraries: dict[str, ctypes.CDLL] | None = None,
+        tables: Tables | None = None,
+        widest: int | None = None,
+    ):
         self._libraries, self._blocks = libraries, blocks if tables is None else tables.blocks
+        self._widest = widest
 
     def refuses(self, run: Run) -> None:
         """See `Engine`.
@@ -143,7 +151,7 @@ class Compiled:
         Raises:
             see `Program`
         """
-        return Program(run.loop, self._libraries)
+        return Program(run.loop, self._libraries, self._widest)
 
     def run(self, run: Run, progress: Progress | None = None) -> Result:
         """Make a run; see `Engine`."""
@@ -171,16 +179,12 @@ class _Steps:
 
     def __init__(self, program: Program, run: Run, recorder: Recorder):
         self._program, self._run, self._recorder = program, run, recorder
-        v0, work = run.loop.cell.v0, program.work
-        self._before = np.zeros((2, 2, v0.size))
-        buffers = (part.ctypes.data for part in self._before)
-        work.step_error = structs.StepError(0, np.abs(v0).max(), 0, 0, 0, *buffers)
+        self._worst = Worst(program, run.loop.cell.v0)
         self._steps = structs.Steps(holds=run.every is not None, period=run.info.get("control_period") or 0.0)
         self._block: DesiredStretch | None = None
         program.tell(self._steps, {"disturbance": run.schedule.torques, "pi": program.carried})
-        ctypes.memset(work.side, 0, 8 * run.loop.cell.n)
         self._state, self._agenda = run.loop.state(recorder.state), Agenda(program, run)
-        program.quantities.hidden = self._state.hidden.ctypes.data
+        self._report = Ending(1)
         self._hooks = Hooks(run, program.quantities, self._steps, self._state, self._agenda)
 
     def advance(self, block: DesiredStretch, first: int, last: int) -> None:
@@ -236,24 +240,26 @@ class _Steps:
 
     def _call(self, first: int, times: np.ndarray, marks: np.ndarray, windows: list[np.ndarray]) -> None:
         """Make steps between these times, with what happens at their starts and acts in them."""
-        program, recorder, report = self._program, self._recorder, structs.Report()
+        program, recorder, report = self._program, self._recorder, self._report.fresh()
         steps, times = self._steps, np.ascontiguousarray(times)
         steps.first, steps.count = first, len(marks)
         arrays = (times, marks, *windows)
         steps.t, steps.marks, steps.disturbed, steps.loaded = (array.ctypes.data for array in arrays)
         log = structs.Log(**{name: recorder.address_ahead(name) for name in LOGS})
+        y = program.packed_state(recorder.state) if program.lanes.width > 1 else recorder.state
         try:
-            program.call("advance", steps, recorder.state, log, report)
+            program.call("advance", steps, y, log, report)
         finally:  # an interrupt that came meanwhile is raised before the call has returned
+            if y is not recorder.state:
+                program.unpacked_state(y, recorder.state)
             recorder.advance(times[:-1][marks & Mark.LOGGED > 0][: report.rows])
-            worst = program.work.step_error
-            self._run.step_error.note(worst.largest, worst.speed, worst.at, worst.time)
+            self._run.step_error.note(*self._worst.of_all())
         self._hooks.fail()
-        if report.status:
-            check = checks(limits_of(program.loop.cell.task))[report.status - 1]
-            found = Alarm(check, report.robot, report.value)
-            t, v = float(times[report.step]), recorder.last("v")
-            raise stopped(program.loop, t, recorder.state, v, found)
+        status, step, robot, value = (part[0] for part in self._report.found)
+        if status:
+            check = checks(limits_of(program.loop.cell.task))[status - 1]
+            t, v = float(times[step]), recorder.last("v")
+            raise stopped(program.loop, t, recorder.state, v, Alarm(check, int(robot), float(value)))
 
 
 def _marks(checked: np.ndarray, logged: np.ndarray, sampled: np.ndarray, joined: np.ndarray) -> np.ndarray:

@@ -4,58 +4,50 @@ from __future__ import annotations
 
 import ctypes
 import json
-import re
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 from math import prod
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..assembly.plant import CarryingPlant
 from ..control.adaptation.gradient import BoundGradient
+from ..control.network import BoundIdeal
 from ..coupling.cell import Reference
 from ..errors import CompilationError
 from ..simulation.closed_loop import ClosedLoop, State
 from ..simulation.guard import limits_of
 from ..simulation.plant import Plant
 from . import structs
-from .address import Doubles
+from .address import Vectors
 from .build import cached_library, content_key, require_casadi
 from .carrying import carrying_constants, held_constants, object_function
+from .compiler import widest_lanes
+from .emit import written
 from .hearing import exchange_of
 from .kind import Classified, Kind, classify, standing
 from .known import check_known, check_untouched
+from .lanes import Lanes, aligned, compared, narrowest, room, state_parts
 from .plugged import learner
 from .quantities import DESIRED, SLIDE, checked, owned_by, shape
 from .specimen import Specimen
-from .structs import header, largest
+from .structs import driver, largest, prelude
 from .trace import Trace
 
 #: relative difference between generated code and the reference engine above which the code is refused
 AGREEMENT = 1e-9
 
 
-def generate(kinds: list[Kind]) -> Iterator[str]:
+def generate(kinds: list[Kind], width: int) -> Iterator[str]:
     """C sources one after another: one per function of each kind of robot and of objects, and the driver."""
+    before = prelude(kinds, width)
     for k, kind in enumerate(kinds):
         for function in Trace(kind, f"kind{k}").functions():
-            yield _written(function)
+            yield before + written(function)
     if any(kind.holds for kind in kinds):
-        yield _written(object_function(f"kind{len(kinds)}_object"))
-    parts = (Path(__file__).parent / name for name in ("network.c", "driver.c"))
-    yield header(kinds) + "".join(part.read_text(encoding="utf-8") for part in parts)
-
-
-def _written(function: Any) -> str:
-    """A function in C, without its tests for arguments and results left out: the driver leaves none out."""
-    import casadi as ca
-
-    generator = ca.CodeGenerator(f"{function.name()}.c")
-    generator.add(function)
-    source = generator.dump()
-    source = re.sub(r"arg\[\d+\]\? (arg\[\d+\]\[\d+\]) : 0;", r"\1;", source)
-    return re.sub(r"if \(res\[\d+\]!=0\) res", "res", source)
+        yield before + written(object_function(f"kind{len(kinds)}_object"))
+    yield driver(kinds, width)
 
 
 class CompiledLoop:
@@ -65,42 +57,64 @@ class CompiledLoop:
         loop: controller and plant of a cell of known parts.
         classified: what kinds of robots there are, and which one each robot of the cell is.
         library: made for these kinds.
+        scattered: whether the library's lanes are robots; else they are runs.
 
     Attributes:
+        lanes: how arrays stand in lanes.
         sizes: lengths of rows, see `SIZES`, and the numbers of robots, pairs and objects, n, p and o, and
             r and h, of what network and plant remember.
         cell, quantities, work: what the driver is given; see `structs.py`.
         carried: true inertial parameters with every load, (loads, n, bodies).
-        scratch: sizes of the scratch arrays arg, res, iw and w that the generated functions ask for.
 
     Raises:
         CompilationError: an array of another shape than generated code reads.
     """
 
-    def __init__(self, loop: ClosedLoop, classified: Classified, library: ctypes.CDLL):
+    def __init__(
+        self, loop: ClosedLoop, classified: Classified, library: ctypes.CDLL, scattered: bool = False
+    ):
         self.loop, self.library = loop, library
+        width = int(library.lanes())
+        self.lanes = Lanes(width, scattered and width > 1)
         cell, objects = loop.cell, int(isinstance(loop.plant, CarryingPlant))
         self.sizes = {**largest(classified.kinds), "n": cell.n, "p": cell.coupling.pairs, "o": objects}
         self.sizes |= {"r": loop.controller.network.start().size, "h": loop.plant.hidden0.size}
         self._keep: list[np.ndarray] = []
-        self.cell = self._cell([*classified.kind_of, len(classified.kinds)])
+        self.cell = self._cell(classified)
         self.quantities = structs.Quantities()
-        arrays = {name: np.zeros(shape(name, self.sizes)) for name in owned_by("work")}
-        self._arrays = {
-            name: checked(name, array, self.sizes)
-            for name, array in {**arrays, **_constants(loop, classified)}.items()
+        self.constants = {
+            name: checked(name, array, self.sizes) for name, array in _constants(loop, classified).items()
         }
+        self._arrays = {name: self._packed(name, array) for name, array in self.constants.items()}
+        self._arrays |= {name: room(*shape(name, self._rows), width) for name in owned_by("work")}
         for name, array in self._arrays.items():
             setattr(self.quantities, name, self.address(array))
-        sizes = (ctypes.c_longlong * 4)()
-        library.work_sizes(sizes)
-        self.scratch = tuple(sizes)
         self.work = self._work()
         self.carried = _carried(loop.plant, self.sizes["bodies"])
 
+    def packed_state(self, y: np.ndarray) -> np.ndarray:
+        """A flat state in lanes, flat."""
+        parts, begin = [], 0
+        for name, rows, length in state_parts(self.sizes, y.size):
+            part = y[begin : begin + rows * length].reshape(rows, length)
+            parts.append(self._packed(name, part).ravel())
+            begin += rows * length
+        return aligned(np.concatenate(parts))
+
+    def unpacked_state(self, packed: np.ndarray, y: np.ndarray) -> None:
+        """The opposite: write the state of the run, or of the first of the runs, to y."""
+        found, begin = [], 0
+        for name, rows, length in state_parts(self._rows, packed.size // self.lanes.width):
+            size = rows * length * self.lanes.width
+            part = packed[begin : begin + size].reshape(rows, length, self.lanes.width)
+            found.append(self.lanes.unpacked(name, part, self.sizes).ravel())
+            begin += size
+        y[...] = np.concatenate(found)
+
     def state_dot(self, reference: Reference, y: np.ndarray, disturbance: np.ndarray) -> np.ndarray:
         """y' at one instant, for comparison with `ClosedLoop.evaluate`."""
-        y, y_dot, first = np.ascontiguousarray(y), np.zeros(self.loop.size), np.zeros(1, dtype=np.intc)
+        y, first, found = self.packed_state(y), np.zeros(1, dtype=np.intc), np.zeros(self.loop.size)
+        y_dot = room(y.size)
         desired = dict(zip((*DESIRED, *SLIDE), reference.desired, strict=False))
         weights = one_after_another(reference.weights)
         t = np.full(2, float(reference.t))
@@ -108,12 +122,13 @@ class CompiledLoop:
         steps = structs.Steps(**{name: array.ctypes.data for name, array in addresses.items()})
         self.tell(steps, {**desired, "weights": weights, "disturbance": disturbance, "pi": self.carried})
         self.call("state_dot", steps, y, y_dot)
-        return y_dot
+        self.unpacked_state(y_dot, found)
+        return found
 
     def hold(self, hidden: np.ndarray) -> None:
         """Let those hands hold the object that do so in this state of the plant's own."""
         for name, array in held_constants(self.loop, hidden).items():
-            self._arrays[name][...] = array
+            self._arrays[name][...] = self._packed(name, array)
 
     def tell(self, steps: structs.Steps, arrays: Mapping[str, np.ndarray]) -> None:
         """Say what is desired and acts in steps, instead of what was said before.
@@ -126,9 +141,10 @@ class CompiledLoop:
             CompilationError: an array of another shape than generated code reads.
         """
         for name, array in arrays.items():
-            kept = checked(name, array, self.sizes)
-            size = prod(shape(name, self.sizes))
-            setattr(steps, name, structs.Arrays(kept.ctypes.data, size if kept.size > size else 0))
+            kept = self._packed(name, checked(name, array, self.sizes))
+            size = prod(shape(name, self._rows))
+            several = kept.size > size * self.lanes.width
+            setattr(steps, name, structs.Arrays(kept.ctypes.data, size if several else 0, None))
             steps.kept[name] = kept
 
     def call(self, function: str, steps: structs.Steps, y: np.ndarray, *others: Any) -> None:
@@ -149,19 +165,28 @@ class CompiledLoop:
 
     # -- internals ----------------------------------------------------------------------------------------
 
-    def _cell(self, kind_of: list[int]) -> structs.Cell:
-        cell, plant = self.loop.cell, self.loop.plant
-        coupling = cell.coupling
-        first, incident, incident_sign = coupling.incidence
-        lists = {"kind": kind_of, "edge": coupling.edges, "first": first, "incident": incident}
-        found = {name: self.address(np.array(part, dtype=np.intc)) for name, part in lists.items()}
-        signs = {"sign": coupling.signs, "incident_sign": incident_sign}
-        found |= {name: self.address(np.array(part, dtype=float)) for name, part in signs.items()}
+    @cached_property
+    def _rows(self) -> dict[str, int]:
+        """Sizes, with numbers of rows as the code has them."""
+        return self.lanes.sizes(self.sizes)
+
+    def _packed(self, name: str, array: np.ndarray) -> np.ndarray:
+        return self.lanes.packed(name, array, self.sizes)
+
+    def _cell(self, classified: Classified) -> structs.Cell:
+        cell, plant, coupling = self.loop.cell, self.loop.plant, self.loop.cell.coupling
+        kinds = [*np.array(classified.kind_of)[self.lanes.members(cell.n)[:, 0]], len(classified.kinds)]
+        tables = {"kind": np.array(kinds), **compared(coupling, self.lanes, cell.m)._asdict()}
+        found = {
+            name: self.address(aligned(table) if "sign" in name else np.ascontiguousarray(table, dtype=np.intc))
+            for name, table in tables.items()
+        }
         return structs.Cell(
-            n=cell.n,
-            p=coupling.pairs,
-            **{name: self.sizes[name] for name in ("o", "r", "h")},
+            **{name: self._rows[name] for name in ("n", "p", "o", "r", "h")},
+            robots=cell.n,
+            pairs=coupling.pairs,
             arity=coupling.edges.shape[1],
+            scattered=int(self.lanes.scattered),
             rubs=int(plant.rubs),
             saturates=int(plant.saturate),
             exchange=exchange_of(self.loop.controller.network, self.address),
@@ -169,12 +194,16 @@ class CompiledLoop:
         )
 
     def _work(self) -> structs.Work:
-        arg, res, iw, w = self.scratch
-        size, n = self.loop.size, self.sizes["n"]
-        lengths = {"arg": arg, "res": res, "iw": iw, "w": w, "stage": size, "held": size, "side": n}
-        found = {name: self.address(np.zeros(length + 1)) for name, length in lengths.items()}
-        rates = (Doubles * 4)(*(self.address(np.zeros(size)) for _ in range(4)))
+        parts = state_parts(self._rows, 0)[:-1]
+        size = sum(rows * length for _, rows, length in parts) + self._rows["h"]
+        lengths = {"stage": size, "held": size, "side": self._rows["n"]}
+        found = {name: self.address(self._vectors(length)) for name, length in lengths.items()}
+        rates = (Vectors * 4)(*(self.address(self._vectors(size)) for _ in range(4)))
         return structs.Work(k=rates, **found)
+
+    def _vectors(self, length: int) -> np.ndarray:
+        """Room for so many numbers of all lanes."""
+        return room(length + 1, self.lanes.width)
 
 
 class Program(CompiledLoop):
@@ -183,6 +212,7 @@ class Program(CompiledLoop):
     Args:
         loop: controller and plant of a cell.
         libraries: libraries that are loaded already, by what they were made for; this program's is added.
+        widest: most lanes that are worth it on this machine; robots stand in as many of them as are cheapest.
 
     Attributes:
         kinds: number of different robots, each with generated functions of its own.
@@ -193,22 +223,47 @@ class Program(CompiledLoop):
         CompilationError: the code cannot be compiled, or computes something else than the reference engine.
     """
 
-    def __init__(self, loop: ClosedLoop, libraries: dict[str, ctypes.CDLL] | None = None):
+    def __init__(
+        self, loop: ClosedLoop, libraries: dict[str, ctypes.CDLL] | None = None, widest: int | None = None
+    ):
         check_known(loop)
         classified = classify(loop)
         self.kinds = len(classified.kinds)
-        library = _library(loop, classified, {} if libraries is None else libraries)
-        super().__init__(loop, classified, library)
+        width = robots_in_lanes(loop, classified, widest)
+        library = library_for(loop, classified, {} if libraries is None else libraries, width)
+        super().__init__(loop, classified, library, scattered=True)
 
 
-def _library(loop: ClosedLoop, classified: Classified, libraries: dict[str, ctypes.CDLL]) -> ctypes.CDLL:
+def robots_in_lanes(loop: ClosedLoop, classified: Classified, widest: int | None = None) -> int:
+    """In how many lanes the robots of a closed loop stand.
+
+    In more than one only robots of one kind, which hear of each other at once and are not asked about in the
+    middle of a step.
+
+    Args:
+        loop, classified: the loop, and its robots' kinds.
+        widest: most lanes; by default what the machine has.
+    """
+    ideal = isinstance(loop.controller.network, BoundIdeal)
+    alone = len(classified.kinds) > 1 or not ideal or loop.devices.settings
+    return 1 if alone else narrowest(loop.cell.n, widest_lanes() if widest is None else widest)
+
+
+def library_for(
+    loop: ClosedLoop, classified: Classified, libraries: dict[str, ctypes.CDLL], width: int
+) -> ctypes.CDLL:
+    """The library of the kinds of a closed loop, for as many lanes; found, or built and compared.
+
+    Raises:
+        see `Program`
+    """
     keys = [kind.key() for kind in classified.kinds]
-    name = json.dumps(keys)
+    name = json.dumps([width, keys])
     if name not in libraries:
         check_untouched(loop)
-        key = content_key(keys, require_casadi())
+        key = content_key(width, keys, require_casadi())
         libraries[name] = cached_library(
-            key, lambda: generate(classified.kinds), lambda library: _compare(library, loop, classified)
+            key, lambda: generate(classified.kinds, width), lambda library: _compare(library, loop, classified)
         )
     return libraries[name]
 
@@ -219,7 +274,7 @@ def _compare(library: ctypes.CDLL, loop: ClosedLoop, classified: Classified) -> 
     Raises:
         CompilationError: they differ.
     """
-    if not (hasattr(library, "work_sizes") and hasattr(library, "state_dot")):
+    if not (hasattr(library, "lanes") and hasattr(library, "state_dot")):
         raise CompilationError("the library was made from other code", subject="generated code")
     specimen = Specimen(loop, classified)
     small = specimen.loop
