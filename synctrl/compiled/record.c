@@ -8,25 +8,27 @@ static void know(const Cell *c, Quantities *a) {
     if (c->exchange.hearing != IDEAL) compare(c, a->memory, a->integral); /* S W */
 }
 
-/* Rows of robots or pairs out of their lanes, one after another. */
-static void take_out(const Cell *c, const vec *rows, int count, int length, double *numbers) {
-    int lanes = c->scattered ? LANES : 1;
+/* Rows out of so many lanes, one after another. */
+static void take_out(const vec *rows, int lanes, int count, int length, double *numbers) {
     for (int i = 0; i < count; i += lanes, rows += length)
         for (int l = 0; l < lanes && i + l < count; l++, numbers += length)
             for (int j = 0; j < length; j++) numbers[j] = lane(rows[j], l);
 }
 
-/* How many rows there really are; of what is neither a robot's nor a pair's, all lanes have the same. */
-static int real(const Cell *c, char rows) {
-    return rows == 'n' ? c->robots : rows == 'p' ? c->pairs : rows == 'r' ? c->r : rows == 'h' ? c->h : 1;
+/* How many rows there really are, of robots, pairs, and what network and plant remember. */
+static int rows_of(const Cell *c, char rows) {
+    return rows == 'n' ? c->robots : rows == 'p' ? c->pairs : rows == 'r' ? c->r : c->h;
 }
+
+/* In how many lanes they stand; of what is neither a robot's nor a pair's, all lanes have the same. */
+static int lanes_of(const Cell *c, char rows) { return c->scattered && (rows == 'n' || rows == 'p') ? LANES : 1; }
 
 /* One row of the log. */
 static void record(const Cell *c, Quantities *a, long row, const Log *log) {
 #define COPY(log_name, name, rows, columns)                                             \
     if (log->log_name) {                                                                \
-        size_t count = real(c, #rows[0]), length = columns;                             \
-        take_out(c, a->name, count, length, log->log_name + row * count * length);      \
+        size_t count = rows_of(c, #rows[0]), length = columns;                          \
+        take_out(a->name, lanes_of(c, #rows[0]), count, length, log->log_name + row * count * length); \
     }
     LOGS(COPY)
 }
