@@ -14,7 +14,7 @@ static ivec not_finite(const vec *numbers, int size) {
 /* Say of lanes what was found there at robot i, unless they have ended before; whether none goes on. */
 static int found(const Cell *c, Report *report, ivec lanes, int status, int i, vec value) {
     if (!any(lanes)) return 0;
-    vec marked = is_counted(lanes);
+    vec marked = where(lanes, splat(1));
     for (int l = 0; l < LANES; l++) {
         int run = c->scattered ? 0 : l;
         if (lane(marked, l) == 0 || report->status[run]) continue;

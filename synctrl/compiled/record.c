@@ -52,7 +52,7 @@ static void tally(const Cell *c, const Quantities *a, double t, Tally *x) {
     measure_errors(a->e, c->n, span, x->rows, &x->tracking);
     measure_errors(a->epsilon, c->p, span, x->rows, &x->sync);
     for (int j = 0; j < c->n * nv; j++) {
-        vec size = v_fabs(a->acting[j]), cut = is_counted(is_less(a->limits[j], size));
+        vec size = v_fabs(a->acting[j]), cut = where(is_less(a->limits[j], size), splat(1));
         x->torque[j] = choose(is_less(x->torque[j], size), size, x->torque[j]);
         x->cut[j] += cut;
     }

@@ -52,9 +52,16 @@ VECTOR vec load(const double *from) {
 VECTOR void store(double *to, vec x) { memcpy(to, &x, sizeof x); }
 VECTOR double lane(vec x, int l) { return ((Lanes){.all = x}).of[l]; }
 VECTOR vec gather(const double *base, const int *index) {
-    Lanes found;
-    for (int l = 0; l < LANES; l++) found.of[l] = base[index[l]];
-    return found.all;
+#define AT(l) base[index[l]]
+#if LANES == 1
+    return AT(0);
+#elif LANES == 2
+    return (vec){AT(0), AT(1)};
+#elif LANES == 4
+    return (vec){AT(0), AT(1), AT(2), AT(3)};
+#else
+    return (vec){AT(0), AT(1), AT(2), AT(3), AT(4), AT(5), AT(6), AT(7)};
+#endif
 }
 
 /* -- masks: all bits of a lane, or none -------------------------------------------------------------------------- */
