@@ -164,4 +164,3 @@ def state_parts(sizes: Mapping[str, int], size: int) -> list[tuple[str, int, int
     """
     parts = [(name, sizes[QUANTITIES[name].rows], columns(name, sizes)) for name in owned_by("state")[:-1]]
     return [*parts, ("hidden", size - sum(rows * length for _, rows, length in parts), 1)]
-

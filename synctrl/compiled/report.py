@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from . import structs
+from .arrays import CompiledLoop
 from .lanes import room
-from .program import CompiledLoop
 
 
 class Ending:
@@ -22,6 +22,11 @@ class Ending:
     def __init__(self, runs: int):
         status, step, robot = np.zeros((3, runs), dtype=np.intc)
         self.found = status, step, robot, np.zeros(runs)
+
+    @property
+    def all(self) -> bool:
+        """Whether all runs have ended."""
+        return bool(self.found[0].all())
 
     def fresh(self) -> structs.Report:
         """A report that counts its rows from 0 and goes on with what was found."""
