@@ -18,8 +18,10 @@ from time import monotonic
 
 from ..errors import CompilationError, MissingDependencyError
 
-#: -O1, because generated code is one long sum of products: -O2 makes it no faster, only longer to compile
-FLAGS = ("-O1", "-fPIC", "-fno-math-errno", "-ffp-contract=off")
+#: for the processor of this machine, which is in the key of the cache, where the compiler knows how
+NATIVE = "-march=native"
+#: products and sums are rounded one by one, so that results do not depend on the compiler
+FLAGS = ("-O2", NATIVE, "-ffp-contract=off", "-fno-math-errno", "-fPIC")
 #: how long one call of the compiler may take, s; the largest arms take about a minute on a slow machine
 LONGEST = 900.0
 #: how long it may take to say its version, s
@@ -57,6 +59,16 @@ def compiler_version(command: tuple[str, ...]) -> str:
     return _printed_version(command, shutil.which(command[0]))
 
 
+def flags(command: tuple[str, ...]) -> list[str]:
+    """The flags for a compiler, without what it does not know; it is asked once in a process.
+
+    Raises:
+        CompilationError: it cannot be run, or does not come to an end.
+    """
+    native = NATIVE in FLAGS and _knows_native(command, shutil.which(command[0]))
+    return [flag for flag in FLAGS if native or flag != NATIVE]
+
+
 def compile_library(sources: Iterable[str], folder: Path) -> Path:
     """Compile each source as soon as it is there, as many at a time as there are cores, and link them.
 
@@ -66,10 +78,11 @@ def compile_library(sources: Iterable[str], folder: Path) -> Path:
         CompilationError: the compiler refuses, hangs, or does not write what it should.
     """
     command, stop = compiler(), threading.Event()
+    compiling = [*command, *flags(command)]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         try:
             jobs = [
-                pool.submit(_compile, command, source, folder / f"part{k}.c", stop)
+                pool.submit(_compile, compiling, source, folder / f"part{k}.c", stop)
                 for k, source in enumerate(sources)
             ]
             objects = [str(job.result()) for job in jobs]
@@ -154,9 +167,14 @@ def _printed_version(command: tuple[str, ...], found_at: str | None) -> str:
     return run([*command, "--version"], LONGEST_VERSION)[1]
 
 
-def _compile(command: tuple[str, ...], source: str, path: Path, stop: threading.Event) -> Path:
+@cache
+def _knows_native(command: tuple[str, ...], found_at: str | None) -> bool:
+    return run([*command, NATIVE, "-E", "-x", "c", os.devnull], LONGEST_VERSION)[0] == 0
+
+
+def _compile(command: list[str], source: str, path: Path, stop: threading.Event) -> Path:
     path.write_text(source, encoding="utf-8")
-    return _make(path.with_suffix(".o"), [*command, *FLAGS, "-c", str(path)], stop)
+    return _make(path.with_suffix(".o"), [*command, "-c", str(path)], stop)
 
 
 def _make(target: Path, command: list[str], stop: threading.Event) -> Path:
