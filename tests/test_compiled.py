@@ -221,8 +221,8 @@ def test_tables_hold_what_the_cell_desires(coupling):
     cell = planar_cell(2, coupling).cell
     instants = np.array([[0.0, 0.1], [0.05, 0.15], [0.1, 0.2]])
     found = tables.tabulated(cell, instants)
-    desired = np.stack([tables[name] for name in DESIRED], axis=2).reshape(3, 2, 2, 3, 2)
-    c = np.broadcast_to(tables["weights"].reshape(-1, 2, 4, 2, 2), (6, 2, 4, 2, 2)).reshape(3, 2, 2, 4, 2, 2)
+    desired = np.stack([found[name] for name in DESIRED], axis=2).reshape(3, 2, 2, 3, 2)
+    c = np.broadcast_to(found["weights"].reshape(-1, 2, 4, 2, 2), (6, 2, 4, 2, 2)).reshape(3, 2, 2, 4, 2, 2)
     for stage, times in enumerate(instants):
         for step, reference in enumerate(cell.references(times)):
             np.testing.assert_allclose(desired[stage, step].swapaxes(0, 1), reference.desired)
