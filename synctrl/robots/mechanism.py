@@ -8,6 +8,7 @@ for, their ranges, speeds and torques, is here too.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,11 @@ class Mechanism:
     tip_parent: int
     tip_translation: np.ndarray
     tip_rotation: np.ndarray
+
+    @cached_property
+    def name(self) -> str:
+        """A text that is equal for equal mechanisms."""
+        return repr(self.key())
 
     def key(self) -> list[Any]:
         """Plain data that is equal for equal mechanisms."""

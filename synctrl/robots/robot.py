@@ -257,8 +257,8 @@ class Robot:
     def tip_kinematics(self, q: np.ndarray, v: np.ndarray) -> tuple[pin.SE3, np.ndarray, np.ndarray]:
         """Pose of the tip, its Jacobian, (6, nv), and the Jacobian's derivative, (6, nv), from one pass.
 
-        q and v are (nv,), and not checked. The pose is scratch memory, valid until this thread's next call, of
-        this robot or of one that was placed from it.
+        q and v are (nv,), and not checked. The pose is scratch memory, valid until this thread's next call
+        of this robot or of one that was placed from it.
         """
         model, data, tip = self.model, self._data.own, self.tip_id
         pin.computeJointJacobiansTimeVariation(model, data, self._stored(q), v)
