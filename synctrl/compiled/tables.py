@@ -83,13 +83,9 @@ class Tables:
 def tabulated(cell: Cell, instants: np.ndarray) -> dict[str, np.ndarray]:
     """Desired motion and weights at the instants of three stages, (3, T), one stage after another.
 
-    Every motion is asked once and goes straight to its place: what a step costs does not grow with n.
+    Every motion is asked once, at best many of them together: what a step costs does not grow with n.
     """
     flat = instants.ravel()
-    names = (*DESIRED, *SLIDE)[: rows_of(cell.space)]
-    desired = {name: np.empty((flat.size, cell.n, cell.m)) for name in names}
-    for i in range(cell.n):
-        for name, part in zip(names, cell.told(i, flat), strict=True):
-            desired[name][:, i] = part
+    desired = dict(zip((*DESIRED, *SLIDE), cell.told_together(range(cell.n), flat), strict=False))
     weights = cell.weights(flat[:1] if cell.coupling.is_constant else flat)
     return {**desired, "weights": one_after_another(weights)}
