@@ -11,7 +11,6 @@ import sys
 from functools import cache
 from pathlib import Path
 
-import casadi as ca
 import mpmath
 import numpy as np
 import pytest
@@ -19,6 +18,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synctrl.compiled.compiler import compiler
+
+ca = pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
 
 FOLDER = Path(__file__).parents[1] / "synctrl" / "compiled"
 HEADERS = tuple((FOLDER / name).read_text("utf-8") for name in ("vectors.h", "elementary.h"))

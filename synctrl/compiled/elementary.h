@@ -30,44 +30,51 @@ static const unsigned long long two_over_pi[20] = {
     0x7527bac7ebe5f17b, 0x3d0739f78a5292ea, 0x6bfb5fb11f8d5d08, 0x56033046fc7b6bab,
 };
 
-/* The angle of one number of at least FAR, in integers: |x| = m 2^e, and of m (2/pi) 2^e the bits from 2 on are left
- * out, 190 bits behind the point kept. At most 62 of these vanish next to a multiple of pi/2, and 53 are not certain.
+typedef unsigned long long Word;
+typedef unsigned __int128 Words;
+
+/* (2/pi) m 2^e modulo 4, in units of 2^-190.
+ *
+ * Bits of 2/pi that make multiples of 4 are passed over, and the next 192 are taken. Of the result, the last 53 bits
+ * are not certain, and next to an integer as many as 62 say nothing: 75 are left.
  */
+static __attribute__((unused)) void quarters(Word m, int e, Word found[3]) {
+    int first = 64 + e - 2;
+    Word taken[3];
+    for (int k = 0; k < 3; k++) {
+        const Word *at = two_over_pi + first / 64 + k;
+        taken[k] = (Word)(((Words)at[0] << 64 | at[1]) >> (64 - first % 64));
+    }
+    Words low = (Words)m * taken[2], middle = (Words)m * taken[1] + (low >> 64);
+    found[0] = m * taken[0] + (Word)(middle >> 64), found[1] = (Word)middle, found[2] = (Word)low;
+}
+
+/* The angle of one number of at least FAR, in integers. */
 static __attribute__((unused)) void far_angle(double x, double *rest, double *excess, long long *quadrant) {
-    typedef unsigned long long word;
-    typedef unsigned __int128 words;
-    word image;
+    Word image, part[3];
     memcpy(&image, &x, sizeof image);
     int negative = (int)(image >> 63), exponent = (int)(image >> 52 & 0x7ff);
     *rest = x - x, *excess = 0, *quadrant = 0;
     if (exponent == 0x7ff) return; /* NaN */
+    quarters((image & 0xfffffffffffff) | 0x10000000000000, exponent - 1075, part);
 
-    word m = (image & 0xfffffffffffff) | 0x10000000000000, window[3];
-    int skip = exponent - 1075 - 2 + 64;
-    for (int k = 0; k < 3; k++) {
-        const word *at = two_over_pi + skip / 64 + k;
-        window[k] = (word)(((words)at[0] << 64 | at[1]) >> (64 - skip % 64));
-    }
-    words low = (words)m * window[2], middle = (words)m * window[1] + (low >> 64);
-    word part[3] = {m * window[0] + (word)(middle >> 64), (word)middle, (word)low};
-
-    word nearest = (part[0] + ((word)1 << 61)) >> 62;
+    Word nearest = (part[0] + ((Word)1 << 61)) >> 62;
     part[0] -= nearest << 62;
     int below = part[0] >> 63 != 0;
-    if (below) { /* than the nearest multiple */
+    if (below) { /* the nearest integer: change the sign */
         part[0] = ~part[0], part[1] = ~part[1], part[2] = -part[2];
         if (part[2] == 0 && ++part[1] == 0) part[0]++;
     }
-    int gone = 0;
-    if (part[0] == 0) part[0] = part[1], part[1] = part[2], gone = 64;
-    int zeros = __builtin_clzll(part[0]);
-    word top = (word)(((words)part[0] << 64 | part[1]) << zeros >> 64);
-    words product = (words)top * 0xc90fdaa22168c235; /* pi/2 2^63 */
-    word high = (word)(product >> 64), rounded = (high + 0x400) & ~(word)0x7ff;
+    int zeros = part[0] ? 0 : 64;
+    if (zeros) part[0] = part[1], part[1] = part[2];
+    int more = __builtin_clzll(part[0]);
+    Word top = (Word)(((Words)part[0] << 64 | part[1]) << more >> 64);
+    Word product = (Word)((Words)top * 0xc90fdaa22168c235 >> 64); /* by 2^63 pi/2; its first 53 bits, and the others: */
+    Word rounded = (product + 0x400) & ~(Word)0x7ff;
 
-    double scale = ldexp(below == negative ? 1 : -1, -61 - zeros - gone);
-    *rest = (double)rounded * scale;
-    *excess = (double)(long long)(rounded - high) * scale;
+    double unit = ldexp(below == negative ? 1 : -1, -61 - zeros - more);
+    *rest = (double)rounded * unit;
+    *excess = (double)(long long)(rounded - product) * unit;
     *quadrant = negative ? -(long long)nearest : (long long)nearest;
 }
 
@@ -98,13 +105,13 @@ typedef struct {
 } Circle;
 
 INSIDE Circle circle(Angle angle) {
-    vec r = angle.rest, z = r * r;
-    vec odd = -0x1.5555555555548p-3 + z * (0x1.111111110f7cbp-7 + z * (-0x1.a01a019bfd3a5p-13
-            + z * (0x1.71de35672e55fp-19 + z * (-0x1.ae5e5a09f56f2p-26 + z * 0x1.5d8fa8914e415p-33))));
-    vec even = 0x1.555555555554bp-5 + z * (-0x1.6c16c16c14f8bp-10 + z * (0x1.a01a019c839e8p-16
-             + z * (-0x1.27e4f7ea3fd83p-22 + z * (0x1.1ee9d75752e0bp-29 + z * -0x1.8fa46803f06fbp-37))));
+    vec r = angle.rest, z = r * r, w = z * z;
+    vec odd = (-0x1.5555555555548p-3 + z * 0x1.111111110f7cbp-7) + w * ((-0x1.a01a019bfd3a5p-13
+            + z * 0x1.71de35672e55fp-19) + w * (-0x1.ae5e5a09f56f2p-26 + z * 0x1.5d8fa8914e415p-33));
+    vec even = (0x1.555555555554bp-5 + z * -0x1.6c16c16c14f8bp-10) + w * ((0x1.a01a019c839e8p-16
+             + z * -0x1.27e4f7ea3fd83p-22) + w * (0x1.1ee9d75752e0bp-29 + z * -0x1.8fa46803f06fbp-37));
     vec near_1 = 1.0 - 0.5 * z, below = angle.excess * near_1 - z * r * odd; /* in this order -0 stays */
-    vec above = ((1.0 - near_1) - 0.5 * z) + (z * z * even + r * angle.excess);
+    vec above = ((1.0 - near_1) - 0.5 * z) + (w * even + r * angle.excess);
     vec sine = r - below, cosine = near_1 + above;
     return (Circle){sine, cosine, (r - sine) - below, (near_1 - cosine) + above};
 }
@@ -167,11 +174,11 @@ VECTOR vec v_atan2(vec y, vec x) {
     k = choose(back, 4.0 - k, k);
     t = flip(t, sign_bit(x));
 
-    vec z = t * t;
-    vec p = -0x1.5555555555552p-2 + z * (0x1.999999999901ep-3 + z * (-0x1.249249244ff4ep-3 + z * (0x1.c71c71a9d89b4p-4
-          + z * (-0x1.745d1374689a6p-4 + z * (0x1.3b135eff7da17p-4 + z * (-0x1.110c5ea886adfp-4
-          + z * (0x1.e181c09ecab1ep-5 + z * (-0x1.ac6d007713613p-5 + z * (0x1.77e7fe4b7f795p-5
-          + z * (-0x1.2feeddde3311ap-5 + z * (0x1.832c45a9a1ed0p-6 + z * -0x1.11a81116de8d6p-7)))))))))));
+    vec z = t * t, w = z * z;
+    vec p = (-0x1.5555555555552p-2 + z * 0x1.999999999901ep-3) + w * ((-0x1.249249244ff4ep-3 + z * 0x1.c71c71a9d89b4p-4)
+          + w * ((-0x1.745d1374689a6p-4 + z * 0x1.3b135eff7da17p-4) + w * ((-0x1.110c5ea886adfp-4
+          + z * 0x1.e181c09ecab1ep-5) + w * ((-0x1.ac6d007713613p-5 + z * 0x1.77e7fe4b7f795p-5)
+          + w * ((-0x1.2feeddde3311ap-5 + z * 0x1.832c45a9a1ed0p-6) + w * -0x1.11a81116de8d6p-7)))));
     vec found = k * 0x1.921fb54442d18p-1 + (t + (k * 0x1.1a62633145c07p-55 + t * z * p));
     return flip(found, sign_bit(y));
 }
@@ -210,11 +217,12 @@ INSIDE vec exponential(vec x, vec *k) {
     *k = (x * 0x1.71547652b82fep+0 + SHIFT) - SHIFT;
     vec a = x - *k * 0x1.62e42fefa38p-1, part = *k * 0x1.ef35793c7673p-45; /* log(2) in two parts */
     vec r = a - part, excess = part - (a - r);
-    vec p = 0.5 + r * (0x1.5555555555559p-3 + r * (0x1.555555555555ap-5 + r * (0x1.111111110f6aep-7
-          + r * (0x1.6c16c16c14431p-10 + r * (0x1.a01a01afe5874p-13 + r * (0x1.a01a01b0bf617p-16
-          + r * (0x1.71ddf852a53bdp-19 + r * (0x1.27e4c5916d63bp-22 + r * (0x1.af5ec0bd3e3fbp-26
-          + r * 0x1.1f9577e18bc36p-29)))))))));
-    return r + (r * r * p - excess);
+    vec w = r * r;
+    vec p = (0.5 + r * 0x1.5555555555559p-3) + w * ((0x1.555555555555ap-5 + r * 0x1.111111110f6aep-7)
+          + w * ((0x1.6c16c16c14431p-10 + r * 0x1.a01a01afe5874p-13) + w * ((0x1.a01a01b0bf617p-16
+          + r * 0x1.71ddf852a53bdp-19) + w * ((0x1.27e4c5916d63bp-22 + r * 0x1.af5ec0bd3e3fbp-26)
+          + w * 0x1.1f9577e18bc36p-29))));
+    return r + (w * p - excess);
 }
 
 /* Within 1 ulp, subnormal results too. */
@@ -263,9 +271,9 @@ VECTOR vec v_log(vec x) {
     vec k = from_bits((ivec)(image >> 52) | bits(splat(0x1p52))) - (0x1p52 + 1023) - where(subnormal, splat(54));
     vec f = from_bits((ivec)(image & 0xfffffffffffff) + bits(splat(0x1.6a09e667f3bcdp-1))) - 1.0;
     /* log(1 + f) = 2 artanh(s) = f - f f / 2 + s (f f / 2 + z p) */
-    vec s = f / (2.0 + f), z = s * s, half = 0.5 * f * f;
-    vec p = 0x1.5555555555592p-1 + z * (0x1.999999997fd72p-2 + z * (0x1.24924941f5294p-2 + z * (0x1.c71c5205ec95fp-3
-          + z * (0x1.74663fa755604p-3 + z * (0x1.39a1a66908ec3p-3 + z * 0x1.2f063acc1e800p-3)))));
+    vec s = f / (2.0 + f), z = s * s, w = z * z, half = 0.5 * f * f;
+    vec p = (0x1.5555555555592p-1 + z * 0x1.999999997fd72p-2) + w * ((0x1.24924941f5294p-2 + z * 0x1.c71c5205ec95fp-3)
+          + w * ((0x1.74663fa755604p-3 + z * 0x1.39a1a66908ec3p-3) + w * 0x1.2f063acc1e8p-3));
     vec found = k * 0x1.62e42fefa38p-1 - ((half - (s * (half + z * p) + k * 0x1.ef35793c7673p-45)) - f);
     if (any(~(is_less(splat(0), x) & is_less(x, splat(INFINITY))))) {
         found = choose(is_less(x, splat(INFINITY)), found, x);

@@ -106,7 +106,8 @@ VECTOR vec v_copysign(vec x, vec sign) { return flip(v_fabs(x), sign_bit(sign));
 VECTOR vec v_sign(vec x) { /* of 0 and NaN: themselves */
     return choose(is_less(splat(0), v_fabs(x)), v_copysign(splat(1), x), x);
 }
-VECTOR vec v_fmin(vec a, vec b) { return choose(is_less(a, b) | is_different(b, b), a, b); } /* the one that is no NaN */
+/* of a NaN and a number, the number */
+VECTOR vec v_fmin(vec a, vec b) { return choose(is_less(a, b) | is_different(b, b), a, b); }
 VECTOR vec v_fmax(vec a, vec b) { return choose(is_less(b, a) | is_different(b, b), a, b); }
 VECTOR vec v_sq(vec x) { return x * x; }
 VECTOR vec v_twice(vec x) { return 2.0 * x; }
