@@ -228,6 +228,16 @@ def test_a_wrong_digit_of_a_coefficient_is_seen(tmp_path):
     assert worst(wrong, "sin", np.linspace(-1, 1, 101)) > stated("sin")
 
 
+def test_polynomials_are_the_best_of_their_degree(monkeypatch):
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "scripts")
+    from polynomials import polynomials
+
+    written = {float.fromhex(text) for text in re.findall(r"-?0x[\da-f.]+p[+-]\d+", HEADERS[1])}
+    for name, (coefficients, largest) in polynomials().items():
+        assert {*coefficients} - {0.5} <= written, name
+        assert largest < 2.0**-57
+
+
 # -- special arguments ------------------------------------------------------------------------------------
 
 NUMPY = {"atan": "arctan", "asin": "arcsin", "acos": "arccos", "atan2": "arctan2", "inv": "reciprocal"}

@@ -5,7 +5,7 @@
  *
  * ulp: unit in the last place of the exact result. The errors stated are those that tests/test_vectors.py allows; they
  * hold for every double. Where C has a number for 0, infinite numbers and NaN, it is that one, with its sign.
- * The polynomials are the best ones of their degree, by Remez' exchange, in the relative error of the function.
+ * The polynomials have the least relative errors of their degrees: `scripts/polynomials.py` prints them.
  */
 
 #define INSIDE static inline __attribute__((always_inline, unused)) /* part of other functions */
