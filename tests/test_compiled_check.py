@@ -205,7 +205,7 @@ FAULTS = {
     "the integral's sign is lost": ("sign * a->integral[pair + j]", "a->integral[pair + j]"),
     "the place of the base": ("X(base, n, 12) X(desired", "X(base, one, 12) X(desired"),
     "the posture's gain": ("X(gain, n, nv) X(z, n, Z)", "X(posture, n, nv) X(z, n, Z)"),
-    "the weights of W": ("X(weights, n, 4*m*m) X(W_inv, n, nv)", "X(weights, n, 4*m*m) X(gain, n, nv)"),
+    "the weights of W": ("X(weights, n, weighs) X(W_inv, n, nv)", "X(weights, n, weighs) X(gain, n, nv)"),
     "another robot's damping": ("X(leak, one, m) X(K_r, n, K)", "X(leak, one, m) X(K_r, one, K)"),
     "another robot's true parameters": ("X(pi, n, bodies) X(true_base", "X(pi, one, bodies) X(true_base"),
     "Coulomb friction": ("* tanh(a->v[j] / a->smoothing[j])", "* (a->v[j] / a->smoothing[j])"),
@@ -236,7 +236,7 @@ def test_code_that_was_made_from_a_wrong_line_of_the_law_is_found(monkeypatch):
     from synctrl.control import law
 
     with monkeypatch.context() as patch:
-        patch.setattr(law, "compute_weighted_errors", lambda weights, error: np.matvec(weights.c, error))
+        patch.setattr(law, "compute_weighted_errors", lambda weights, error: 2 * error)
         wrong = sources_of(loop)
     monkeypatch.setattr(program, "generate", lambda kinds: iter(wrong))
     with refused(CompilationError, "generated code") as caught:

@@ -24,9 +24,10 @@ from . import structs
 from .agenda import Agenda
 from .hooks import Hooks
 from .known import check_known
-from .program import Program, one_after_another
+from .program import Program
 from .quantities import DESIRED, LOGS, SLIDE
 from .structs import Mark
+from .weighing import weighing_of
 
 #: bytes of references that one block of steps may need
 BLOCK_BYTES = 32_000_000
@@ -58,7 +59,7 @@ def blocks(program: Program, clock: Clock) -> Iterator[DesiredStretch]:
 
 def _step_bytes(cell: Cell) -> int:
     """Bytes of what is desired in one step."""
-    weights = 0 if cell.coupling.is_constant else 4 * cell.m**2
+    weights = 0 if cell.coupling.is_constant else weighing_of(cell).count(cell.m)
     return 3 * 8 * cell.n * (rows_of(cell.space) * cell.m + weights)
 
 
@@ -274,7 +275,7 @@ def _tables(cell: Cell, instants: np.ndarray) -> dict[str, np.ndarray]:
         for name, part in zip(names, cell.told(i, flat), strict=True):
             desired[name][:, i] = part
     weights = cell.weights(flat[:1] if cell.coupling.is_constant else flat)
-    return {**desired, "weights": one_after_another(weights)}
+    return {**desired, "weights": weighing_of(cell).numbers(weights)}
 
 
 __getattr__ = names_elsewhere(__name__, ".engine", Block="DesiredStretch")

@@ -23,6 +23,7 @@ from ..tasks.redundancy import Posture
 from ..tasks.spaces import BoundJointSpace, BoundTipSpace, JointSpace, TipSpace
 from .momentum import momentum_function
 from .plugged import Learning, learner, trace_law, trace_learning
+from .weighing import Weighing, weighing_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +40,7 @@ class Kind:
             as it is, if all robots with the mechanism share it, else None.
         gravity: in the world's axes, m/s^2.
         reference_acceleration, k_r_space: options of the controller.
+        weighing: structure of the weights.
         smoothing: velocity at which adapted Coulomb friction reaches tanh(1), or None without it.
         rotors: whether rotors are adapted too.
         made_of: names of the types that the user has plugged in.
@@ -57,6 +59,7 @@ class Kind:
     gravity: tuple[float, ...]
     reference_acceleration: str
     k_r_space: str
+    weighing: Weighing
     smoothing: float | None = None
     rotors: bool = False
     made_of: tuple[str, ...] = ()
@@ -143,6 +146,7 @@ class Kind:
             "spare": int(self.solves),
             "damped": int(self.damped),
             "watches": len(self.watches),
+            "weighs": self.weighing.count(self.m),
             "hand": int(self.holds),
             "gives": int(self.gives_at is not None),
         }
@@ -154,6 +158,7 @@ class Kind:
         matrix = None if self.matrix is None else self.matrix.tolist()
         options: list[Any] = [self.reference_acceleration, self.k_r_space, list(self.gravity)]
         options += [self.smoothing, self.rotors, list(self.made_of), self.holds, self.gives_at]
+        options += [list(self.weighing.parts), self.weighing.full]
         options += [None if part is None else part.serialize() for part in (*(self.learning or ()), self.law)]
         damping = asdict(self.space.damping) if self.damped else None  # type: ignore[union-attr, arg-type]
         space = [list(getattr(self.space, "rows", ())), damping, list(self.watches)]
@@ -262,6 +267,7 @@ def _kind(
         tuple(map(float, cell.robots[i].gravity_vector)),
         controller.reference_acceleration,
         controller.k_r_space,
+        weighing_of(cell),
         getattr(parameters, "smoothing", None),
         getattr(parameters, "armature", False),
         tuple(type(part).__qualname__ for part in (cell.space, parameters, rigid)),

@@ -69,6 +69,7 @@ class CompiledLoop:
     Attributes:
         sizes: lengths of rows, see `SIZES`, and the numbers of robots, pairs and objects, n, p and o, and
             r and h, of what network and plant remember.
+        weighing: structure of the weights.
         cell, quantities, work: what the driver is given; see `structs.py`.
         carried: true inertial parameters with every load, (loads, n, bodies).
         scratch: sizes of the scratch arrays arg, res, iw and w that the generated functions ask for.
@@ -79,6 +80,7 @@ class CompiledLoop:
 
     def __init__(self, loop: ClosedLoop, classified: Classified, library: ctypes.CDLL):
         self.loop, self.library = loop, library
+        self.weighing = classified.kinds[0].weighing
         cell, objects = loop.cell, int(isinstance(loop.plant, CarryingPlant))
         self.sizes = {**largest(classified.kinds), "n": cell.n, "p": cell.coupling.pairs, "o": objects}
         self.sizes |= {"r": loop.controller.network.start().size, "h": loop.plant.hidden0.size}
@@ -102,7 +104,7 @@ class CompiledLoop:
         """y' at one instant, for comparison with `ClosedLoop.evaluate`."""
         y, y_dot, first = np.ascontiguousarray(y), np.zeros(self.loop.size), np.zeros(1, dtype=np.intc)
         desired = dict(zip((*DESIRED, *SLIDE), reference.desired, strict=False))
-        weights = one_after_another(reference.weights)
+        weights = self.weighing.numbers(reference.weights)
         t = np.full(2, float(reference.t))
         addresses = {"disturbed": first, "loaded": first, "t": t}
         steps = structs.Steps(**{name: array.ctypes.data for name, array in addresses.items()})
@@ -253,12 +255,6 @@ def _agree(expected: State, found: State) -> None:
                 subject="generated code",
                 found=float(difference),
             )
-
-
-def one_after_another(weights: Sequence[np.ndarray]) -> np.ndarray:
-    """c, c', c'' and c^-1, (..., n, m, m) each, as rows of numbers, (..., n, 4 m m)."""
-    together = np.stack(weights, axis=-3)
-    return together.reshape(*together.shape[:-3], -1)
 
 
 def _constants(loop: ClosedLoop, classified: Classified) -> dict[str, np.ndarray]:

@@ -51,6 +51,7 @@ SIZES: Mapping[str, str] = MappingProxyType(
         "spare": "1 if the way to the joints is a pseudo-inverse, else 0",
         "damped": "1 if singular configurations are damped, else 0",
         "watches": "numbers that the guard watches",
+        "weighs": "numbers that weights are made of",
         "hand": "1 for robots whose tip holds an object, else 0",
         "gives": "1 if robots give way to forces inside the object, else 0",
     }
@@ -98,7 +99,9 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "slide": Quantity("instant", "n", "slides*m", "place of a point on what is carried"),
         "slide_dot": Quantity("instant", "n", "slides*m", "its velocity there"),
         "slide_ddot": Quantity("instant", "n", "slides*m", "its acceleration there"),
-        "weights": Quantity("instant", "n", "4*m*m", "c, c', c'' and c^-1"),
+        "weights": Quantity(
+            "instant", "n", "weighs", "what of c, c', c'' and c^-1 is no constant of the code"
+        ),
         "x": Quantity("work", "n", "m", "coordinates of the task"),
         "e": Quantity("work", "n", "m", "error"),
         "e_dot": Quantity("work", "n", "m", "its rate"),

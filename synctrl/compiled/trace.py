@@ -91,7 +91,7 @@ class Trace:
         told = (*DESIRED, *SLIDE) if self.kind.slides else DESIRED
         motion, desired = (np.stack([*map(self._row, names)]) for names in (("q", "v"), told))
         task, felt = self._given_way(self.space.measure(motion, desired), desired)
-        w, w_dot = law.compute_weighted_errors(Weights(*self._weights()), task.error)
+        w, w_dot = law.compute_weighted_errors(self._weights(), task.error)
         way = {} if task.inversion is None else task.inversion._asdict()
         return self._function(
             "measure",
@@ -157,7 +157,7 @@ class Trace:
     def _errors(self, task: Measurement) -> Errors:
         """What a law is told of one robot."""
         w, heard = (np.stack([*map(self._row, names)]) for names in (("w", "w_dot"), HEARD))
-        return Errors(None, task.error, task.x_dot, task.rates, w, heard, Weights(*self._weights()))
+        return Errors(None, task.error, task.x_dot, task.rates, w, heard, self._weights())
 
     def _asked(self, errors: Errors) -> Asked:
         """What the law asks of one robot."""
@@ -166,7 +166,7 @@ class Trace:
             Lambda, beta, K_eps, leak = map(self._row, ("Lambda", "beta", "K_eps", "leak"))
             return BoundSunMills(Lambda, beta, K_eps, kind.reference_acceleration, leak).command(errors)
         rows = (column_of(getattr(errors, name)) for name in ROWS)
-        parts = kind.law(*rows, self.given["weights"])
+        parts = kind.law(*rows, column_of(np.stack(self._weights())))
         return Asked(*(array_of(part, -1) for part in parts))
 
     def beside(self, learning: Learning) -> Iterator[Any]:
@@ -271,8 +271,8 @@ class Trace:
         """Gravity in the frame of a first joint's placement."""
         return self.ca.mtimes(base[0].T, self.ca.SX(self.ca.DM(self.kind.gravity)))
 
-    def _weights(self) -> np.ndarray:
-        return array_of(self.given["weights"], 4, self.kind.m, self.kind.m)
+    def _weights(self) -> Weights:
+        return self.kind.weighing.weights(self._row("weights"), self.kind.m)
 
     def _row(self, name: str) -> np.ndarray:
         """A quantity as an array of single symbols."""
