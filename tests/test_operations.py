@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from cells import SMALL_GAINS, small_cell
 from refusals import refused
 
-from synctrl import Coupling, Experiment
+from synctrl import Cell, Coupling, Cubic, Experiment, Gains, Member, load_robot
 from synctrl.compiled import weighing
 from synctrl.compiled.kind import classify
-from synctrl.compiled.operations import operations
+from synctrl.compiled.operations import counted, operations
+from synctrl.compiled.trace import SHORT
 from synctrl.compiled.weighing import weighing_of
 from synctrl.coupling.weights import SmoothWeights, Weights
 from synctrl.errors import CompilationError
+from synctrl.robots.documents import planar_arm, write_urdf
+from synctrl.robots.lumped import bodies_of, lumped_bodies
+from synctrl.robots.mechanism import mechanism
+from synctrl.robots.symbolic import Symbols
 
-pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+ca = pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
 
 AGREEMENT = 1e-9
 
@@ -143,3 +150,62 @@ def test_the_structure_of_weights_is_part_of_the_key():
     assert len(keys) == len(COUPLINGS)
     (kind,) = classify(weighted("ONE").closed_loop()).kinds
     assert replace(kind, weighing=weighing.MOVING).key() != kind.key()
+
+
+# -- bodies -----------------------------------------------------------------------------------------------
+
+
+def plant_of(robot, bodies):
+    """Operations of the bias and the mass matrix of bodies that are made somehow, and a function for both."""
+    fixed, base = mechanism(robot)
+    q, v, pi = (ca.SX.sym(name, size * robot.nv) for name, size in (("q", 1), ("v", 1), ("pi", 10)))
+    recursion = Symbols(fixed, q, ca.sin(q), ca.cos(q))
+    made = bodies(fixed, pi)
+    gravity = ca.SX(base.rotation.T @ robot.gravity_vector)
+    found = [recursion.bias(made, v, gravity), recursion.mass_matrix(made)]
+    function = ca.Function("plant", [q, v, pi], ca.cse(found))
+    return counted(function), function
+
+
+@pytest.mark.parametrize("name", ["planar2r", "a460", "ur5", "panda"])
+def test_lumped_bodies_move_alike_with_fewer_operations(name):
+    robot = load_robot(name)
+    (many, whole), (few, lumped) = (
+        plant_of(robot, way) for way in (lambda fixed, pi: bodies_of(pi), lumped_bodies)
+    )
+    assert few < many
+    state = np.random.default_rng(0).uniform(-1, 1, (2, robot.nv))
+    parts = zip(
+        whole(*state, robot.inertial_parameters), lumped(*state, robot.inertial_parameters), strict=True
+    )
+    for expected, found in parts:
+        expected, found = np.array(expected), np.array(found)
+        assert np.abs(found - expected).max() <= 1e-13 * (1 + np.abs(expected).max())
+
+
+def chain(joints):
+    """Two arms in a plane, as heavy with few joints as with many."""
+    with tempfile.TemporaryDirectory() as folder:
+        document = planar_arm([1 / joints] * joints, [6 / joints] * joints, f"planar{joints}r")
+        arm = load_robot(write_urdf(document, Path(folder) / "arm.urdf"))
+    start = np.full(joints, 0.3 / joints)
+    members = [
+        Member(arm, Cubic(start, 2 * start, 1.0), theta_hat0=0.7 * arm.inertial_parameters) for _ in range(2)
+    ]
+    return Experiment(Cell(members, Coupling.pair()), Gains(4, 4, 1e-3, 0.01, 1e-4), 0.01)
+
+
+def test_a_long_chain_computes_the_same_and_costs_the_same_per_joint():
+    same_run(chain(SHORT + 1), 0.01)
+    counts = []
+    for joints in (12, 16, 20):
+        (kind,) = classify(chain(joints).closed_loop()).kinds
+        counts.append(operations(kind)["evaluation"])
+    few, some, many = counts
+    assert many - some == some - few
+
+
+def test_operations_are_counted_and_nothing_else():
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    assert counted(ca.Function("f", [x, y], [x * y + 2, x])) == 2
+    assert counted(ca.Function("f", [x, y], [ca.sin(x) / y])) == 2

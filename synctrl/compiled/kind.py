@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from ..assembly.plant import CarryingPlant
 from ..control.controller import Controller
+from ..robots.lumped import Lumping, lumping
 from ..robots.mechanism import Mechanism, mechanism
 from ..robots.parameters import FrictionParameters
 from ..robots.robot import Robot
@@ -99,6 +100,11 @@ class Kind:
         """Entries of the state of the adaptation, without what an admittance adds."""
         return self.adapted if self.learning is None else self.learning.estimate.numel_in()
 
+    @cached_property
+    def lumping(self) -> Lumping:
+        """How the true inertial parameters are lumped."""
+        return lumping(self.true)
+
     @property
     def damped(self) -> bool:
         """Whether singular configurations are damped."""
@@ -140,7 +146,7 @@ class Kind:
             "P": self.adapted,
             "Z": self.learned if self.gives_at is None else self.gives_at + 12,
             "K": self.nv if self.k_r_space == "joint" else self.m,
-            "bodies": 10 * self.nv,
+            "bodies": self.lumping.size,
             "slides": int(self.slides),
             "tip": int(self.tip),
             "spare": int(self.solves),

@@ -71,7 +71,7 @@ class CompiledLoop:
             r and h, of what network and plant remember.
         weighing: structure of the weights.
         cell, quantities, work: what the driver is given; see `structs.py`.
-        carried: true inertial parameters with every load, (loads, n, bodies).
+        carried: true inertial parameters, lumped, with every load, (loads, n, bodies).
         scratch: sizes of the scratch arrays arg, res, iw and w that the generated functions ask for.
 
     Raises:
@@ -98,7 +98,7 @@ class CompiledLoop:
         library.work_sizes(sizes)
         self.scratch = tuple(sizes)
         self.work = self._work()
-        self.carried = _carried(loop.plant, self.sizes["bodies"])
+        self.carried = _carried(loop.plant, classified, self.sizes["bodies"])
 
     def state_dot(self, reference: Reference, y: np.ndarray, disturbance: np.ndarray) -> np.ndarray:
         """y' at one instant, for comparison with `ClosedLoop.evaluate`."""
@@ -286,11 +286,12 @@ def _placements(bases: Sequence[Any]) -> np.ndarray:
     return np.array([np.append(base.rotation.ravel(), base.translation) for base in bases])
 
 
-def _carried(plant: Plant, bodies: int) -> np.ndarray:
-    """True inertial parameters with every load of the schedule, (windows, n, bodies)."""
+def _carried(plant: Plant, classified: Classified, bodies: int) -> np.ndarray:
+    """True inertial parameters, lumped, with every load of the schedule, (windows, n, bodies)."""
+    lumps = [classified.kinds[k].lumping for k in classified.kind_of]
     windows = plant.schedule.robots
     pi = np.zeros((len(windows), len(windows[0]), bodies))
     for rows, robots in zip(pi, windows, strict=True):
-        for row, robot in zip(rows, robots, strict=True):
-            row[: 10 * robot.body_count] = robot.inertial_parameters
+        for row, robot, lumping in zip(rows, robots, lumps, strict=True):
+            row[: lumping.size] = lumping.matrix @ robot.inertial_parameters
     return pi

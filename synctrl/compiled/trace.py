@@ -20,6 +20,7 @@ from ..control.laws import Asked, Errors
 from ..control.laws.protocol import ROWS
 from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.weights import Weights
+from ..robots.articulated import accelerations
 from ..robots.mechanism import Mechanism
 from ..robots.symbolic import Symbols
 from ..tasks.algebra import limited
@@ -32,6 +33,9 @@ from .kind import Kind
 from .momentum import model_torque
 from .plugged import Learning
 from .quantities import DESIRED, FUNCTIONS, HEARD, QUANTITIES, SLIDE, columns
+
+#: joints up to which the mass matrix and a factor of it take fewer operations than articulated bodies
+SHORT = 8
 
 
 class TracedTip:
@@ -223,11 +227,15 @@ class Trace:
     # -- the plant ----------------------------------------------------------------------------------------
 
     def plant(self) -> Any:
-        """v' = M^-1 (tau - C v - g), through a Cholesky factor of M."""
-        pi, gravity = self.given["pi"], self._gravity(self._true_base())
+        """v' = M^-1 (tau - C v - g), through a factor of M, or joint after joint where there are many."""
+        bodies, gravity = self.kind.lumping.bodies(self.given["pi"]), self._gravity(self._true_base())
         recursion = Symbols(self.kind.true, self.q, self.given["sine"], self.given["cosine"])
-        bias = recursion.torque(pi, self.v, self.v, self.ca.SX.zeros(self.kind.nv), gravity)
-        v_dot = solve_positive(recursion.mass_matrix(pi), self.given["moving"] - bias)
+        moving = self.given["moving"]
+        if self.kind.nv > SHORT:
+            v_dot = accelerations(recursion, bodies, recursion.biased(bodies, self.v, gravity), moving)
+        else:
+            bias = recursion.bias(bodies, self.v, gravity)
+            v_dot = solve_positive(recursion.mass_matrix(bodies), moving - bias)
         return self._function("plant", v_dot=array_of(v_dot))
 
     def hand(self) -> Any:
