@@ -1,4 +1,4 @@
-"""The articulated-body algorithm with CasADi symbols: of n joints in a number of operations that grows like n.
+"""The articulated-body algorithm with CasADi symbols: operations of n joints grow like n.
 
 What a body with all that hangs from it opposes to an acceleration is found from the tips to the base, while
 its joints are free to give way; then the joints' accelerations follow from the base to the tips

@@ -4,8 +4,8 @@ Mass on the axis of a turning joint moves with the body before the joint as well
 mass that only has a second moment moves through a sliding joint unnoticed. So what of a body is like that may
 be counted to the body before it, from the tips to the base, where it does not matter any more (Khalil and
 Dombre, *Modeling, Identification and Control of Robots*, 2002, chapter 9). Of a body behind a turning joint
-seven of ten numbers remain. Of one that can only turn about one direction, such as all of a planar arm and the
-first of any, one moment of inertia stands for six. Torques, in numbers or in symbols, stay what they were.
+seven of ten numbers remain. Of one that can only turn about one direction, such as all of a planar arm and
+the first of any, one moment of inertia stands for six. Torques stay what they were.
 """
 
 from __future__ import annotations
