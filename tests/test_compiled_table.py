@@ -171,7 +171,7 @@ def test_the_driver_counts_columns_as_python_does(name, tmp_path):
 SMALL = dict(
     zip(
         (*SIZES, "n", "p", "o", "r", "h"),
-        (2, 3, 5, 7, 3, 30, 1, 1, 1, 1, 2, 1, 1, 4, 6, 1, 9, 14),
+        (2, 3, 5, 7, 3, 30, 1, 1, 1, 1, 2, 16, 1, 1, 4, 6, 1, 9, 14),
         strict=True,
     )
 )

@@ -12,8 +12,9 @@ from ..coupling.cell import Cell
 from ..coupling.desired import rows_of
 from ..simulation.advance import up_to_a_failure
 from ..simulation.clock import Clock, Stretch
-from .arrays import CompiledLoop, one_after_another
+from .arrays import CompiledLoop
 from .quantities import DESIRED, SLIDE
+from .weighing import weighing_of
 
 #: bytes of references that one block of steps may need
 BLOCK_BYTES = 32_000_000
@@ -43,7 +44,7 @@ def blocks(program: CompiledLoop, clock: Clock) -> Iterator[DesiredStretch]:
 
 def _step_bytes(cell: Cell) -> int:
     """Bytes of what is desired in one step."""
-    weights = 0 if cell.coupling.is_constant else 4 * cell.m**2
+    weights = 0 if cell.coupling.is_constant else weighing_of(cell).count(cell.m)
     return 3 * 8 * cell.n * (rows_of(cell.space) * cell.m + weights)
 
 
@@ -88,4 +89,4 @@ def tabulated(cell: Cell, instants: np.ndarray) -> dict[str, np.ndarray]:
     flat = instants.ravel()
     desired = dict(zip((*DESIRED, *SLIDE), cell.told_together(range(cell.n), flat), strict=False))
     weights = cell.weights(flat[:1] if cell.coupling.is_constant else flat)
-    return {**desired, "weights": one_after_another(weights)}
+    return {**desired, "weights": weighing_of(cell).numbers(weights)}
