@@ -13,7 +13,7 @@ from ..simulation.guard import checks, limits_of
 from . import structs
 from .arrays import CompiledLoop
 from .structs import Mark
-from .tables import DesiredStretch, tabulated
+from .tables import DesiredStretch, desired_in
 
 #: how long the library may be away, s: Ctrl-C is seen when it comes back
 AWAY = 0.05
@@ -73,7 +73,7 @@ class Stepper:
         nothing = Stretch(clock.steps, np.repeat(end, 2), yes, yes, np.array([clock.count]))
         due = np.array([run.every is None or clock.sampled_at_end(run.every)])
         before = clock.stretch(clock.steps - 1, clock.steps).middles
-        block = DesiredStretch(nothing, tabulated(run.loop.cell, np.array([clock.end] * 3)))
+        block = desired_in(run.loop.cell, nothing, no)
         self._say(block, nothing.times, marked(yes, yes, due, no), before)
 
     def call(self, first: int, last: int) -> None:
@@ -91,6 +91,7 @@ class Stepper:
         """What is desired in a block, what happens and when, and what acts in the middles of its steps."""
         self.program.tell(self.steps, block.desired)
         self.steps.length, self._block = len(marks), block
+        self.steps.ends = block.ends.ctypes.data
         self._times, self._marks = np.ascontiguousarray(times), marks
         schedules = self.run.schedule, self.program.loop.plant.schedule
         self._acting = [schedule.windows(middles).astype(np.intc) for schedule in schedules]

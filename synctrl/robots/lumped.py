@@ -11,6 +11,7 @@ the first of any, one moment of inertia stands for six. Torques stay what they w
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,8 +86,9 @@ def lumped_bodies(fixed: Mechanism, pi: Any) -> list[Body]:
     return bodies
 
 
+@lru_cache(maxsize=64)
 def lumping(fixed: Mechanism) -> Lumping:
-    """How the parameters of any such bodies are lumped."""
+    """How the parameters of any such bodies are lumped; robots that were placed from one ask but once."""
     import casadi as ca
 
     pi = ca.SX.sym("pi", 10 * len(fixed.joints))
