@@ -65,14 +65,12 @@ static __attribute__((unused)) void far_angle(double x, double *rest, double *ex
         part[0] = ~part[0], part[1] = ~part[1], part[2] = -part[2];
         if (part[2] == 0 && ++part[1] == 0) part[0]++;
     }
-    int zeros = part[0] ? 0 : 64;
-    if (zeros) part[0] = part[1], part[1] = part[2];
-    int more = __builtin_clzll(part[0]);
-    Word top = (Word)(((Words)part[0] << 64 | part[1]) << more >> 64);
+    int zeros = __builtin_clzll(part[0]); /* it is not 0: no double is that close to a multiple of pi/2 */
+    Word top = (Word)(((Words)part[0] << 64 | part[1]) << zeros >> 64);
     Word product = (Word)((Words)top * 0xc90fdaa22168c235 >> 64); /* by 2^63 pi/2; its first 53 bits, and the others: */
     Word rounded = (product + 0x400) & ~(Word)0x7ff;
 
-    double unit = ldexp(below == negative ? 1 : -1, -61 - zeros - more);
+    double unit = ldexp(below == negative ? 1 : -1, -61 - zeros);
     *rest = (double)rounded * unit;
     *excess = (double)(long long)(rounded - product) * unit;
     *quadrant = negative ? -(long long)nearest : (long long)nearest;
