@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..simulation.engines import Run
-from . import structs
+from . import processor, structs
 from .arrays import CompiledLoop
 from .kind import classify
 from .known import check_known
@@ -95,7 +95,7 @@ class Batch:
         check_known(run.loop)
         _check_alone(run)
         classified, known = classify(run.loop), {} if libraries is None else libraries
-        library = library_for(run.loop, classified, known, widest_lanes() if width is None else width)
+        library = library_for(run.loop, classified, known, processor.widest() if width is None else width)
         self._run, self._program = run, CompiledLoop(run.loop, classified, library)
         self._tables = Tables()
         self._bands = bands
