@@ -49,12 +49,12 @@ def test_code_for_another_processor_has_another_key(monkeypatch):
     ],
 )
 def test_the_widest_vectors_are_those_that_the_features_have(features, width):
-    assert processor.widest_lanes(features) == width
+    assert processor.widest(features) == width
 
 
 def test_this_processor_has_vectors_as_wide_as_its_features_say():
-    assert processor.widest_lanes() == processor.widest_lanes(processor.cpu_features())
-    assert processor.widest_lanes() in {1, *processor.WIDTHS.values()}
+    assert processor.widest() == processor.widest(processor.cpu_features())
+    assert processor.widest() in {1, *processor.WIDTHS.values()}
 
 
 def test_linux_names_features_of_each_processor_and_those_count_that_all_have():
@@ -76,7 +76,7 @@ def test_where_the_system_is_silent_every_processor_of_the_kind_has_two_doubles(
     monkeypatch.setattr(processor, "_cpuinfo", str)
     monkeypatch.setattr(processor, "_sysctl", str)
     monkeypatch.setattr(processor.platform, "machine", lambda: machine)
-    assert processor.widest_lanes(processor.cpu_features.__wrapped__()) == 2
+    assert processor.widest(processor.cpu_features.__wrapped__()) == 2
 
 
 # -- the flags --------------------------------------------------------------------------------------------

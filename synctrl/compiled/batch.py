@@ -22,7 +22,6 @@ from .arrays import CompiledLoop
 from .kind import classify
 from .known import check_known
 from .lanes import room, state_parts
-from .processor import widest_lanes
 from .program import library_for
 from .quantities import QUANTITIES, shape
 from .report import Ending, Worst

@@ -26,7 +26,7 @@ def cpu_features() -> tuple[str, ...]:
     return tuple(sorted({*(found or {platform.processor()}), always}))
 
 
-def widest_lanes(features: Collection[str] | None = None) -> int:
+def widest(features: Collection[str] | None = None) -> int:
     """How many doubles fit the widest vectors of this processor, or of one with these features."""
     found = cpu_features() if features is None else features
     return next((width for name, width in WIDTHS.items() if name in found), 1)

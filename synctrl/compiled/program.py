@@ -20,7 +20,6 @@ from .header import driver, prelude
 from .kind import Classified, Kind, classify, standing
 from .known import check_known, check_untouched
 from .lanes import narrowest
-from .processor import widest_lanes
 from .specimen import Specimen
 from .trace import Trace
 
