@@ -14,7 +14,8 @@ from synctrl.simulation.closed_loop import ClosedLoop
 
 def sources_of(loop: ClosedLoop) -> list[str]:
     """The C sources that are made for a closed loop, the driver last."""
-    return list(program.generate(classify(loop).kinds))
+    classified = classify(loop)
+    return list(program.generate(classified.kinds, program.robots_in_lanes(loop, classified)))
 
 
 def empty_cache(monkeypatch: pytest.MonkeyPatch, folder) -> None:
@@ -29,7 +30,7 @@ def check_fault(loop: ClosedLoop, sources: list[str], fault: tuple[str, str], mo
     *functions, driver = sources
     text, other = fault
     assert text in driver
-    monkeypatch.setattr(program, "generate", lambda kinds: iter([*functions, driver.replace(text, other)]))
+    monkeypatch.setattr(program, "generate", lambda kinds, width: iter([*functions, driver.replace(text, other)]))
     with refused(CompilationError, "generated code") as caught:
         Program(loop)
     assert not caught.value.found <= program.AGREEMENT

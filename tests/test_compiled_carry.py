@@ -38,7 +38,7 @@ from synctrl.compiled import program
 from synctrl.compiled.carrying import _solve
 from synctrl.compiled.known import check_known
 from synctrl.compiled.program import Program
-from synctrl.compiled.structs import functions_of
+from synctrl.compiled.header import functions_of
 from synctrl.control.adaptation import Leakage
 from synctrl.control.laws import ComputedTorque
 from synctrl.coupling.cell import Reference

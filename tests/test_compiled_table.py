@@ -16,7 +16,8 @@ from synctrl import CartesianSpace, Cell, Experiment
 from synctrl.compiled import structs
 from synctrl.compiled.compiler import compiler
 from synctrl.compiled.kind import classify
-from synctrl.compiled.program import Program, _constants
+from synctrl.compiled.arrays import _constants
+from synctrl.compiled.program import Program
 from synctrl.compiled.quantities import (
     FUNCTIONS,
     LOGS,
@@ -27,7 +28,7 @@ from synctrl.compiled.quantities import (
     owned_by,
     shape,
 )
-from synctrl.compiled.structs import functions_of, header, largest
+from synctrl.compiled.header import functions_of, header, largest
 from synctrl.compiled.trace import Trace
 from synctrl.control.adaptation import Natural
 from synctrl.errors import CompilationError

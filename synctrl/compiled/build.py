@@ -87,7 +87,7 @@ def digest_of_sources(package: Path = Path(__file__).parents[1]) -> str:
     files = sorted(path for room in ROOMS for path in (package / room).rglob("*"))
     found = hashlib.sha256()
     for path in files:
-        if path.suffix in (".py", ".c"):
+        if path.suffix in (".py", ".c", ".h"):
             content = path.read_bytes()
             found.update(f"{path.relative_to(package)} {len(content)}\n".encode() + content)
     return found.hexdigest()

@@ -19,7 +19,7 @@ from time import monotonic
 from ..errors import CompilationError, MissingDependencyError
 
 #: -O1, because generated code is one long sum of products: -O2 makes it no faster, only longer to compile
-FLAGS = ("-O1", "-fPIC", "-fno-math-errno", "-ffp-contract=off")
+FLAGS = ("-O2", "-march=native", "-fPIC", "-fno-math-errno", "-ffp-contract=off")
 #: how long one call of the compiler may take, s; the largest arms take about a minute on a slow machine
 LONGEST = 900.0
 #: how long it may take to say its version, s
@@ -46,6 +46,10 @@ def compiler() -> tuple[str, ...]:
         "engine='compiled' needs cc, gcc or clang, and found none; install one, or use engine='pinocchio'",
         subject="C compiler",
     )
+
+
+def widest_lanes() -> int:
+    return 8
 
 
 def compiler_version(command: tuple[str, ...]) -> str:
