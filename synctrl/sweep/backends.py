@@ -7,8 +7,9 @@ import contextlib
 import logging
 import sys
 import threading
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 from pathlib import Path
 from traceback import walk_stack
@@ -76,12 +77,11 @@ def _threads(runner: Runner, payload: bytes, workers: int) -> Crew:
     def crew(batches: Iterable[Batch]) -> Iterator[list[Outcome]]:
         waiting = iter(batches)
         with ThreadPoolExecutor(workers) as pool:
-            running = {pool.submit(run, batch) for batch in islice(waiting, 2 * workers)}
+            running = deque(pool.submit(run, batch) for batch in islice(waiting, 2 * workers))
             try:
                 while running:
-                    done, running = wait(running, return_when=FIRST_COMPLETED)
-                    running |= {pool.submit(run, batch) for batch in islice(waiting, len(done))}
-                    yield from (each.result() for each in done)
+                    yield running.popleft().result()
+                    running.extend(pool.submit(run, batch) for batch in islice(waiting, 1))
             finally:
                 for each in running:
                     each.cancel()
