@@ -1,9 +1,9 @@
 """Runs of one experiment side by side: a run per lane, with measures taken on the way instead of a log.
 
-All runs share robots, coupling, desired motion, instants and what happens at them; what differs is numbers: gains,
-parameters, the start. Such numbers are given as columns, an array per quantity with a row per run. A run that ends
-before its time leaves the others alone. What is measured of a run does not depend on who is beside it, nor on how many
-lanes there are.
+All runs share robots, coupling, desired motion, instants and what happens at them; what differs is numbers:
+gains, parameters, the start. Such numbers are given as columns, an array per quantity with a row per run. A
+run that ends before its time leaves the others alone. What is measured of a run does not depend on who is
+beside it, nor on how many lanes there are.
 """
 
 from __future__ import annotations
@@ -17,9 +17,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..simulation.engines import Run
-from . import structs
+from . import processor, structs
 from .arrays import CompiledLoop
-from .compiler import widest_lanes
 from .kind import classify
 from .known import check_known
 from .lanes import room, state_parts
@@ -50,7 +49,8 @@ class Measured(NamedTuple):
         step_error: error of the worst step and the largest velocity, in rad/s, and the end of that step, s,
             (runs, 3); see `StepError`.
         joint: in a row of all robots' joints, at which it was, (runs,); -1 if no step was looked at.
-        status: 0 of a run that went to its end, else what the guard found, see `stepper.found_check`, (runs,).
+        status: 0 of a run that went to its end, else what the guard found, see `stepper.found_check`,
+            (runs,).
         stop_time: when it ended, s, (runs,).
         robot, value: at which robot, and the number that was too large, (runs,).
         instants: how many instants were looked at in a run that went to its end.
@@ -94,7 +94,7 @@ class Batch:
         check_known(run.loop)
         _check_alone(run)
         classified, known = classify(run.loop), {} if libraries is None else libraries
-        library = library_for(run.loop, classified, known, widest_lanes() if width is None else width)
+        library = library_for(run.loop, classified, known, processor.widest() if width is None else width)
         self._run, self._program = run, CompiledLoop(run.loop, classified, library)
         self._tables = Tables()
         self._bands = bands
@@ -104,8 +104,9 @@ class Batch:
         """Make some runs.
 
         Args:
-            columns: what differs from the planned run, by names of quantities: constants of the cell, "q", "v", "z" and
-                "memory" at the start, (count, rows, columns); "pi" and "disturbance", (count, windows, rows, columns).
+            columns: what differs from the planned run, by names of quantities: constants of the cell, "q",
+                "v", "z" and "memory" at the start, (count, rows, columns); "pi" and "disturbance", (count,
+                windows, rows, columns).
             count: number of runs.
 
         Raises:
@@ -127,7 +128,7 @@ class Batch:
         """A column of the right shape."""
         if name not in QUANTITIES or QUANTITIES[name].owner not in ("cell", "state", "load", "disturbance"):
             raise InputError.expected("a quantity that runs have from their start", name, "columns")
-        expected = shape(name, self._program.sizes)
+        expected: tuple[int, ...] = shape(name, self._program.sizes)
         windows = {"pi": self._program.carried, "disturbance": self._run.schedule.torques}
         if name in windows:
             expected = (len(windows[name]), *expected)
@@ -202,12 +203,19 @@ class _Side(Stepper):
         for array in self._kept.values():
             array[..., status != 0] = np.nan  # of a run that ended early nothing is known
         worst = self._worst
-        errors = (self._errors(kind, t) for kind in ("tracking", "sync"))
-        steps = np.stack((worst.largest, worst.speed, worst.time), axis=1)
-        torque = [self._runs(f"torque {name}") for name in ("torque", "cut")]
-        joint = worst.joint(np.arange(len(status)))
-        ended = status, self._stop, robot, value
-        return Measured(*errors, *torque, steps, joint, *(part.copy() for part in ended), self._tally.rows)
+        return Measured(
+            tracking_error=self._errors("tracking", t),
+            sync_error=self._errors("sync", t),
+            peak_torque=self._runs("torque torque"),
+            cut=self._runs("torque cut"),
+            step_error=np.stack((worst.largest, worst.speed, worst.time), axis=1),
+            joint=worst.joint(np.arange(len(status))),
+            status=status.copy(),
+            stop_time=self._stop.copy(),
+            robot=robot.copy(),
+            value=value.copy(),
+            instants=self._tally.rows,
+        )
 
     def _errors(self, kind: str, t: np.ndarray) -> MeasuredErrors:
         peak, ise, final, outside = (
@@ -261,9 +269,17 @@ def _joined(parts: Iterable[Measured], count: int) -> Measured:
     """Measures of all runs, without the lanes that were too many."""
     listed = list(parts)
 
-    def one(arrays: tuple) -> np.ndarray:
-        return np.concatenate(arrays)[:count]
+    def one(arrays: Iterable[np.ndarray]) -> np.ndarray:
+        return np.concatenate(list(arrays))[:count]
 
-    errors = [MeasuredErrors(*map(one, zip(*(part[k] for part in listed), strict=True))) for k in (0, 1)]
-    rest = [one(arrays) for arrays in zip(*(part[2:-1] for part in listed), strict=True)]
-    return Measured(*errors, *rest, max(part.instants for part in listed))
+    def errors(kind: str) -> MeasuredErrors:
+        of_kind = [getattr(part, kind) for part in listed]
+        return MeasuredErrors(*(one(arrays) for arrays in zip(*of_kind, strict=True)))
+
+    names = [name for name in Measured._fields if name not in ("tracking_error", "sync_error", "instants")]
+    return Measured(
+        tracking_error=errors("tracking_error"),
+        sync_error=errors("sync_error"),
+        **{name: one(getattr(part, name) for part in listed) for name in names},
+        instants=max(part.instants for part in listed),
+    )

@@ -1,8 +1,8 @@
 """C from the instructions of CasADi functions, for numbers that are vectors of lanes.
 
-CasADi would write C itself, but for one `double` at a time. Here every instruction becomes one line that works on a
-`vec`, see `vectors.h`: as many robots, or runs, as it has lanes. Nothing is reordered, so the bits of a result do not
-depend on how many lanes there are.
+CasADi would write C itself, but for one `double` at a time. Here every instruction becomes one line that
+works on a `vec`, see `vectors.h`: as many robots, or runs, as it has lanes. Nothing is reordered, so the bits
+of a result do not depend on how many lanes there are.
 """
 
 from __future__ import annotations
@@ -123,15 +123,16 @@ def _instructions(function: Any) -> Iterator[str]:
     import casadi as ca
 
     lines = [*_lines(function)]
-    asked = {(line.operation, line.given[0]): line.result for line in lines if line.given}
+    asked = {(line.operation, line.given[0]): line.result for line in lines}
     for line in lines:
-        both = [asked.get((operation, *line.given[:1])) for operation in (ca.OP_SIN, ca.OP_COS)]
+        angle = line.given[0]
+        both = asked.get((ca.OP_SIN, angle), ""), asked.get((ca.OP_COS, angle), "")
         if line.operation == ca.OP_OUTPUT:
-            yield f"{line.result} = {line.given[0]};"
-        elif line.operation not in (ca.OP_SIN, ca.OP_COS) or None in both or line.result not in both:
+            yield f"{line.result} = {angle};"
+        elif line.result not in both or "" in both:
             yield f"const vec {line.result} = {_text(function, line)};"
         elif line.result == min(both, key=lambda name: int(name[1:])):
-            yield f"vec {both[0]}, {both[1]}; v_sincos({line.given[0]}, &{both[0]}, &{both[1]});"
+            yield f"vec {both[0]}, {both[1]}; v_sincos({angle}, &{both[0]}, &{both[1]});"
 
 
 def _lines(function: Any) -> Iterator[_Line]:

@@ -1,8 +1,8 @@
 """The text in C that stands before the driver, and before a generated function.
 
-It has vectors, sizes, lists of quantities, the structures, and a table of generated functions. A list is a macro
-that is applied to every quantity in it, with its name, its rows and its columns, so that the driver says once
-what is done with each. The driver's files stand one behind another, see `DRIVER`.
+It has vectors, sizes, lists of quantities, the structures, and a table of generated functions. A list is a
+macro that is applied to every quantity in it, with its name, its rows and its columns, so that the driver
+says once what is done with each. The driver's files stand one behind another, see `DRIVER`.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Lanes: what stands side by side in the vectors of generated code, and how arrays are put there.
 
-An array of a quantity has a row per robot or pair. In the code a number is a vector of `width` lanes. Lanes are
-either runs of one cell, or robots of one run: then a row of the code is one of `width` robots, or pairs, one after
-another, and lanes that are too many repeat the last one. Whatever is neither a robot's nor a pair's is the same in all
-lanes. With one lane both are the arrays as they are.
+An array of a quantity has a row per robot or pair. In the code a number is a vector of `width` lanes. Lanes
+are either runs of one cell, or robots of one run: then a row of the code is one of `width` robots, or pairs, one
+after another, and lanes that are too many repeat the last one. Whatever is neither a robot's nor a pair's is
+the same in all lanes. With one lane both are the arrays as they are.
 """
 
 from __future__ import annotations
@@ -88,8 +88,8 @@ class Lanes(NamedTuple):
     def unpacked(self, name: str, array: np.ndarray, sizes: Mapping[str, int]) -> np.ndarray:
         """The opposite of `packed`, of one run: (rows in the code, columns, width) -> (rows, columns)."""
         if name == "memory" and self.scattered:
-            rows = array.reshape(-1, sizes["m"], self.width)
-            return self._gathered(rows, sizes["p"]).reshape(-1, 1)
+            pairs = array.reshape(-1, sizes["m"], self.width)
+            return self._gathered(pairs, sizes["p"]).reshape(-1, 1)
         rows = QUANTITIES[name].rows
         return self._gathered(array, sizes[rows]) if rows in ("n", "p") and self.scattered else array[..., 0]
 
@@ -128,7 +128,7 @@ class Compared(NamedTuple):
 def compared(coupling: Coupling, lanes: Lanes, m: int) -> Compared:
     """Who is compared with whom, in lanes, for tasks of m coordinates.
 
-    Robots in the lanes of one row may be in different numbers of pairs: what is missing counts with the sign 0.
+    Robots in the lanes of one row may be in different numbers of pairs: what is missing has the sign 0.
     """
     first, incident, signs = coupling.incidence
     pairs, robots = lanes.members(coupling.pairs), lanes.members(coupling.robots)

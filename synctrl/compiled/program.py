@@ -11,10 +11,10 @@ import numpy as np
 from ..control.network import BoundIdeal
 from ..errors import CompilationError
 from ..simulation.closed_loop import ClosedLoop, State
+from . import processor
 from .arrays import CompiledLoop
 from .build import cached_library, content_key, require_casadi
 from .carrying import object_function
-from .compiler import widest_lanes
 from .emit import written
 from .header import driver, prelude
 from .kind import Classified, Kind, classify, standing
@@ -78,7 +78,7 @@ def robots_in_lanes(loop: ClosedLoop, classified: Classified, widest: int | None
     """
     ideal = isinstance(loop.controller.network, BoundIdeal)
     alone = len(classified.kinds) > 1 or not ideal or loop.devices.settings
-    return 1 if alone else narrowest(loop.cell.n, widest_lanes() if widest is None else widest)
+    return 1 if alone else narrowest(loop.cell.n, processor.widest() if widest is None else widest)
 
 
 def library_for(

@@ -88,7 +88,7 @@ class Stepper:
         raise NotImplementedError
 
     def _say(self, block: DesiredStretch, times: np.ndarray, marks: np.ndarray, middles: np.ndarray) -> None:
-        """What is desired in a block, what happens in it and when, and what acts in the middles of its steps."""
+        """What is desired in a block, what happens and when, and what acts in the middles of its steps."""
         self.program.tell(self.steps, block.desired)
         self.steps.length, self._block = len(marks), block
         self._times, self._marks = np.ascontiguousarray(times), marks

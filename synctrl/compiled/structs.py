@@ -33,16 +33,16 @@ class Cell(ctypes.Structure):
     """What does not change in a run: sizes, who is compared with whom, and whether joints rub.
 
     Attributes:
-        n, p, o, r, h: rows of robots, pairs, objects that are carried, and numbers that the network and the plant
-            remember; where lanes are robots, a row is one of several robots, or pairs.
+        n, p, o, r, h: rows of robots, pairs, objects that are carried, and numbers that the network and the
+            plant remember; where lanes are robots, a row is one of several robots, or pairs.
         robots, pairs: how many there are.
         arity: robots in one pair.
         scattered: whether lanes are robots, so that who is compared may be in other lanes.
         kind: of each row of robots, and then of each object.
-        edge, sign: (p, arity, lanes), where the rows of w begin of robots that are compared, as numbers from its
-            beginning, and entries of S.
-        first, incident, incident_sign: where the pairs of a row of robots begin, (n + 1), and row after row its
-            pairs, (terms, lanes), where their rows of epsilon begin, with entries of S.
+        edge, sign: (p, arity, lanes), where the rows of w begin of robots that are compared, as numbers from
+            its beginning, and entries of S.
+        first, incident, incident_sign: where the pairs of a row of robots begin, (n + 1), and row after row
+            its pairs, (terms, lanes), where their rows of epsilon begin, with entries of S.
         rubs, saturates: whether there is friction, and whether torque is cut off.
         exchange: how the robots hear of each other.
     """
@@ -185,8 +185,8 @@ class Report(ctypes.Structure):
         rows: how many were logged.
         step: which one it is.
         ended: how many runs have ended.
-        status, at, robot, value: what was found in every lane that is a run, or in the only run: 0 for nothing,
-            in which step, at which robot, and the number that was too large.
+        status, at, robot, value: what was found in every lane that is a run, or in the only run: 0 for
+            nothing, in which step, at which robot, and the number that was too large.
     """
 
     _fields_ = [
