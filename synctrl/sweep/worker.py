@@ -58,7 +58,8 @@ class Prepared:
         self._known = list(_paths(experiment))
         self._engine, self._libraries = find_engine(engine), dict[str, Any]()
         if engine == "compiled":
-            from ..compiled.engine import Compiled, Tables
+            from ..compiled.engine import Compiled
+            from ..compiled.tables import Tables
 
             self._engine = Compiled(self._libraries, Tables())
             self._engine.load(run)
