@@ -16,6 +16,7 @@ from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .distributions import Value
 from .factors import Factor, Setup
+from .further import further_values
 from .measures import MEASURES, Doubt, doubt_of, measures
 from .rows import COMPLETED, REFUSED, STOPPED, Row, columns
 
@@ -49,12 +50,14 @@ class Job(NamedTuple):
         factors: how.
         bands: settling bands by kind of error.
         keep_every: which of the logged instants are kept, or None for no trajectories.
+        further: names of the measures of `FURTHER` that rows have too, after all others.
     """
 
     base: Setup
     factors: tuple[Factor, ...]
     bands: Mapping[str, Band]
     keep_every: int | None = None
+    further: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"Job: {self.base!r}, {len(self.factors)} factors"
@@ -62,7 +65,7 @@ class Job(NamedTuple):
     @property
     def columns(self) -> list[str]:
         """Names of the entries of a row."""
-        return columns(factor.name for factor in self.factors)
+        return columns((factor.name for factor in self.factors), (*MEASURES, *self.further))
 
     def setup(self, values: Sequence[Value]) -> Setup:
         """The base with all factors applied, in their order."""
@@ -177,10 +180,11 @@ class Runner:
         if error is not None:  # halves of surrogate pairs, which a name may have, become question marks
             cause = f"{type(error).__name__}: {error}".encode(errors="replace").decode()
         time = error.time if isinstance(error, SimulationError) else None
-        values: list[Any] = [None] * len(MEASURES)
+        values: list[Any] = [None] * (len(MEASURES) + len(self.job.further))
         doubt = None
         if status == COMPLETED and result is not None:
             values, doubt = measures(result, self.job.bands), doubt_of(result)
+            values += further_values(self.job.further, self.job.setup(task.values))
         row = [task.run, *task.values, status, cause, None if time is None else float(time), *values]
         return Outcome(row, self._keep(task, result), doubt)
 
