@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from faults import check_fault, empty_cache, sources_of
+from faults import check_fault, empty_cache, row, sources_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
@@ -146,9 +146,9 @@ def test_other_masses_and_dampings_and_none_need_no_new_code():
 
 #: faults of the lists before the driver and of the driver: a text, and what stands in its place
 FAULTS = {
-    "another hand's share": ("X(share, n, gives*36)", "X(share, one, gives*36)"),
-    "forces of a moment ago": ("    if (c->o) { turn(c, a); feel(c, a, k); }\n", ""),
-    "another robot's force": ("X(felt, n, gives*6)", "X(felt, one, gives*6)"),
+    "another hand's share": row("share", "gives*36"),
+    "forces of a moment ago": ("    if (c->o) { turn(c, a); feel(c, a); }\n", ""),
+    "another robot's force": row("felt", "gives*6"),
 }
 
 

@@ -23,6 +23,7 @@ from typing import NamedTuple
 from ..errors import CompilationError, MissingDependencyError
 from .cache import building_folder, executable_place, open_cache, read_file, remove_leftovers
 from .compiler import FLAGS, compile_library, compiler, compiler_version, fault
+from .processor import cpu_features
 
 #: rooms of the package that generated code is made from, or compared with
 ROOMS = ("robots", "tasks", "coupling", "control", "simulation", "assembly", "compiled")
@@ -70,13 +71,15 @@ def require_casadi() -> str:
 
 
 def content_key(*parts: object) -> str:
-    """Digest of plain data, of all code that generates code or that it is compared with, and of the compiler.
+    """Digest of plain data, of all code that generates code or is compared with it, compiler and processor.
+
+    So two machines may share a cache, and neither runs code that was made for the other's processor.
 
     Raises:
         MissingDependencyError, CompilationError: there is no compiler, or it cannot be run.
     """
     command = compiler()
-    version, machine = compiler_version(command), [platform.system(), platform.machine()]
+    version, machine = compiler_version(command), [platform.system(), platform.machine(), cpu_features()]
     content = json.dumps([*parts, command, version, machine, FLAGS, digest_of_sources()], sort_keys=True)
     return hashlib.sha256(content.encode()).hexdigest()
 
@@ -87,7 +90,7 @@ def digest_of_sources(package: Path = Path(__file__).parents[1]) -> str:
     files = sorted(path for room in ROOMS for path in (package / room).rglob("*"))
     found = hashlib.sha256()
     for path in files:
-        if path.suffix in (".py", ".c"):
+        if path.suffix in (".py", ".c", ".h"):
             content = path.read_bytes()
             found.update(f"{path.relative_to(package)} {len(content)}\n".encode() + content)
     return found.hexdigest()

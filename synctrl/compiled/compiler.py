@@ -8,18 +8,28 @@ import shlex
 import shutil
 import signal
 import subprocess
+import sys
 import threading
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import monotonic
 
 from ..errors import CompilationError, MissingDependencyError
 
-#: -O1, because generated code is one long sum of products: -O2 makes it no faster, only longer to compile
-FLAGS = ("-O1", "-fPIC", "-fno-math-errno", "-ffp-contract=off")
+#: for the processor of this machine, which is in the key of the cache, where the compiler knows how
+NATIVE = "-march=native"
+#: products and sums are rounded one by one, so that results do not depend on the compiler
+FLAGS = ("-O2", NATIVE, "-ffp-contract=off", "-fno-math-errno", "-fPIC")
+#: what the program of the package ziglang is called with: without checks that end a process, and without the
+#: libraries for them and for arithmetic that processors do not have, which it would have to compile first
+ZIG = ("cc", "-fno-sanitize=undefined", *(() if sys.platform == "win32" else ("--rtlib=none",)))
+#: variables by which it is told where to keep what it makes on the way
+_ZIG_PLACES = ("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR")
 #: how long one call of the compiler may take, s; the largest arms take about a minute on a slow machine
 LONGEST = 900.0
 #: how long it may take to say its version, s
@@ -31,7 +41,7 @@ GLANCE = 0.05
 
 
 def compiler() -> tuple[str, ...]:
-    """The machine's C compiler: the environment variable CC, or cc, gcc or clang.
+    """The C compiler: the environment variable CC, or cc, gcc or clang, or that of the package ziglang.
 
     Raises:
         MissingDependencyError: there is none, or CC does not name one; the message says why.
@@ -42,8 +52,11 @@ def compiler() -> tuple[str, ...]:
             return command
     if named:
         raise _bad_cc(f"'{named[0]}' {_why_not(named[0])}")
+    if zig := _zig():
+        return zig
     raise MissingDependencyError(
-        "engine='compiled' needs cc, gcc or clang, and found none; install one, or use engine='pinocchio'",
+        "engine='compiled' needs cc, gcc or clang, and found none; install one, for example by "
+        "pip install 'synctrl[compiler]', or use engine='pinocchio'",
         subject="C compiler",
     )
 
@@ -57,6 +70,16 @@ def compiler_version(command: tuple[str, ...]) -> str:
     return _printed_version(command, shutil.which(command[0]))
 
 
+def flags(command: tuple[str, ...]) -> list[str]:
+    """The flags for a compiler, without what it does not know; it is asked once in a process.
+
+    Raises:
+        CompilationError: it cannot be run, or does not come to an end.
+    """
+    native = NATIVE in FLAGS and _knows_native(command, shutil.which(command[0]))
+    return [flag for flag in FLAGS if native or flag != NATIVE]
+
+
 def compile_library(sources: Iterable[str], folder: Path) -> Path:
     """Compile each source as soon as it is there, as many at a time as there are cores, and link them.
 
@@ -66,10 +89,11 @@ def compile_library(sources: Iterable[str], folder: Path) -> Path:
         CompilationError: the compiler refuses, hangs, or does not write what it should.
     """
     command, stop = compiler(), threading.Event()
+    compiling = [*command, *flags(command)]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         try:
             jobs = [
-                pool.submit(_compile, command, source, folder / f"part{k}.c", stop)
+                pool.submit(_compile, compiling, source, folder / f"part{k}.c", stop)
                 for k, source in enumerate(sources)
             ]
             objects = [str(job.result()) for job in jobs]
@@ -80,12 +104,15 @@ def compile_library(sources: Iterable[str], folder: Path) -> Path:
     return _make(folder / "library.so", [*command, "-shared", *objects, "-lm"], stop)
 
 
-def run(command: Iterable[str], seconds: float, stop: threading.Event | None = None) -> tuple[int, str]:
+def run(
+    command: Iterable[str], seconds: float, place: Path, stop: threading.Event | None = None
+) -> tuple[int, str]:
     """Run a program in a process group of its own, and leave none of that group behind.
 
     Args:
         command: the program and its arguments.
         seconds: how long it may take, s.
+        place: a folder for what it makes on the way.
         stop: ends it early.
 
     Returns:
@@ -102,6 +129,7 @@ def run(command: Iterable[str], seconds: float, stop: threading.Event | None = N
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             start_new_session=True,
+            env={**os.environ, **dict.fromkeys(_ZIG_PLACES, str(place / "zig"))},
         )
     except (OSError, ValueError) as error:
         raise fault(command[0], "cannot be run", f": {error}") from error
@@ -131,6 +159,19 @@ def _named() -> tuple[str, ...]:
         raise _bad_cc(f"{text!r} cannot be split into words") from error
 
 
+def _zig() -> tuple[str, ...] | None:
+    """The compiler of the package ziglang, if that is installed.
+
+    It is the program itself: `python -m ziglang` would look for a module of this name in the working folder.
+    """
+    found = find_spec("ziglang")
+    for folder in (found and found.submodule_search_locations) or ():
+        program = os.path.join(folder, "zig.exe" if sys.platform == "win32" else "zig")
+        if os.access(program, os.X_OK):
+            return program, *ZIG
+    return None
+
+
 def _bad_cc(found: str) -> MissingDependencyError:
     return MissingDependencyError(
         "engine='compiled' needs a C compiler, expected a command such as gcc or clang; "
@@ -151,12 +192,26 @@ def _why_not(program: str) -> str:
 
 @cache
 def _printed_version(command: tuple[str, ...], found_at: str | None) -> str:
-    return run([*command, "--version"], LONGEST_VERSION)[1]
+    return _asked([*command, "--version"])[1]
 
 
-def _compile(command: tuple[str, ...], source: str, path: Path, stop: threading.Event) -> Path:
+@cache
+def _knows_native(command: tuple[str, ...], found_at: str | None) -> bool:
+    return _asked([*command, NATIVE, "-E", "-x", "c", os.devnull])[0] == 0
+
+
+def _asked(command: list[str]) -> tuple[int, str]:
+    """What a compiler answers to a question about itself."""
+    try:
+        with TemporaryDirectory(prefix="synctrl-") as place:
+            return run(command, LONGEST_VERSION, Path(place))
+    except OSError as error:
+        raise fault(command[0], "cannot be run", f" without a folder for temporary files: {error}") from error
+
+
+def _compile(command: list[str], source: str, path: Path, stop: threading.Event) -> Path:
     path.write_text(source, encoding="utf-8")
-    return _make(path.with_suffix(".o"), [*command, *FLAGS, "-c", str(path)], stop)
+    return _make(path.with_suffix(".o"), [*command, "-c", str(path)], stop)
 
 
 def _make(target: Path, command: list[str], stop: threading.Event) -> Path:
@@ -165,7 +220,7 @@ def _make(target: Path, command: list[str], stop: threading.Event) -> Path:
     Raises:
         CompilationError: it does not.
     """
-    status, printed = run([*command, "-o", str(target)], LONGEST, stop)
+    status, printed = run([*command, "-o", str(target)], LONGEST, target.parent, stop)
     said = f":\n{printed[:2000]}" if printed else ""
     if status < 0:
         raise fault(command[0], f"was ended by signal {-status}", said)
