@@ -64,8 +64,16 @@ AIMS = (
     _steps("two Panda", 3.0, 5.0),
     _steps("sixteen UR5", 5.0),
     _steps("sixteen Panda", 5.0),
-    Aim("64 to 10,000 planar arms, the least gain", (Bound("rings, least factor", 4.5, "x", lanes=4.5),)),
-    Aim("16 to 10,000 planar arms, largest cost per robot by least", (_most("rings, spread", 1.3, "x"),)),
+    Aim(
+        "64 to 10,000 planar arms, the least gain",
+        (Bound("rings, least factor", 4.5, "x", lanes=4.5),),
+        "rings",
+    ),
+    Aim(
+        "16 to 10,000 planar arms, largest cost per robot by least",
+        (_most("rings, spread", 1.3, "x"),),
+        "rings",
+    ),
     _steps("30 joints", 2.0),
     Aim(
         "sweep of 10,000 runs of 5 s in steps of 1 ms, two cores",

@@ -47,7 +47,7 @@ def measured(pair: Pair, amount: Amount, reproduce: bool) -> tuple[Figures, floa
             part(pair, amount, figures)
             _say(f"{time.perf_counter() - start:5.0f} s, run {run + 1} of {amount.runs}: {part.__name__}")
     if reproduce:
-        reproduction(pair, figures)
+        reproduction(pair, amount, figures)
     return figures, time.perf_counter() - start
 
 
@@ -179,8 +179,10 @@ def _number(value: Any) -> str:
 def _why(figures: Figures, name: str) -> str:
     """Why a figure is not there."""
     reason = figures.missing.get(name, "")
-    words = reason.splitlines()[0].partition(": ")[2].split(";")[0] if reason else "not measured"
-    return words.replace("|", "/")[:120]
+    if not reason:
+        return "not measured"
+    kind, _, words = reason.splitlines()[0].partition(": ")
+    return (words or kind).split(";")[0].replace("|", "/")[:120]
 
 
 # -- pages ------------------------------------------------------------------------------------------------

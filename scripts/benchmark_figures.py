@@ -24,7 +24,8 @@ class Amount(NamedTuple):
 
     `large` are numbers of robots of cells whose way to the first step is measured, by kind; `sweeps` are
     pairs of duration and step, s, of `swept` runs, which are concluded from two smaller numbers, `few`, where
-    they would take long.
+    they would take long; `judged` is how long the run lasts that is certified, s, and `reproduced` are
+    options of `reproduce.py`.
     """
 
     runs: int
@@ -41,6 +42,7 @@ class Amount(NamedTuple):
     workers: int
     judged: float
     ready: tuple[str, ...]
+    reproduced: tuple[str, ...]
 
 
 WIDTHS = 1, 2, 4, 8
@@ -50,11 +52,11 @@ CELLS = (
 FULL = Amount(
     3, 4, 0.1, CELLS, (16, 64, 256, 1024, 4096, 10_000), None,
     {"four planar arms": WIDTHS[:3], "two UR5": WIDTHS[:2], "sixteen UR5": WIDTHS, "ring of 64": WIDTHS},
-    {"planar arms": 10_000, "UR5": 1000}, ((5.0, 1e-3), (2.0, 2e-3)), 10_000, (100, 400), 2, 5.0, READY,
+    {"planar arms": 10_000, "UR5": 1000}, ((5.0, 1e-3), (2.0, 2e-3)), 10_000, (100, 400), 2, 5.0, READY, (),
 )  # fmt: skip
 QUICK = Amount(
     1, 2, 0.01, ("four planar arms",), (4, 8), ("a log of every tenth step",), {"four planar arms": (1, 2)},
-    {"planar arms": 20}, ((0.02, 2e-3),), 8, (2, 4), 1, 0.05, ("planar_four",),
+    {"planar arms": 20}, ((0.02, 2e-3),), 8, (2, 4), 1, 0.05, ("planar_four",), ("--quick",),
 )  # fmt: skip
 
 

@@ -36,6 +36,8 @@ PARTS = {"planar arms": ring_parts, "UR5": partial(joint_parts, "ur5")}
 MOST, FEWEST = 150_000, 60
 #: bytes of tables that engines keep from one run to the next, with some to spare
 KEPT = 28e6
+#: where `Tables` has been, newest first
+TABLES = "synctrl.compiled.tables", "synctrl.compiled.engine", "synctrl.simulation.compiled.engine"
 #: share of the steps that a second run has: the difference is what steps cost without what comes before them
 FEW = 0.2
 #: how often a measurement is repeated at most, because it is short
@@ -61,15 +63,21 @@ def engine(libraries: dict, width: int | None = None, kept: bool = False) -> Cal
         width: most lanes; by default the engine's choice.
         kept: whether what is desired is tabulated in the first run and looked up in others.
     """
+    tables = _first_of("Tables", *TABLES)() if kept else None
     try:
-        module = import_module("synctrl.compiled.engine")
+        compiled = import_module("synctrl.compiled.engine").Compiled
     except ModuleNotFoundError:  # version 0.1
-        module = import_module("synctrl.simulation.compiled.engine")
         run = import_module("synctrl.simulation.simulate").run_compiled
-        before = module.Tables() if kept else None
-        return lambda planned: run(planned, None, libraries, before)
-    lanes = {} if width is None else {"widest": width}
-    return module.Compiled(libraries, module.Tables() if kept else None, **lanes).run
+        return lambda planned: run(planned, None, libraries, tables)
+    return compiled(libraries, tables, **({} if width is None else {"widest": width})).run
+
+
+def _first_of(name: str, *modules: str) -> Any:
+    """What the first of these modules that has it knows under a name."""
+    for module in modules:
+        with suppress(ModuleNotFoundError, AttributeError):
+            return getattr(import_module(module), name)
+    raise ImportError(f"no {name} in {', '.join(modules)}")
 
 
 class Stepper:

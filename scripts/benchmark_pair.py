@@ -74,6 +74,17 @@ class Worker:
         finally:
             fresh.close()
 
+    def script(self, name: str, *arguments: str) -> None:
+        """Run one of the version's scripts.
+
+        Raises:
+            Unmeasured: it failed; with its last words.
+        """
+        command = [sys.executable, str(self.folder / "scripts" / name), *arguments]
+        run = subprocess.run(command, env=self._environment(), capture_output=True, text=True, check=False)
+        if run.returncode:
+            raise Unmeasured(f"{name} ended with {run.returncode}: {run.stderr.strip().splitlines()[-1:]}")
+
     def close(self) -> None:
         """End the process."""
         if self._process is not None:
@@ -82,11 +93,16 @@ class Worker:
             self._process = None
 
     def _start(self) -> subprocess.Popen[str]:
-        environment = {**os.environ, "PYTHONPATH": str(self.folder), "SYNCTRL_CACHE": str(self._cache)}
-        environment.update(OPENBLAS_NUM_THREADS="1", MPLBACKEND="Agg")
         command = [sys.executable, str(SCRIPTS / "benchmark_worker.py")]
         pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-        return subprocess.Popen(command, text=True, env=environment, stderr=subprocess.DEVNULL, **pipes)
+        return subprocess.Popen(
+            command, text=True, env=self._environment(), stderr=subprocess.DEVNULL, **pipes
+        )
+
+    def _environment(self) -> dict[str, str]:
+        """Variables with which this package is found, and its cache."""
+        own = {"PYTHONPATH": str(self.folder), "SYNCTRL_CACHE": str(self._cache)}
+        return {**os.environ, **own, "OPENBLAS_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
 
 
 class Pair(NamedTuple):

@@ -59,6 +59,8 @@ def rings(pair: Pair, amount: Amount, figures: Figures) -> None:
         _put_times(figures, f"ring of {size}", found, {("now", size): "now", ("then", size): "then"})
     costs = [float(np.median(found["now", size])) for size in amount.rings if ("now", size) in found]
     compared = [np.median(found["then", min(s, largest)]) / np.median(found["now", s]) for s in _many(found)]
+    left = ", ".join(f"{size:,}" for size in amount.rings if ("now", size) not in found)
+    figures.remarks["rings"] = f"without {left} arms, which were not measured" if left else ""
     if costs:
         figures.put({"rings, spread": max(costs) / min(costs)})
     if compared:

@@ -5,17 +5,15 @@ Times are CPU times unless they are called wall.
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from benchmark_figures import LONGEST, READY_THEN, Amount, Figures, check_fits, put_factor
-from benchmark_pair import Job, Pair, Unmeasured, in_turns
+from benchmark_pair import Job, Pair, Unmeasured, Worker, in_turns
 
 
 def large_cells(pair: Pair, amount: Amount, figures: Figures) -> None:
@@ -120,25 +118,15 @@ def _once_then(pair: Pair, cell: str, figures: Figures) -> Iterator[tuple[str, A
         yield "then", pair.then
 
 
-def reproduction(pair: Pair, figures: Figures) -> None:
+def reproduction(pair: Pair, amount: Amount, figures: Figures) -> None:
     """The paper's experiments from an empty cache, once each, wall."""
     for by, worker in pair.workers.items():
         with tempfile.TemporaryDirectory() as folder:
-            command = [
-                sys.executable,
-                str(worker.folder / "scripts" / "reproduce.py"),
-                "--out",
-                f"{folder}/out",
-            ]
-            environment = {
-                "PYTHONPATH": str(worker.folder),
-                "SYNCTRL_CACHE": f"{folder}/cache",
-                "MPLBACKEND": "Agg",
-            }
-            environment |= {"OPENBLAS_NUM_THREADS": "1"}
+            fresh = Worker(worker.folder, Path(folder) / "cache")
             start = time.perf_counter()
-            run = subprocess.run(command, env={**os.environ, **environment}, capture_output=True, check=False)
-            if run.returncode:
-                figures.lack("reproduce", f"{by}: it ended with {run.returncode}")
+            try:
+                fresh.script("reproduce.py", "--out", f"{folder}/out", *amount.reproduced)
+            except Unmeasured as reason:
+                figures.lack("reproduce", f"{by}: {reason}")
             else:
                 figures.put({f"reproduce, {by}": time.perf_counter() - start})
