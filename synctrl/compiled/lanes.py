@@ -2,8 +2,8 @@
 
 An array of a quantity has a row per robot or pair. In the code a number is a vector of `width` lanes. Lanes
 are either runs of one cell, or robots of one run: then a row of the code is one of `width` robots, or pairs,
-one after another, and lanes that are too many repeat the last one. Whatever is neither a robot's nor a pair's is
-the same in all lanes. With one lane both are the arrays as they are.
+one after another, and lanes that are too many repeat the last one. Whatever is neither a robot's nor a pair's
+is the same in all lanes. With one lane both are the arrays as they are.
 """
 
 from __future__ import annotations
