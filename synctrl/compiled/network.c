@@ -25,24 +25,23 @@ static void compare(const Cell *c, const vec *rows, vec *epsilon) {
         }
 }
 
-/* The share of a robot of rows of pairs: S^T times these. */
-static void share(const Cell *c, int i, const vec *rows, vec *shares) {
-    for (int j = 0; j < m; j++) {
-        vec sum = splat(0);
-        for (int t = c->first[i]; t < c->first[i + 1]; t++)
-            sum += c->incident_sign[t] * fetch(c, rows + j, c->incident + t * LANES);
-        shares[i * m + j] = sum;
-    }
-}
-
 /* E, sigma, sigma' = S^T (integral, epsilon, epsilon') per robot */
 static void distribute(const Cell *c, Quantities *a) {
     a->integral = a->memory;
-    for (int i = 0; i < c->n; i++) {
-        share(c, i, a->integral, a->E);
-        share(c, i, a->epsilon, a->sigma);
-        share(c, i, a->epsilon_dot, a->sigma_dot);
-    }
+    for (int i = 0; i < c->n; i++)
+        for (int j = 0; j < m; j++) {
+            vec E = splat(0), sigma = splat(0), sigma_dot = splat(0);
+            for (int t = c->first[i]; t < c->first[i + 1]; t++) {
+                const int *pair = c->incident + t * LANES;
+                vec sign = c->incident_sign[t];
+                E += sign * fetch(c, a->integral + j, pair);
+                sigma += sign * fetch(c, a->epsilon + j, pair);
+                sigma_dot += sign * fetch(c, a->epsilon_dot + j, pair);
+            }
+            a->E[i * m + j] = E;
+            a->sigma[i * m + j] = sigma;
+            a->sigma_dot[i * m + j] = sigma_dot;
+        }
 }
 
 /* What is believed of W, w and w' of who is heard on a link, one row after another. */

@@ -8,30 +8,25 @@ static void know(const Cell *c, Quantities *a) {
     if (c->exchange.hearing != IDEAL) compare(c, a->memory, a->integral); /* S W */
 }
 
-/* Rows out of so many lanes, one after another. */
-static void take_out(const vec *rows, int lanes, int count, int length, double *numbers) {
-    for (int i = 0; i < count; i += lanes, rows += length) {
+/* Rows of robots or pairs out of their lanes, one after another. */
+static void take_out(const Cell *c, const vec *rows, int count, int length, double *numbers) {
+    if (!c->scattered) { for (int j = 0; j < count * length; j++) numbers[j] = lane(rows[j], 0); return; }
+    for (int i = 0; i < count; i += LANES, rows += length) {
         const double *from = (const double *)rows;
-        for (int l = 0; l < lanes && i + l < count; l++)
-            for (int j = 0; j < length; j++) *numbers++ = from[j * LANES + l];
+        int lanes = count - i < LANES ? count - i : LANES;
+        for (int l = 0; l < lanes; l++, numbers += length)
+            for (int j = 0; j < length; j++) numbers[j] = from[j * LANES + l];
     }
 }
 
-/* How many rows there really are, of robots, pairs, and what network and plant remember. */
-static int rows_of(const Cell *c, char rows) {
-    return rows == 'n' ? c->robots : rows == 'p' ? c->pairs : rows == 'r' ? c->r : c->h;
-}
-
-/* In how many lanes they stand; of what is neither a robot's nor a pair's, all lanes have the same. */
-static int lanes_of(const Cell *c, char rows) { return c->scattered && (rows == 'n' || rows == 'p') ? LANES : 1; }
-
-/* One row of the log. */
+/* One row of the log: of robots and pairs that of each, of what network and plant remember that of the first lane. */
 static void record(const Cell *c, Quantities *a, long row, const Log *log) {
-#define COPY(log_name, name, rows, columns)                                             \
-    if (log->log_name) {                                                                \
-        size_t count = rows_of(c, #rows[0]), length = columns;                          \
-        take_out(a->name, lanes_of(c, #rows[0]), count, length, log->log_name + row * count * length); \
-    }
+#define NUMBERS_n(name, to, columns) take_out(c, a->name, c->robots, columns, to + row * c->robots * (columns));
+#define NUMBERS_p(name, to, columns) take_out(c, a->name, c->pairs, columns, to + row * c->pairs * (columns));
+#define NUMBERS_r(name, to, columns) for (int j = 0; j < c->r; j++) to[row * c->r + j] = lane(a->name[j], 0);
+#define NUMBERS_h(name, to, columns) for (int j = 0; j < c->h; j++) to[row * c->h + j] = lane(a->name[j], 0);
+#define COPY(log_name, name, rows, columns) \
+    if (log->log_name) { NUMBERS_##rows(name, log->log_name, columns) }
     LOGS(COPY)
 }
 
