@@ -15,9 +15,10 @@ from refusals import refused
 from synctrl import CartesianSpace, Cell, Experiment
 from synctrl.compiled import structs
 from synctrl.compiled.address import CALLBACK
-from synctrl.compiled.compiler import compiler
-from synctrl.compiled.kind import classify
 from synctrl.compiled.arrays import _constants
+from synctrl.compiled.compiler import compiler
+from synctrl.compiled.header import declared, functions_of, header, largest, vectors
+from synctrl.compiled.kind import classify
 from synctrl.compiled.program import Program
 from synctrl.compiled.quantities import (
     FUNCTIONS,
@@ -29,7 +30,6 @@ from synctrl.compiled.quantities import (
     owned_by,
     shape,
 )
-from synctrl.compiled.header import declared, functions_of, header, largest, vectors
 from synctrl.compiled.trace import Trace
 from synctrl.control.adaptation import Natural
 from synctrl.errors import CompilationError

@@ -20,7 +20,7 @@ from synctrl.compiled.weighing import weighing_of
 from synctrl.coupling.weights import SmoothWeights, Weights
 from synctrl.errors import CompilationError
 from synctrl.robots.documents import planar_arm, write_urdf
-from synctrl.robots.lumped import bodies_of, lumped_bodies
+from synctrl.robots.lumped import bodies_of, compact, lumped_bodies
 from synctrl.robots.mechanism import mechanism
 from synctrl.robots.symbolic import Symbols
 
@@ -159,8 +159,8 @@ def plant_of(robot, bodies):
     """Operations of the bias and the mass matrix of bodies that are made somehow, and a function for both."""
     fixed, base = mechanism(robot)
     q, v, pi = (ca.SX.sym(name, size * robot.nv) for name, size in (("q", 1), ("v", 1), ("pi", 10)))
+    fixed, made = bodies(fixed, pi)
     recursion = Symbols(fixed, q, ca.sin(q), ca.cos(q))
-    made = bodies(fixed, pi)
     gravity = ca.SX(base.rotation.T @ robot.gravity_vector)
     found = [recursion.bias(made, v, gravity), recursion.mass_matrix(made)]
     function = ca.Function("plant", [q, v, pi], ca.cse(found))
@@ -171,7 +171,11 @@ def plant_of(robot, bodies):
 def test_lumped_bodies_move_alike_with_fewer_operations(name):
     robot = load_robot(name)
     (many, whole), (few, lumped) = (
-        plant_of(robot, way) for way in (lambda fixed, pi: bodies_of(pi), lumped_bodies)
+        plant_of(robot, way)
+        for way in (
+            lambda fixed, pi: (fixed, bodies_of(pi)),
+            lambda fixed, pi: (compact(fixed), lumped_bodies(fixed, pi)),
+        )
     )
     assert few < many
     state = np.random.default_rng(0).uniform(-1, 1, (2, robot.nv))
