@@ -166,7 +166,7 @@ def test_a_mechanism_is_found_once_for_as_long_as_its_robot_exists():
     robot = load_robot("planar2r")
     placed = [robot.placed((i, 0, 0)) for i in range(300)]
     found = [mechanism(each) for each in placed]
-    assert all(mechanism(each) is kept for each, kept in zip(placed, found, strict=True))
+    assert all(mechanism(each)[0] is kept for each, (kept, _) in zip(placed, found, strict=True))
     gone = weakref.ref(placed.pop())
     gc.collect()
     assert gone() is None

@@ -13,7 +13,8 @@ goes through these modules:
    `carrying`: that of an object in the hands of several. `operations` counts what these compute;
 5. `structs`, made from the table in `quantities`: what stands in C before `network.c` and `driver.c`;
    `hearing`: what these are told of the network;
-6. `build`, with `compiler`, `processor` and `cache`: from C to a library that is loaded;
+6. `build`, with `compiler`, `process` and `processor`, `cache` and `owners`: from C to a library that is
+   loaded;
 7. `program`: library and arrays together. Once in every process, before it is used, the library is compared
    with the reference engine, on the small closed loop of `specimen`;
 8. `engine` again: takes the run through time, some steps with every call of `advance` in `driver.c`. What

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -95,8 +96,9 @@ def compact(fixed: Mechanism) -> Mechanism:
     return _with_shifts(fixed, _shifts(fixed))
 
 
+@lru_cache(maxsize=64)
 def lumping(fixed: Mechanism) -> Lumping:
-    """How the parameters of any such bodies are lumped."""
+    """How the parameters of any such bodies are lumped; robots that were placed from one ask but once."""
     import casadi as ca
 
     pi = ca.SX.sym("pi", 10 * len(fixed.joints))
