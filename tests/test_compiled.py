@@ -221,7 +221,7 @@ def test_what_goes_wrong_while_code_is_written_comes_through(monkeypatch, tmp_pa
 def test_tables_hold_what_the_cell_desires(coupling):
     cell = planar_cell(2, coupling).cell
     instants = np.array([[0.0, 0.1], [0.05, 0.15], [0.1, 0.2]])
-    found = tables.tabulated(cell, instants)
+    found = tables.tabulated(cell, instants.ravel())
     desired = np.stack([found[name] for name in DESIRED], axis=2).reshape(3, 2, 2, 3, 2)
     weighing = weighing_of(cell)
     numbers = np.broadcast_to(found["weights"], (6, 2, weighing.count(2))).reshape(3, 2, 2, -1)

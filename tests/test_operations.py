@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,16 +14,18 @@ from refusals import refused
 
 from synctrl import Cell, Coupling, Cubic, Experiment, Gains, Member, load_robot
 from synctrl.compiled import weighing
+from synctrl.compiled.batch import Batch
 from synctrl.compiled.kind import classify
 from synctrl.compiled.operations import counted, operations
 from synctrl.compiled.trace import SHORT
 from synctrl.compiled.weighing import weighing_of
 from synctrl.coupling.weights import SmoothWeights, Weights
-from synctrl.errors import CompilationError
+from synctrl.errors import CompilationError, InputError
 from synctrl.robots.documents import planar_arm, write_urdf
-from synctrl.robots.lumped import bodies_of, lumped_bodies
+from synctrl.robots.lumped import bodies_of, compact, lumped_bodies
 from synctrl.robots.mechanism import mechanism
 from synctrl.robots.symbolic import Symbols
+from synctrl.simulation.plant import Plant
 
 ca = pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
 
@@ -159,8 +162,8 @@ def plant_of(robot, bodies):
     """Operations of the bias and the mass matrix of bodies that are made somehow, and a function for both."""
     fixed, base = mechanism(robot)
     q, v, pi = (ca.SX.sym(name, size * robot.nv) for name, size in (("q", 1), ("v", 1), ("pi", 10)))
+    fixed, made = bodies(fixed, pi)
     recursion = Symbols(fixed, q, ca.sin(q), ca.cos(q))
-    made = bodies(fixed, pi)
     gravity = ca.SX(base.rotation.T @ robot.gravity_vector)
     found = [recursion.bias(made, v, gravity), recursion.mass_matrix(made)]
     function = ca.Function("plant", [q, v, pi], ca.cse(found))
@@ -171,7 +174,11 @@ def plant_of(robot, bodies):
 def test_lumped_bodies_move_alike_with_fewer_operations(name):
     robot = load_robot(name)
     (many, whole), (few, lumped) = (
-        plant_of(robot, way) for way in (lambda fixed, pi: bodies_of(pi), lumped_bodies)
+        plant_of(robot, way)
+        for way in (
+            lambda fixed, pi: (fixed, bodies_of(pi)),
+            lambda fixed, pi: (compact(fixed), lumped_bodies(fixed, pi)),
+        )
     )
     assert few < many
     state = np.random.default_rng(0).uniform(-1, 1, (2, robot.nv))
@@ -209,3 +216,19 @@ def test_operations_are_counted_and_nothing_else():
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     assert counted(ca.Function("f", [x, y], [x * y + 2, x])) == 2
     assert counted(ca.Function("f", [x, y], [ca.sin(x) / y])) == 2
+
+
+def test_runs_side_by_side_are_told_all_ten_parameters_of_every_body():
+    """How code lumps them is not theirs to know."""
+    experiment = Experiment(small_cell(), SMALL_GAINS, 0.05)
+    run = experiment.plan(0.05, 1e-3)
+    batch = Batch(run, {"tracking_error": 0.01, "sync_error": 0.01})
+    true = np.array([robot.inertial_parameters for robot in run.loop.plant.robots])
+    planned, told = (batch.measure(columns, 1) for columns in ({}, {"pi": true[None, None]}))
+    np.testing.assert_array_equal(told.peak_torque, planned.peak_torque)
+    heavier = [robot.with_parameters(1.5 * robot.inertial_parameters) for robot in run.loop.plant.robots]
+    heavy = replace(experiment, plant_type=partial(Plant, robots=heavier)).simulate(0.05, 1e-3)
+    found = batch.measure({"pi": 1.5 * true[None, None]}, 1)
+    np.testing.assert_allclose(found.peak_torque[0], np.abs(heavy.tau).max(axis=0), rtol=1e-9)
+    with refused(InputError, "columns, pi"):
+        batch.measure({"pi": true[None, None, :, 1:]}, 1)

@@ -17,7 +17,7 @@ from synctrl import Robot, load_robot
 from synctrl.errors import RobotError
 from synctrl.robots.articulated import accelerations
 from synctrl.robots.base_parameters import BaseParameters
-from synctrl.robots.lumped import bodies_of, lumped_bodies, lumping
+from synctrl.robots.lumped import bodies_of, compact, lumped_bodies, lumping
 from synctrl.robots.mechanism import mechanism
 from synctrl.robots.symbolic import Symbols
 
@@ -30,9 +30,9 @@ def evaluated(robot, gathered, q, v, v_ref, a_ref, s):
     n = robot.nv
     symbols = [ca.SX.sym(name, n) for name in ("q", "v", "v_ref", "a_ref", "s")]
     pi = ca.SX.sym("pi", 10 * n)
+    fixed, bodies = gathered(fixed, pi)
     recursion = Symbols(fixed, symbols[0], ca.sin(symbols[0]), ca.cos(symbols[0]))
     gravity = ca.SX(base.rotation.T @ robot.gravity_vector)
-    bodies = gathered(fixed, pi)
     torque = recursion.torque(bodies, *symbols[1:4], gravity)
     tip = recursion.tip(symbols[1], ca.SX(base.rotation), ca.SX(base.translation))
     outputs = [torque, recursion.mass_matrix(bodies), *tip, ca.jtimes(torque, pi, symbols[4], True)]
@@ -79,7 +79,10 @@ def robots(seed):
 
 
 #: ways to make bodies of inertial parameters
-GATHERED = {"as they are": lambda fixed, pi: bodies_of(pi), "lumped": lumped_bodies}
+GATHERED = {
+    "as they are": lambda fixed, pi: (fixed, bodies_of(pi)),
+    "lumped": lambda fixed, pi: (compact(fixed), lumped_bodies(fixed, pi)),
+}
 
 
 @pytest.mark.parametrize("way", GATHERED)
@@ -120,8 +123,8 @@ def test_articulated_bodies_accelerate_as_those_of_pinocchio(way, seed):
         q, v, tau, pi = (
             ca.SX.sym(name, size * robot.nv) for name, size in zip("qvtp", (1, 1, 1, 10), strict=True)
         )
+        fixed, bodies = GATHERED[way](fixed, pi)
         recursion = Symbols(fixed, q, ca.sin(q), ca.cos(q))
-        bodies = GATHERED[way](fixed, pi)
         forces = recursion.biased(bodies, v, ca.SX(base.rotation.T @ robot.gravity_vector))
         function = ca.Function("f", [q, v, tau, pi], [accelerations(recursion, bodies, forces, tau)])
         state = np.random.default_rng(seed).uniform(-1.5, 1.5, (3, robot.nv))
@@ -163,7 +166,7 @@ def test_a_mechanism_is_found_once_for_as_long_as_its_robot_exists():
     robot = load_robot("planar2r")
     placed = [robot.placed((i, 0, 0)) for i in range(300)]
     found = [mechanism(each) for each in placed]
-    assert all(mechanism(each) is kept for each, kept in zip(placed, found, strict=True))
+    assert all(mechanism(each)[0] is kept for each, (kept, _) in zip(placed, found, strict=True))
     gone = weakref.ref(placed.pop())
     gc.collect()
     assert gone() is None

@@ -10,7 +10,7 @@ goes through these modules:
    refused, and the part named;
 3. `kind`: which robots are equal, and can share code; `weighing`: what numbers weights are made of;
 4. `trace`, with `plugged` for laws and adaptations of a user's own: the functions of a robot of a kind;
-   `carrying`: that of an object in the hands of several;
+   `carrying`: that of an object in the hands of several. `operations` counts what these compute;
 5. `structs`, made from the table in `quantities`: what stands in C before `network.c` and `driver.c`;
    `hearing`: what these are told of the network;
 6. `build`, with `compiler`, `process` and `processor`, `cache` and `owners`: from C to a library that is

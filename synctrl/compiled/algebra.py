@@ -59,34 +59,75 @@ def function_of(
     return ca.Function(name, [given[key] for key in inputs], results, [*inputs], [*outputs])
 
 
-def solve_positive(M: Any, b: Any) -> Any:
-    """M^-1 b for a symmetric positive definite matrix of CasADi's, by M = L D L^T without pivoting."""
+def balancing(M: Any, b: Any) -> Any:
+    """x of M x + b = 0, with a symmetric positive definite matrix of CasADi's, M = L D L^T without pivoting.
+
+    Rows are taken from the last on: joints of a mechanism that are in different branches stay apart. CasADi
+    makes x / y of x (1 / y), but not of x (-1 / y): so what is divided by a pivot is multiplied with that,
+    and N is -L.
+    """
     import casadi as ca
 
     n = M.shape[0]
-    L, LD = ca.SX.eye(n), ca.SX.zeros(n, n)
-    for j in range(n):
-        for i in range(j, n):
-            LD[i, j] = M[i, j] - sum(LD[i, k] * L[j, k] for k in range(j))
-            L[i, j] = LD[i, j] / LD[j, j]
-    x = [b[i] for i in range(n)]
-    for i in range(n):
-        x[i] -= sum(L[i, k] * x[k] for k in range(i))
-    x = [x[i] / LD[i, i] for i in range(n)]
+    N, LD = ca.SX.zeros(n, n), ca.SX.zeros(n, n)
+    x, less = [b[i] for i in range(n)], [ca.SX(0)] * n
+    for j in reversed(range(n)):
+        for i in range(j + 1):
+            LD[i, j] = M[i, j] + sum(LD[i, k] * N[j, k] for k in range(j + 1, n))
+        less[j] = -1 / LD[j, j]
+        for i in range(j):
+            N[i, j] = LD[i, j] * less[j]
     for i in reversed(range(n)):
-        x[i] -= sum(L[k, i] * x[k] for k in range(i + 1, n))
+        x[i] += sum(N[i, k] * x[k] for k in range(i + 1, n))
+    x = [x[i] * less[i] for i in range(n)]
+    for i in range(n):
+        x[i] += sum(N[k, i] * x[k] for k in range(i))
     return ca.vertcat(*x)
 
 
 def _inverse(A: np.ndarray) -> np.ndarray:
-    """By minors up to three rows, by an unrolled QR factorization above."""
-    import casadi as ca
+    """By cofactors up to three rows, by an unrolled QR factorization above; every divisor divides once."""
+    return _by_cofactors(A) if len(A) <= 3 else _by_columns(A)
 
-    rows = len(A)
-    given = ca.SX.sym("A", rows, rows)
-    inverse = ca.inv_minor(given) if rows <= 3 else ca.solve(given, ca.SX.eye(rows))
-    function = ca.Function("inverse", [given], [inverse])
-    return array_of(function(ca.reshape(column_of(A.T), rows, rows)))
+
+def _by_cofactors(A: np.ndarray) -> np.ndarray:
+    rows = range(len(A))
+    adjoint = np.empty_like(A)
+    for i, j in np.ndindex(A.shape):
+        minor = np.delete(np.delete(A, i, 0), j, 1)
+        adjoint[j, i] = _signed_minor(minor, (i + j) % 2)
+    return adjoint * _reciprocal(sum(A[0, j] * adjoint[j, 0] for j in rows))
+
+
+def _signed_minor(A: np.ndarray, odd: int) -> Any:
+    """det A, or -det A, of at most two rows."""
+    if len(A) == 2:
+        straight, across = A[0, 0] * A[1, 1], A[0, 1] * A[1, 0]
+        return across - straight if odd else straight - across
+    whole = A[0, 0] if len(A) else 1
+    return -whole if odd else whole
+
+
+def _by_columns(A: np.ndarray) -> np.ndarray:
+    """By A = Q R with orthogonal columns in Q, which need not have length one, and ones on R's diagonal."""
+    n = len(A)
+    Q, R, rows = list(A.T), {}, []
+    for j in range(n):
+        reciprocal = _reciprocal((Q[j] * Q[j]).sum())
+        for k in range(j + 1, n):
+            R[j, k] = (Q[j] * Q[k]).sum(keepdims=True) * reciprocal
+            Q[k] = Q[k] - Q[j] * R[j, k]
+        rows.append(Q[j] * reciprocal)
+    for i in reversed(range(n)):
+        rows[i] = rows[i] - sum(R[i, k] * rows[k] for k in range(i + 1, n))
+    return np.array(rows)
+
+
+def _reciprocal(x: Any) -> np.ndarray:
+    """1 / x, (1,), times which CasADi lets others be: of y (1 / x) it would make y / x, a division each."""
+    found = np.empty(1, dtype=object)
+    found[0] = 2 / (2 * x)
+    return found
 
 
 def _determinant(A: np.ndarray) -> np.ndarray:

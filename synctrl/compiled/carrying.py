@@ -21,7 +21,7 @@ from ..robots.mechanism import mechanism
 from ..robots.robot import Robot
 from ..simulation.closed_loop import ClosedLoop
 from ..tasks.measurement import Kinematics
-from .algebra import array_of, column_of, function_of, solve_positive
+from .algebra import array_of, balancing, column_of, function_of
 from .quantities import FUNCTIONS, columns
 
 
@@ -137,4 +137,4 @@ def _solve(M: np.ndarray, b: np.ndarray) -> np.ndarray:
     import casadi as ca
 
     rows = len(M)
-    return array_of(solve_positive(ca.reshape(column_of(M.T), rows, rows), column_of(b)), -1)
+    return array_of(balancing(ca.reshape(column_of(M.T), rows, rows), -column_of(b)), -1)

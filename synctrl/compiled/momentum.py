@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..robots.lumped import Body, lumped_bodies, lumping
+from ..robots.lumped import Body, compact, lumped_bodies, lumping
 from ..robots.mechanism import Mechanism
 from ..robots.parameters import friction_diagonals
 from ..robots.symbolic import Symbols
@@ -44,7 +44,7 @@ def model_torque(
 
     Args:
         kind: of the robot.
-        recursion: at its joint positions.
+        recursion: of its `compact` mechanism, at its joint positions.
         theta: what is adapted, (P, 1).
         v, v_ref, a_ref: (nv, 1).
         gravity: in the frame of the first joint's placement, (3, 1).
@@ -72,7 +72,7 @@ def momentum_function(kind: Model, base_rotation: np.ndarray) -> Any:
 
     q, v = ca.SX.sym("q", kind.nv), ca.SX.sym("v", kind.nv)
     theta = ca.SX.sym("theta", kind.sizes["P"])
-    still, recursion = ca.SX.zeros(kind.nv), Symbols(kind.fixed, q, ca.sin(q), ca.cos(q))
+    still, recursion = ca.SX.zeros(kind.nv), Symbols(compact(kind.fixed), q, ca.sin(q), ca.cos(q))
     gravity = ca.SX(ca.DM(base_rotation.T @ np.array(kind.gravity)))
     p = model_torque(kind, recursion, theta, still, still, v, ca.SX.zeros(3))
     changing = model_torque(kind, recursion, theta, v, v, still, gravity) - ca.jtimes(p, q, v)

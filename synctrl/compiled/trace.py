@@ -21,13 +21,14 @@ from ..control.laws.protocol import ROWS
 from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.weights import Weights
 from ..robots.articulated import accelerations
+from ..robots.lumped import compact
 from ..robots.mechanism import Mechanism
 from ..robots.symbolic import Symbols
 from ..tasks.algebra import limited
 from ..tasks.measurement import Poses, Positions
 from ..tasks.redundancy import Inversion, velocity_lost
 from ..tasks.spaces import Measurement
-from .algebra import SYMBOLS, array_of, column_of, function_of, solve_positive
+from .algebra import SYMBOLS, array_of, balancing, column_of, function_of
 from .carrying import felt_at_origin, fixture_on
 from .kind import Kind
 from .momentum import model_torque
@@ -72,7 +73,9 @@ class Trace:
         self.ca, self.kind, self.name = ca, kind, name
         self.given = {key: self.ca.SX.sym(key, columns(key, kind.sizes)) for key in QUANTITIES}
         self.q, self.v = self.given["q"], self.given["v"]
-        still = Symbols(self._tooled(kind.fixed, "tool"), self.q, self.ca.sin(self.q), self.ca.cos(self.q))
+        still = Symbols(
+            compact(self._tooled(kind.fixed, "tool")), self.q, self.ca.sin(self.q), self.ca.cos(self.q)
+        )
         posture = self._row("W_inv"), self._row("posture"), self._row("gain")
         self.space: Any = kind.bound(TracedTip(still, self._base()), posture, SYMBOLS)
 
@@ -228,19 +231,20 @@ class Trace:
 
     def plant(self) -> Any:
         """v' = M^-1 (tau - C v - g), through a factor of M, or joint after joint where there are many."""
-        bodies, gravity = self.kind.lumping.bodies(self.given["pi"]), self._gravity(self._true_base())
-        recursion = Symbols(self.kind.true, self.q, self.given["sine"], self.given["cosine"])
+        lumping, gravity = self.kind.lumping, self._gravity(self._true_base())
+        bodies = lumping.bodies(self.given["pi"])
+        recursion = Symbols(lumping.fixed, self.q, self.given["sine"], self.given["cosine"])
         moving = self.given["moving"]
         if self.kind.nv > SHORT:
             v_dot = accelerations(recursion, bodies, recursion.biased(bodies, self.v, gravity), moving)
         else:
             bias = recursion.bias(bodies, self.v, gravity)
-            v_dot = solve_positive(recursion.mass_matrix(bodies), moving - bias)
+            v_dot = balancing(recursion.mass_matrix(bodies), bias - moving)
         return self._function("plant", v_dot=array_of(v_dot))
 
     def hand(self) -> Any:
         """What the fixture between the hand and the object does to the joints, and to the object."""
-        fixed = self._tooled(self.kind.true, "true_tool")
+        fixed = compact(self._tooled(self.kind.true, "true_tool"))
         recursion = Symbols(fixed, self.q, self.given["sine"], self.given["cosine"])
         tip = TracedTip(recursion, self._true_base())
         pull, wrench = fixture_on(tip, *map(self._row, ("q", "v", "body", "grasp")))
@@ -254,7 +258,7 @@ class Trace:
 
     def _recursion(self) -> Symbols:
         """At joint positions of which sine and cosine are known."""
-        return Symbols(self.kind.fixed, self.q, self.given["sine"], self.given["cosine"])
+        return Symbols(compact(self.kind.fixed), self.q, self.given["sine"], self.given["cosine"])
 
     def _tooled(self, fixed: Mechanism, name: str) -> Mechanism:
         """A mechanism with its tip where the quantity says, if it has been left open."""

@@ -35,7 +35,8 @@ class Pivot(NamedTuple):
     """What a joint gives way to.
 
     Attributes:
-        push, twist: acceleration of the joint per acceleration of the body's point and of turning, (3, 1).
+        push, twist: its acceleration per acceleration of the body's point, and per that of turning, where
+            its motor gives nothing, (3, 1).
         alone: its acceleration where the body before it is at rest.
     """
 
@@ -82,19 +83,20 @@ def _give_way(ca: Any, joint: Any, body: Opposition, force: Any, tau: Any) -> tu
         push, twist = ca.mtimes(body.mixed, axis), ca.mtimes(body.twist, axis)
     else:
         push, twist = ca.mtimes(body.push, axis), ca.mtimes(body.mixed.T, axis)
-    pivot = ca.dot(axis, twist if joint.turns else push) + joint.armature
-    alone = (tau - ca.dot(axis, force[joint.turns])) / pivot
-    by = Pivot(push / pivot, twist / pivot, alone)
+    less = -1 / (ca.dot(axis, twist if joint.turns else push) + joint.armature)
+    alone = (ca.dot(axis, force[joint.turns]) - tau) * less
+    by = Pivot(push * less, twist * less, alone)
+    along = np.flatnonzero(joint.axis).tolist()
+    if len(along) == 1 and not joint.armature:  # then a joint gives way to all that is along its axis
+        by[joint.turns][along[0]] = -joint.axis[along[0]]
     rest = Opposition(
-        symmetric(ca, body.push - ca.mtimes(push, by.push.T)),
-        body.mixed - ca.mtimes(push, by.twist.T),
-        symmetric(ca, body.twist - ca.mtimes(twist, by.twist.T)),
+        symmetric(ca, body.push + ca.mtimes(push, by.push.T)),
+        body.mixed + ca.mtimes(push, by.twist.T),
+        symmetric(ca, body.twist + ca.mtimes(twist, by.twist.T)),
     )
     passed = [part + U * alone for part, U in zip(force, (push, twist), strict=True)]
-    along = np.flatnonzero(joint.axis)
     if len(along) == 1:  # what reaches the body before it along the axis is what the motor gives
-        sign, k = float(joint.axis[along[0]]), int(along[0])
-        passed[joint.turns][k] = sign * (tau - joint.armature * alone)
+        passed[joint.turns][along[0]] = joint.axis[along[0]] * (tau - joint.armature * alone)
     return by, rest, tuple(passed)
 
 
@@ -121,7 +123,7 @@ def _outwards(recursion: Symbols, pivots: dict[int, Pivot]) -> list[Any]:
                 ca.mtimes(back, turned),
             )
         push, twist, alone = pivots[i]
-        found.append(alone - (ca.dot(push, pushed) + ca.dot(twist, turned)))
+        found.append(alone + (ca.dot(push, pushed) + ca.dot(twist, turned)))
         own = ca.SX(joint.axis) * found[i]
         bodies.append((pushed, turned + own) if joint.turns else (pushed + own, turned))
     return found

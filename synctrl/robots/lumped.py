@@ -6,11 +6,15 @@ be counted to the body before it, from the tips to the base, where it does not m
 Dombre, *Modeling, Identification and Control of Robots*, 2002, chapter 9). Of a body behind a turning joint
 seven of ten numbers remain. Of one that can only turn about one direction, such as all of a planar arm and
 the first of any, one moment of inertia stands for six. Torques stay what they were.
+
+Where on its axis the origin of a joint stands does not matter either, so it is moved to where its placement
+has more zeros, see `compact`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -43,7 +47,7 @@ class Lumping(NamedTuple):
     """How the parameters of a mechanism's bodies are lumped.
 
     Attributes:
-        fixed: the mechanism.
+        fixed: the mechanism, with origins that suit the lumped bodies.
         matrix: lumped ones from the ten of each body in Pinocchio's order, (count, 10 bodies).
         places: where the lumped ones stand among the ten numbers of each `Body`, (count,).
     """
@@ -75,7 +79,7 @@ def bodies_of(pi: Any) -> list[Body]:
 
 
 def lumped_bodies(fixed: Mechanism, pi: Any) -> list[Body]:
-    """Bodies with the same torques as those of some parameters, (10 bodies, 1)."""
+    """Bodies with the torques of some parameters, (10 bodies, 1), of the `compact` mechanism."""
     turning = spins(fixed)
     bodies = [_body(pi[10 * i : 10 * i + 10], d) for i, d in enumerate(turning)]
     for i in reversed(range(len(bodies))):
@@ -83,7 +87,13 @@ def lumped_bodies(fixed: Mechanism, pi: Any) -> list[Body]:
         passed, bodies[i] = (_rod if joint.turns else _spread)(joint, bodies[i])
         if joint.parent >= 0:
             bodies[joint.parent] = _joined(bodies[joint.parent], passed, joint, turning[joint.parent])
-    return bodies
+    moved = zip(bodies, fixed.joints, _shifts(fixed).tolist(), strict=True)
+    return [_shifted(body, joint, along) if along else body for body, joint, along in moved]
+
+
+def compact(fixed: Mechanism) -> Mechanism:
+    """The same mechanism; origins of turning joints are moved along their axes if more zeros come of it."""
+    return _with_shifts(fixed, _shifts(fixed))
 
 
 @lru_cache(maxsize=64)
@@ -95,7 +105,7 @@ def lumping(fixed: Mechanism) -> Lumping:
     entries = ca.vertcat(*map(_packed, lumped_bodies(fixed, pi)))
     matrix = np.array(ca.evalf(ca.jacobian(entries, pi)))
     places = np.flatnonzero(matrix.any(axis=1))
-    return Lumping(fixed, matrix[places], places)
+    return Lumping(compact(fixed), matrix[places], places)
 
 
 def spins(fixed: Mechanism) -> list[np.ndarray | None]:
@@ -109,6 +119,52 @@ def spins(fixed: Mechanism) -> list[np.ndarray | None]:
                 above = None if _snapped(np.cross(above, joint.axis)).any() else joint.axis
         found.append(above)
     return found
+
+
+# -- where origins are -----------------------------------------------------------------------------------
+
+
+def _shifts(fixed: Mechanism) -> np.ndarray:
+    """How far each joint's origin is moved along its axis, (nv,), m."""
+    shifts = np.zeros(len(fixed.joints))
+    for i, joint in enumerate(fixed.joints):
+        if joint.turns and joint.parent >= 0:
+            above = fixed.joints[joint.parent].axis * shifts[joint.parent]
+            shifts[i] = -(joint.rotation @ joint.axis) @ (joint.translation - above)
+    before, after = (
+        sum(np.count_nonzero(joint.translation) for joint in one.joints)
+        for one in (fixed, _with_shifts(fixed, shifts))
+    )
+    return shifts if after < before else np.zeros_like(shifts)
+
+
+def _with_shifts(fixed: Mechanism, shifts: np.ndarray) -> Mechanism:
+    """A mechanism with origins that are moved along the joints' axes; the tip stays."""
+
+    def above(parent: int) -> np.ndarray:
+        return fixed.joints[parent].axis * shifts[parent] if parent >= 0 else np.zeros(3)
+
+    joints = tuple(
+        replace(
+            joint,
+            translation=_snapped(
+                joint.translation - above(joint.parent) + along * joint.rotation @ joint.axis
+            ),
+        )
+        for joint, along in zip(fixed.joints, shifts, strict=True)
+    )
+    tip = fixed.tip_translation - above(fixed.tip_parent)
+    return replace(fixed, joints=joints, tip_translation=tip)
+
+
+def _shifted(body: Body, joint: MechanismJoint, along: float) -> Body:
+    """A body without mass on its axis, seen from an origin that is moved along it."""
+    import casadi as ca
+
+    if body.planar:
+        return body
+    part = ca.mtimes(ca.SX(ca.DM(along * joint.axis)), body.first.T)
+    return body._replace(second=body.second - (part + part.T))
 
 
 # -- what a body hands on to the one before it ------------------------------------------------------------

@@ -65,41 +65,44 @@ class Symbols:
         """
         ca, joints = self.ca, self.fixed.joints
         R: list[Any] = []
-        p, w, pd, axes = list(R), list(R), list(R), list(R)
+        p, w, axes = list(R), list(R), list(R)
         for i, joint in enumerate(joints):
-            if joint.parent < 0:
-                R_up, p_up, w_up, pd_up = base_rotation, base_translation, ca.SX.zeros(3), ca.SX.zeros(3)
-            else:
-                R_up, p_up, w_up, pd_up = (part[joint.parent] for part in (R, p, w, pd))
+            R_up, p_up, w_up = base_rotation, base_translation, ca.SX.zeros(3)
+            if joint.parent >= 0:
+                R_up, p_up, w_up = (part[joint.parent] for part in (R, p, w))
             R.append(ca.mtimes(R_up, self.R[i]))
-            arm = ca.mtimes(R_up, self.p[i])
-            axis = ca.mtimes(R[i], ca.SX(joint.axis))
-            axes.append(axis)
-            p.append(p_up + arm)
-            w.append(w_up + axis * v[i] if joint.turns else w_up)
-            pd.append(pd_up + ca.cross(w_up, arm) + (0 if joint.turns else axis * v[i]))
+            axes.append(ca.mtimes(R[i], ca.SX(joint.axis)))
+            p.append(p_up + ca.mtimes(R_up, self.p[i]))
+            w.append(w_up + axes[i] * v[i] if joint.turns else w_up)
         k = self.fixed.tip_parent
-        reach = ca.mtimes(R[k], ca.SX(self.fixed.tip_translation))
-        x, x_dot = p[k] + reach, pd[k] + ca.cross(w[k], reach)
-        J, J_dot = self._jacobians(axes, p, w, pd, x, x_dot)
-        return x, ca.mtimes(R[k], ca.SX(self.fixed.tip_rotation)), J, J_dot
+        x = p[k] + ca.mtimes(R[k], ca.SX(self.fixed.tip_translation))
+        return x, ca.mtimes(R[k], ca.SX(self.fixed.tip_rotation)), *self._jacobians(axes, p, w, x, v)
 
-    def _jacobians(self, axes: list, p: list, w: list, pd: list, x: Any, x_dot: Any) -> tuple[Any, Any]:
-        """Column by column: axis x lever and axis for a turning joint, axis and 0 for a sliding one."""
+    def _jacobians(self, axes: list, p: list, w: list, x: Any, v: Any) -> tuple[Any, Any]:
+        """Column by column: axis x lever and axis for a turning joint, axis and 0 for a sliding one.
+
+        Joints before one turn its column, and a turning one turns what those behind it make of the velocity.
+        """
         ca, joints = self.ca, self.fixed.joints
         J, J_dot = ca.SX.zeros(6, len(joints)), ca.SX.zeros(6, len(joints))
-        for i in self._chain():
-            axis, axis_dot = axes[i], ca.cross(w[i], axes[i])
+        chain = self._chain()
+        for i in chain:
+            turns = joints[i].turns
+            J[:, i] = (
+                ca.vertcat(ca.cross(axes[i], x - p[i]), axes[i]) if turns else ca.vertcat(axes[i], 0, 0, 0)
+            )
+        x_dot = sum((J[:3, i] * v[i] for i in reversed(chain)), ca.SX.zeros(3))
+        before = ca.SX.zeros(3)
+        for i in reversed(chain):
+            before += J[:3, i] * v[i]
+            J_dot[:3, i] = ca.cross(w[i], J[:3, i])
             if joints[i].turns:
-                lever, lever_dot = x - p[i], x_dot - pd[i]
-                J[:, i] = ca.vertcat(ca.cross(axis, lever), axis)
-                J_dot[:, i] = ca.vertcat(ca.cross(axis_dot, lever) + ca.cross(axis, lever_dot), axis_dot)
-            else:
-                J[:3, i], J_dot[:3, i] = axis, axis_dot
+                J_dot[:3, i] += ca.cross(axes[i], x_dot - before)
+                J_dot[3:, i] = ca.cross(w[i], axes[i])
         return J, J_dot
 
     def _chain(self) -> list[int]:
-        """Joints between the base and the tip."""
+        """Joints between the tip and the base."""
         chain, i = [], self.fixed.tip_parent
         while i >= 0:
             chain.append(i)
@@ -274,16 +277,11 @@ def _momentum(ca: Any, body: Body, joint: MechanismJoint) -> tuple[Any, Any]:
 
 def _centripetal(ca: Any, a: Any, half: Any = None) -> Any:
     """[a][a]; or ([a][b] + [b][a]) / 2 = (a b^T + b a^T) / 2 - (a . b) I, given half of b."""
-    b = a if half is None else half
-    square = (a[k] * b[k] for k in range(3))
-    if half is None:
-        x, y, z = square
-        xy, xz, yz = (a[j] * a[k] for j, k in ((0, 1), (0, 2), (1, 2)))
-        sums = y + z, x + z, x + y
-    else:
-        x, y, z = square
-        xy, xz, yz = (a[j] * b[k] + a[k] * b[j] for j, k in ((0, 1), (0, 2), (1, 2)))
-        sums = 2 * (y + z), 2 * (x + z), 2 * (x + y)
+    alone = half is None
+    b = a if alone else half
+    x, y, z = (a[k] * b[k] for k in range(3))
+    xy, xz, yz = (a[j] * b[k] + (0 if alone else a[k] * b[j]) for j, k in ((0, 1), (0, 2), (1, 2)))
+    sums = [one if alone else 2 * one for one in (y + z, x + z, x + y)]
     rows = ((-sums[0], xy, xz), (xy, -sums[1], yz), (xz, yz, -sums[2]))
     return ca.vertcat(*(ca.horzcat(*row) for row in rows))
 
