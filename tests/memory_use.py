@@ -72,7 +72,7 @@ def measure_cell(robot: str, n: str) -> None:
 
 
 def ring(name: str, n: int) -> Experiment:
-    """n equal robots in a row, in one signed ring: planar arms with tasks of the tip, others in joint space."""
+    """n equal robots in a row and a signed ring: planar arms with tasks of the tip, others of the joints."""
     robot, planar = load_robot(name), name == "planar2r"
     q0, theta = (
         np.array([0.4, 1.2]) if planar else np.linspace(-0.6, 0.8, robot.nv),

@@ -149,26 +149,22 @@ class Experiment:
         Args:
             duration: s; by default the experiment's.
             dt: step of "rk4", s.
-            integrator: "rk4", or a method of SciPy's solve_ivp: "RK45", "RK23", "DOP853", "Radau", "BDF" or
-                "LSODA".
+            integrator: "rk4", or of SciPy's methods "RK45", "RK23", "DOP853", "Radau", "BDF" or "LSODA".
             engine: "pinocchio", "compiled" (the same as generated C), or an `Engine` of one's own.
             plant: library that computes the plant, "pinocchio" or "mujoco".
             control_period: None for continuous control; else how long torque is held, a multiple of dt, s.
             log_dt: interval of the log, a multiple of dt, s; by default dt. Every dt is watched all the same.
-            log_to: a folder, not there yet, whose files the arrays of the result become, see `Result`.
-            log_dtype: "float64", or "float32" for a log of half the size with seven digits.
-            rtol, atol: tolerances of SciPy's methods.
-            progress: called now and then with the time reached, s.
+            log_to, log_dtype: a folder for files, not there yet; "float64" or "float32"; see `Result`.
+            rtol, atol, progress: SciPy's tolerances; a function that is told the time reached, s.
 
         Raises:
-            InputError: a value that is wrong or does not go with another, or a log larger than memory.
-            UnreachableError: a robot cannot reach its desired positions; raised before anything runs.
+            InputError, UnreachableError: a wrong value; a log without room; a path out of reach.
             MissingDependencyError, CompilationError: the compiled engine cannot be had, and why.
             SimulationError, RunInterrupted: the run had to stop, or was interrupted.
 
         Warns:
             SaturationWarning, StepWarning: torque was cut off; the step of "rk4" was too long.
-            GainWarning, RobotWarning: forces inside an object may grow; nobody says if stated friction acts.
+            GainWarning, RobotWarning: forces inside may grow; nobody says if stated friction acts.
         """
         run = self.plan(duration, dt, control_period, plant, log_dt, log_to, log_dtype)
         return carry_out(run, integrator, engine, (rtol, atol), progress)
