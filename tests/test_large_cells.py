@@ -28,6 +28,7 @@ from synctrl import (
     load_robot,
 )
 from synctrl.coupling import reachability
+from synctrl.coupling.graphs import largest_share
 from synctrl.coupling.reachability import check_motions, check_reachable
 from synctrl.errors import (
     InputError,
@@ -37,9 +38,11 @@ from synctrl.errors import (
     TrajectoryError,
     UnreachableError,
 )
+from synctrl.experiments import mixed_four, panda_four, planar_four, ur5_payload
 from synctrl.robots.mechanism import mechanism
 from synctrl.robots.tips import tip_places
 from synctrl.simulation.plant import Plant
+from synctrl.simulation.rates import damping_rate
 from synctrl.tasks.derivatives import find_misfit_in_motion, spread_windows
 from synctrl.tasks.following import follow
 from synctrl.tasks.together import EXACT
@@ -277,6 +280,27 @@ def test_a_line_of_rotation_vectors_is_no_motion_of_a_pose_and_is_still_refused(
     cell = Cell([Member(UR5, line, Q0["ur5"])] * 2, Coupling.pair(), PoseSpace())
     with refused(TrajectoryError, "robot 1, trajectory", derivative="velocity"):
         check_motions(cell, TIMES)
+
+
+# -- how fast they move ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("make", [Coupling.signed_ring, Coupling.chain, Coupling.star])
+def test_the_largest_share_of_a_coupling_is_found_without_writing_it_out(make, monkeypatch):
+    coupling = make(60, c=np.linspace(1, 2, 60)).weighted(np.linspace(0.5, 2, make(60).pairs))
+    expected = np.linalg.eigvalsh(coupling.matrix.T @ coupling.matrix)[-1]
+    np.testing.assert_allclose(largest_share(coupling), expected, rtol=1e-12)
+    monkeypatch.setattr("synctrl.coupling.graphs.WRITTEN_OUT", 0)
+    np.testing.assert_allclose(largest_share(coupling), expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize("make", [planar_four, panda_four, ur5_payload, mixed_four])
+def test_rates_of_robots_measured_a_few_at_a_time_are_those_of_all_together(make, monkeypatch):
+    loop = make().closed_loop()
+    motion = np.stack((loop.cell.q0, loop.cell.v0))
+    expected = damping_rate(loop, 0.1, motion)
+    monkeypatch.setattr("synctrl.simulation.rates.TOGETHER", 1)
+    np.testing.assert_allclose(damping_rate(loop, 0.1, motion), expected, rtol=1e-9)
 
 
 # -- what a compiled run needs -----------------------------------------------------------------------------
