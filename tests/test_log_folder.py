@@ -22,7 +22,7 @@ from synctrl.analysis.metrics import metrics
 from synctrl.compiled.engine import BLOCK_STEPS
 from synctrl.errors import InputError, ResultError, RunInterrupted, SimulationError
 from synctrl.simulation import memory
-from synctrl.simulation.log import AHEAD, OFTEN
+from synctrl.simulation.log import AHEAD, OFTEN, Keeping, make_log
 from synctrl.simulation.result import LAYOUT
 
 ENGINES = ["pinocchio", "compiled"]
@@ -72,8 +72,15 @@ def test_logs_of_every_length_are_whole(engine, steps, tmp_path, experiment):
         np.testing.assert_array_equal(arrays(single)[name], array.astype("f8" if name == "t" else "f4"))
 
 
-def test_engines_fill_no_more_rows_than_there_are():
+@pytest.mark.parametrize("kept", [Keeping(), Keeping(None, "float32")])
+@pytest.mark.parametrize("rows", [1, OFTEN, AHEAD, 3 * AHEAD])
+def test_there_is_room_for_all_rows_that_an_engine_may_fill(kept, rows):
     assert BLOCK_STEPS <= AHEAD
+    log, rng = make_log({"t": (), "x": (2,)}, rows, kept), np.random.default_rng(0)
+    while log.count < rows:
+        ahead = len(log.rows["x"]) - log.at
+        assert ahead >= min(AHEAD, rows - log.count)
+        log.advance(int(min(rng.choice([1, OFTEN - 1, AHEAD]), rows - log.count)))
 
 
 @pytest.mark.parametrize("engine", ENGINES)

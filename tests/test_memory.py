@@ -135,9 +135,9 @@ def test_a_run_takes_little_beyond_the_arrays_of_its_result():
 
 def test_a_run_into_a_folder_takes_as_little_however_long_it_is(tmp_path):
     pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
-    use = memory_use("compiled", 40.0, 1e-3, tmp_path / "run")
-    assert use.arrays > 30 * MB
-    assert use.beyond < 12 * MB
+    use = memory_use("compiled", 90.0, 1e-3, tmp_path / "run")
+    assert use.arrays > 70 * MB
+    assert use.beyond < 10 * MB
     whole = sum(file.stat().st_size for file in (tmp_path / "run").glob("*.npy"))
     assert use.arrays < whole < use.arrays + 0.1 * MB
 
