@@ -19,7 +19,7 @@ from test_interrupts import raising
 from synctrl import Experiment, Result, simulate
 from synctrl.analysis.certify import certify
 from synctrl.analysis.metrics import metrics
-from synctrl.compiled.engine import BLOCK_STEPS
+from synctrl.compiled.tables import BLOCK_STEPS
 from synctrl.errors import InputError, ResultError, RunInterrupted, SimulationError
 from synctrl.simulation import memory
 from synctrl.simulation.log import AHEAD, OFTEN, Keeping, make_log
