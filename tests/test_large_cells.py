@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from faults import empty_cache
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import random_robot
@@ -16,8 +17,10 @@ from synctrl import (
     Circle,
     Coupling,
     Cubic,
+    Experiment,
     ExponentialApproach,
     FunctionTrajectory,
+    Gains,
     Hold,
     Member,
     PoseSpace,
@@ -25,10 +28,21 @@ from synctrl import (
     load_robot,
 )
 from synctrl.coupling import reachability
+from synctrl.coupling.graphs import largest_share
 from synctrl.coupling.reachability import check_motions, check_reachable
-from synctrl.errors import NonFiniteError, RobotError, SimulationError, TrajectoryError, UnreachableError
+from synctrl.errors import (
+    InputError,
+    NonFiniteError,
+    RobotError,
+    SimulationError,
+    TrajectoryError,
+    UnreachableError,
+)
+from synctrl.experiments import mixed_four, panda_four, planar_four, ur5_payload
 from synctrl.robots.mechanism import mechanism
 from synctrl.robots.tips import tip_places
+from synctrl.simulation.plant import Plant
+from synctrl.simulation.rates import damping_rate
 from synctrl.tasks.derivatives import find_misfit_in_motion, spread_windows
 from synctrl.tasks.following import follow
 from synctrl.tasks.together import EXACT
@@ -266,3 +280,73 @@ def test_a_line_of_rotation_vectors_is_no_motion_of_a_pose_and_is_still_refused(
     cell = Cell([Member(UR5, line, Q0["ur5"])] * 2, Coupling.pair(), PoseSpace())
     with refused(TrajectoryError, "robot 1, trajectory", derivative="velocity"):
         check_motions(cell, TIMES)
+
+
+# -- how fast they move ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("make", [Coupling.signed_ring, Coupling.chain, Coupling.star])
+def test_the_largest_share_of_a_coupling_is_found_without_writing_it_out(make, monkeypatch):
+    coupling = make(60, c=np.linspace(1, 2, 60)).weighted(np.linspace(0.5, 2, make(60).pairs))
+    expected = np.linalg.eigvalsh(coupling.matrix.T @ coupling.matrix)[-1]
+    np.testing.assert_allclose(largest_share(coupling), expected, rtol=1e-12)
+    monkeypatch.setattr("synctrl.coupling.graphs.WRITTEN_OUT", 0)
+    np.testing.assert_allclose(largest_share(coupling), expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize("make", [planar_four, panda_four, ur5_payload, mixed_four])
+def test_rates_of_robots_measured_a_few_at_a_time_are_those_of_all_together(make, monkeypatch):
+    loop = make().closed_loop()
+    motion = np.stack((loop.cell.q0, loop.cell.v0))
+    expected = damping_rate(loop, 0.1, motion)
+    monkeypatch.setattr("synctrl.simulation.rates.TOGETHER", 1)
+    np.testing.assert_allclose(damping_rate(loop, 0.1, motion), expected, rtol=1e-9)
+
+
+# -- what a compiled run needs -----------------------------------------------------------------------------
+
+
+def test_a_compiled_run_plants_no_forest(monkeypatch):
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    experiment = Experiment(cell_of([Hold([0.3, 0.2])] * 3), Gains(4, 4, 1, 2, 0.2), 0.01)
+    experiment.simulate(engine="compiled")  # a library that was not checked before is compared with Pinocchio
+
+    def planted(*arguments):
+        raise AssertionError("a forest")
+
+    monkeypatch.setattr("synctrl.robots.forest.Forest.__init__", planted)
+    assert experiment.simulate(engine="compiled").status == "completed"
+    with pytest.raises(SimulationError):
+        experiment.simulate()
+
+
+def test_a_plant_that_says_how_it_moves_is_asked_before_a_run(monkeypatch):
+    class Still(Plant):
+        def move(self, q, v, tau, hidden):
+            return np.zeros(3), hidden
+
+    told = []
+    experiment = Experiment(cell_of([Hold([0.3, 0.2])] * 2), Gains(4, 4, 1, 2, 0.2), 0.01, plant_type=Still)
+    with refused(InputError, found=(3,)):
+        experiment.simulate(progress=told.append)
+    assert told == []
+
+
+def test_robots_a_kilometre_away_are_compiled_on_an_empty_cache_and_err_as_here(monkeypatch, tmp_path):
+    """World axes cost digits there; what errors and torques are does not depend on where the cell stands."""
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    empty_cache(monkeypatch, tmp_path)
+    q0 = np.array(Q0["ur5"])
+
+    def run(place):
+        robots = [UR5.placed((*place, 0.0)), UR5.placed((place[0] + 1.5, place[1], 0.0))]
+        tips = [robot.tip_position(q0) for robot in robots]
+        members = [Member(r, Cubic(tip, tip + 0.05, 1.0), q0) for r, tip in zip(robots, tips, strict=True)]
+        cell = Cell(members, Coupling.pair(), CartesianSpace("xyz"))
+        gains = Gains(8, 8, (12.0, 12.0, 8.0, 0.4, 0.2, 0.04), 1, 0.01)
+        return Experiment(cell, gains, 0.05).simulate(engine="compiled")
+
+    far, here = run((1000.0, -800.0)), run((0.0, 0.0))
+    for name in ("tracking_error", "sync_error", "q"):
+        np.testing.assert_allclose(getattr(far, name), getattr(here, name), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(far.tau, here.tau, rtol=0, atol=1e-6 * np.abs(here.tau).max())

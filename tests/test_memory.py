@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 from cells import SMALL_GAINS, small_cell
-from memory_use import memory_use, size
+from memory_use import cell_use, memory_use, size
 from refusals import refused
 
 from synctrl import Experiment, simulate
@@ -131,6 +131,25 @@ def test_a_run_takes_little_beyond_the_arrays_of_its_result():
     use = memory_use("compiled", 40.0, 0.01)
     assert use.rows == 4001
     assert use.beyond < 20 * MB
+
+
+def test_a_run_into_a_folder_takes_as_little_however_long_it_is(tmp_path):
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    use = memory_use("compiled", 90.0, 1e-3, tmp_path / "run")
+    assert use.arrays > 70 * MB
+    assert use.beyond < 10 * MB
+    whole = sum(file.stat().st_size for file in (tmp_path / "run").glob("*.npy"))
+    assert use.arrays < whole < use.arrays + 0.1 * MB
+
+
+#: robot -> bytes for each of many of them, from the robot to the first steps of the compiled engine
+EACH = {"planar2r": 60_000, "ur5": 120_000}
+
+
+@pytest.mark.parametrize(("robot", "n"), [("planar2r", 500), ("planar2r", 2000), ("ur5", 400)])
+def test_a_large_cell_takes_little_memory_for_each_of_its_robots(robot, n):
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    assert cell_use(robot, n) < n * EACH[robot]
 
 
 def test_too_many_steps_are_refused():

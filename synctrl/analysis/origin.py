@@ -103,8 +103,11 @@ def check_same(result: Result, s_q: np.ndarray, speed: np.ndarray) -> None:
         s_q, speed: what an experiment gives for it, velocity errors and size of velocities, (T, n, nv).
 
     Raises:
-        InputError: it is another experiment.
+        InputError: it is another experiment, or numbers with too few digits to tell.
     """
+    if result.v_error.dtype != np.float64:
+        found = str(result.v_error.dtype)
+        raise InputError.expected("a log in float64, from which a run can be computed anew", found, "result")
     difference, speed = (part.max(axis=(1, 2)) for part in (np.abs(s_q - result.v_error), speed))
     rounding = max(STILL, AGREEMENT * speed.max())
     wrong = ~(difference <= MISMATCH * speed + rounding)

@@ -65,7 +65,7 @@ class Compiled:
     def run(self, run: Run, progress: Progress | None = None) -> Result:
         """Make a run; see `Engine`."""
         run.info["engine"] = "compiled"
-        recorder = Recorder(run.loop, run.clock, run.devices)
+        recorder = run.recorder()
         with before_the_start(run):
             program = self.load(run)
 

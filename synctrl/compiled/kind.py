@@ -185,7 +185,7 @@ class Standing(NamedTuple):
     @property
     def shared(self) -> list[np.ndarray | None]:
         """Rotation of each first joint's placement if all with the mechanism share it, else None."""
-        names = [repr(fixed.key()) for fixed in self.fixed]
+        names = [fixed.name for fixed in self.fixed]
         rotations: dict[str, set[bytes]] = {}
         for name, base in zip(names, self.bases, strict=True):
             rotations.setdefault(name, set()).add((base.rotation + 0.0).tobytes())  # -0 counts as 0
@@ -230,12 +230,13 @@ def classify(loop: ClosedLoop) -> Classified:
         partial(momentum_function, kind, base.rotation) for kind, base in zip(bare, known.bases, strict=True)
     ]
     kinds: dict[str, Kind] = {}
+    places: dict[str, int] = {}
     index, plugged = [], zip(trace_learning(controller, momentum), trace_law(controller), strict=True)
     for plain, (learning, law) in zip(bare, plugged, strict=True):
         kind = replace(plain, learning=learning, law=law)
         key = repr(kind.key())
         kinds.setdefault(key, kind)
-        index.append(list(kinds).index(key))
+        index.append(places.setdefault(key, len(places)))
     return Classified(list(kinds.values()), index, known.bases, true.bases)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from ..tasks.spaces import JointSpace, Space, units_of
 from ..tasks.trajectories import Motion, Trajectory
 from .coupling import Coupling
 from .desired import desired_motion, further_rows, weights_by_clocks
+from .graphs import largest_share
 from .member_checks import (
     check_friction,
     check_labels,
@@ -169,6 +171,11 @@ class Cell:
     def nv(self) -> int:
         """Largest number of joints."""
         return max(robot.nv for robot in self.robots)
+
+    @cached_property
+    def largest_share(self) -> float:
+        """The largest eigenvalue of S^T S: the most by which synchronization errors answer together."""
+        return largest_share(self.coupling)
 
     @property
     def unit(self) -> str:

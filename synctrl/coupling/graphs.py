@@ -13,6 +13,8 @@ from ..errors import CouplingError, CouplingWarning, InputError, warn
 Edge = tuple[int, int]
 #: beyond it numbers are no longer those of robots, and may not fit an integer
 LARGEST = 2**31
+#: entries of S up to which it is written out
+WRITTEN_OUT = 100_000
 
 
 def cycle(n: int) -> list[Edge]:
@@ -159,6 +161,20 @@ def _row(edge: Any) -> tuple[Any, Any, Any]:
     if len(parts) not in (2, 3):
         raise InputError.expected("pairs (i, j) or triples (i, j, weight)", edge, "graph")
     return (*parts, 1.0)[:3]
+
+
+def largest_share(coupling: Any) -> float:
+    """The largest eigenvalue of S^T S of a coupling; of a large S to four digits, without writing it out."""
+    edges, signs = coupling.edges, coupling.signs
+    if coupling.robots * coupling.pairs <= WRITTEN_OUT:
+        return float(np.linalg.norm(coupling.matrix, 2) ** 2)
+    from scipy.sparse import csr_array
+    from scipy.sparse.linalg import eigsh
+
+    rows = np.repeat(np.arange(len(edges)), edges.shape[1])
+    S = csr_array((signs.ravel(), (rows, edges.ravel())), (len(edges), coupling.robots))
+    start = np.random.default_rng(0).standard_normal(coupling.robots)  # the same answer every time
+    return float(eigsh(S.T @ S, 1, which="LA", v0=start, tol=1e-4, return_eigenvectors=False)[0])
 
 
 def sparse_product(S: Any, x: np.ndarray) -> np.ndarray:

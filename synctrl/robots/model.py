@@ -141,6 +141,15 @@ def joint_poses(model: pin.Model, q: np.ndarray) -> np.ndarray:
     return poses
 
 
+def moved_shapes(visual: pin.GeometryModel | None, base: pin.SE3) -> pin.GeometryModel | None:
+    """Shapes with those fixed to the world moved along with the base."""
+    moved = None if visual is None else visual.copy()
+    for shape in () if moved is None else moved.geometryObjects:
+        if shape.parentJoint == 0:
+            shape.placement = base * shape.placement
+    return moved
+
+
 T = TypeVar("T")
 
 

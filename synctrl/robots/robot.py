@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..renamed import names_elsewhere
 from .friction import Friction
 from .model import PerThread, check_inertia, check_joints, check_numbering, frame_id, joint_units
+from .model import moved_shapes as _moved
 from .urdf.changes import with_bodies
 from .urdf.document import Document, Pose
 from .urdf.report import NOTHING, Report
@@ -291,15 +292,6 @@ class Robot:
 
     def __repr__(self) -> str:
         return f"Robot('{self.name}', {self.nv} joints, tip '{self.tip}')"
-
-
-def _moved(visual: pin.GeometryModel | None, base: pin.SE3) -> pin.GeometryModel | None:
-    """Shapes with those fixed to the world moved along with the base."""
-    moved = None if visual is None else visual.copy()
-    for shape in () if moved is None else moved.geometryObjects:
-        if shape.parentJoint == 0:
-            shape.placement = base * shape.placement
-    return moved
 
 
 __getattr__ = names_elsewhere(__name__, ".catalog", "load_robot")

@@ -28,6 +28,7 @@ from .diagnosis import diagnosed
 from .guard import Guard, Progress, date, report_time, user_failure
 from .integrators import ADAPTIVE, RungeKutta, Scipy, check_method
 from .limits import warn_of_saturation
+from .log import IN_MEMORY, Keeping
 from .recorder import NOTHING, Recorder
 from .result import Result
 from .schedules import DisturbanceSchedule
@@ -42,7 +43,7 @@ class Run(NamedTuple):
 
     `every` is how many steps of dt a sample of sampled control lasts, or None; `experiment` is what the
     result will know as its own; `step_error` learns what the worst step was; `devices` are sensors and
-    actuators at the beginning of the run.
+    actuators at the beginning of the run; `kept` says how the log is kept.
     """
 
     experiment: Any
@@ -53,6 +54,11 @@ class Run(NamedTuple):
     info: dict[str, Any]
     step_error: StepError
     devices: LiveDevices
+    kept: Keeping = IN_MEMORY
+
+    def recorder(self) -> Recorder:
+        """What logs this run; an `InputError` if there is no room for it."""
+        return Recorder(self.loop, self.clock, self.devices, self.kept)
 
     def check(self) -> None:
         """Look ahead, before anything runs.
@@ -122,7 +128,7 @@ def collect(run: Run, samples: Iterator[Sample], progress: Progress | None) -> R
     Raises:
         SimulationError: the run had to stop; it carries what was logged.
     """
-    recorder, guard = Recorder(run.loop, run.clock, run.devices), Guard(run.loop)
+    recorder, guard = run.recorder(), Guard(run.loop)
 
     def log() -> None:
         for sample in samples:

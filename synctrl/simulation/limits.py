@@ -20,6 +20,7 @@ from ..renamed import names_elsewhere
 from ..robots.mechanism import joint_limits
 from ..robots.model import unit_for
 from ..tasks.redundancy import velocity_lost
+from .memory import in_parts, row_of
 from .plant import Output, Plant
 
 if TYPE_CHECKING:
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
 APPLIED = "applied_torque"
 #: adaptations that keep estimates within bounds, and need no advice
 BOUNDED = "Ball", "Box"
-#: bytes of an array that are looked at at a time
-PART = 4_000_000
 #: growth of the estimates that is worth a word, as a share of what they were
 GROWN = 0.01
 
@@ -72,7 +71,7 @@ def limit_report(
         for i, joint in np.argwhere(left).tolist():
             unit = unit_for(turning, cell.robots[i].joint_units[joint])
             about = {"robot": i, "joint": joint, "kind": kind, "unit": unit}
-            for entry in _outside(t, values[:, i, joint], lower[i, joint], upper[i, joint]):
+            for entry in _outside(t, row_of(values, i, joint), lower[i, joint], upper[i, joint]):
                 found.append({**about, **entry})
     return sorted(found, key=lambda entry: (entry["start"], entry["robot"], entry["joint"], entry["kind"]))
 
@@ -97,12 +96,6 @@ def _ever(values: np.ndarray, test: Callable[[np.ndarray], np.ndarray]) -> np.nd
     for rows in in_parts(values):
         found |= test(rows).any(axis=0)
     return found
-
-
-def in_parts(values: np.ndarray) -> Iterator[np.ndarray]:
-    """An array over time, some instants at a time: what is made of them takes little memory."""
-    length = max(1, PART // max(1, values[:1].nbytes))
-    return (values[first : first + length] for first in range(0, len(values), length))
 
 
 def _outside(t: np.ndarray, values: np.ndarray, lower: float, upper: float) -> Iterator[dict[str, float]]:
@@ -144,8 +137,8 @@ def saturation_report(plant: Plant, arrays: Mapping[str, np.ndarray]) -> list[di
             "limit": float(limits[i, joint]),
             "unit": unit_for("N·m", plant.cell.robots[i].joint_units[joint]),
             "share": float(share[i, joint]),
-            "largest": float(np.abs(tau[:, i, joint]).max()),
-            "theta_hat": [float(np.abs(part).max()) for part in (estimates[0, i], estimates[:, i])],
+            "largest": float(np.abs(row_of(tau, i, joint)).max()),
+            "theta_hat": [float(np.abs(part).max()) for part in (estimates[0, i], row_of(estimates, i))],
         }
         for i, joint in np.argwhere(share > 0)
     ]
@@ -239,53 +232,51 @@ def _learned(found: list[dict[str, Any]]) -> str:
 # -- damping ----------------------------------------------------------------------------------------------
 
 
-class DampingLog:
-    """Damping of every robot at all logged instants, as a list of intervals.
+#: what is logged of damping, (n,) each: lambda, and the part of xref' that J v_ref leaves out
+DAMPING = ("damping", "velocity_lost")
+
+
+def may_damp(space: Any) -> bool:
+    """Whether a space may damp singular configurations: of one of a user's own nobody knows."""
+    ours = type(space).__module__.partition(".")[0] == __name__.partition(".")[0]
+    return not ours or getattr(space, "damping", None) is not None
+
+
+def damping_of(signals: Signals) -> tuple[np.ndarray, np.ndarray]:
+    """What is logged of damping at one instant, see `DAMPING`."""
+    task = signals.task
+    if task.J is None or task.inversion is None or task.inversion.damping is None:
+        none = np.zeros(len(signals.tau))
+        return none, none
+    lost = velocity_lost(task.J, signals.v_ref, signals.asked.xref_dot)
+    return task.inversion.damping[:, 0], lost[:, 0]
+
+
+def damping_report(t: np.ndarray, damping: np.ndarray, lost: np.ndarray) -> list[dict[str, Any]]:
+    """Intervals in which the damping of a robot was above zero, in order of their start.
 
     Args:
-        instants: number of logged instants.
-        robots: number of robots.
+        t: logged instants, (T,), s.
+        damping, lost: see `DAMPING`, (T, n).
 
-    Attributes:
-        arrays: lambda, and the part of xref' that J v_ref leaves out, (instants, robots) each.
+    Returns:
+        One entry per interval: `robot`, counted from 0; `start`, `stop`, s: first and last instant;
+        `largest_damping`: of lambda; `largest_velocity_lost`: of |xref' - J v_ref|, task unit per s.
     """
-
-    def __init__(self, instants: int, robots: int):
-        self.arrays = {name: np.zeros((instants, robots)) for name in ("damping", "velocity_lost")}
-
-    def add(self, k: int, signals: Signals) -> None:
-        """Log one instant."""
-        task = signals.task
-        if task.J is None or task.inversion is None or task.inversion.damping is None:
-            return
-        lost = velocity_lost(task.J, signals.v_ref, signals.asked.xref_dot)
-        self.arrays["damping"][k], self.arrays["velocity_lost"][k] = task.inversion.damping[:, 0], lost[:, 0]
-
-    def report(self, t: np.ndarray) -> list[dict[str, Any]]:
-        """Intervals in which the damping of a robot was above zero, in order of their start.
-
-        Args:
-            t: instants logged so far, (T,), s.
-
-        Returns:
-            One entry per interval: `robot`, counted from 0; `start`, `stop`, s: first and last instant;
-            `largest_damping`: of lambda; `largest_velocity_lost`: of |xref' - J v_ref|, task unit per s.
-        """
-        logged = [array[: len(t)] for array in self.arrays.values()]
-        damped = np.flatnonzero(_ever(logged[0], lambda rows: rows > 0)).tolist()
-        found = [
-            {
-                "robot": robot,
-                "start": float(t[first]),
-                "stop": float(t[last]),
-                "largest_damping": float(damping[first : last + 1].max()),
-                "largest_velocity_lost": float(lost[first : last + 1].max()),
-            }
-            for robot in damped
-            for damping, lost in [[array[:, robot] for array in logged]]
-            for first, last in spans(damping > 0)
-        ]
-        return sorted(found, key=lambda entry: (entry["start"], entry["robot"]))
+    damped = np.flatnonzero(_ever(damping, lambda rows: rows > 0)).tolist()
+    found = [
+        {
+            "robot": robot,
+            "start": float(t[first]),
+            "stop": float(t[last]),
+            "largest_damping": float(size[first : last + 1].max()),
+            "largest_velocity_lost": float(missing[first : last + 1].max()),
+        }
+        for robot in damped
+        for size, missing in [[row_of(part, robot) for part in (damping, lost)]]
+        for first, last in spans(size > 0)
+    ]
+    return sorted(found, key=lambda entry: (entry["start"], entry["robot"]))
 
 
 __getattr__ = names_elsewhere(__name__, ".plant", "torque_limits")

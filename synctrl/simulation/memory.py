@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import mmap
 import os
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from ..errors import InputError
 from .clock import Clock
 
+#: bytes of an array that are looked at at a time
+PART = 4_000_000
 #: largest share of the available memory that a log may take; the rest is for what is made of it
 SHARE = 0.8
 
@@ -23,7 +30,20 @@ def check_fits(clock: Clock, row: int) -> None:
     Raises:
         InputError: with the bytes needed, those available, and the least log_dt that would fit.
     """
-    available = available_memory()
+    _check_room(clock, row, available_memory(), "memory")
+
+
+def check_fits_disk(clock: Clock, row: int, folder: Path) -> None:
+    """Refuse a log that needs more than `SHARE` of what is free where a folder is to be.
+
+    Raises:
+        InputError: see `check_fits`.
+    """
+    there = next((place for place in folder.parents if place.is_dir()), None)
+    _check_room(clock, row, None if there is None else shutil.disk_usage(there).free, "disk")
+
+
+def _check_room(clock: Clock, row: int, available: int | None, where: str) -> None:
     if available is None or clock.rows * row <= SHARE * available:
         return
     fitting = int(SHARE * available) // row
@@ -32,9 +52,34 @@ def check_fits(clock: Clock, row: int) -> None:
         advice = f"log_dt={-(-clock.count // (fitting - 1)) * clock.dt:.12g} would"
     raise InputError(
         f"the log of {clock.rows} instants takes {clock.rows * row} bytes, and {available} bytes of "
-        f"memory are available; expected a log that fits into {SHARE:.0%} of them: {advice}",
+        f"{where} are available; expected a log that fits into {SHARE:.0%} of them: {advice}",
         subject="log_dt",
     )
+
+
+def in_parts(array: np.ndarray) -> Iterator[np.ndarray]:
+    """An array over time, some instants at a time: what is made of them takes little memory.
+
+    Of an array that is mapped from a file, what was read is let go.
+    """
+    length = max(1, PART // max(1, array[:1].nbytes))
+    for first in range(0, len(array), length):
+        yield array[first : first + length]
+        let_go(array)
+
+
+def let_go(array: np.ndarray) -> None:
+    """Free the memory that holds what was read of a file, if an array is mapped from one."""
+    mapped = getattr(array, "_mmap", None)
+    if mapped is not None and hasattr(mapped, "madvise"):
+        mapped.madvise(mmap.MADV_DONTNEED)
+
+
+def row_of(array: np.ndarray, *place: int) -> np.ndarray:
+    """One number, or row, of an array over time at all instants, in memory."""
+    where: Any = (slice(None), *place)
+    parts = [part[where].copy() for part in in_parts(array)]
+    return np.concatenate(parts) if parts else array[where]
 
 
 def available_memory() -> int | None:

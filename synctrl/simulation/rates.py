@@ -30,7 +30,8 @@ from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.cell import Reference
 from ..robots.momentum import momentum_of_all
 from ..robots.regressors import make_regressors
-from ..tasks.measurement import Measurement
+from ..tasks.measurement import Measurement, Tips
+from ..tasks.spaces import TipSpace
 from .closed_loop import ClosedLoop
 
 #: largest product of rate and step that was ever seen to do with the classical Runge-Kutta method, whose own
@@ -38,6 +39,8 @@ from .closed_loop import ClosedLoop
 RUNGE_KUTTA, SWING = 2.0, 2.83
 #: the same for rate and period of torque that is held
 HELD, HELD_SPRING = 2.0, 1.0
+#: robots that are measured together at most
+TOGETHER = 96
 #: gains are cut off here, so that rates do not overflow
 HUGE = 1e200
 
@@ -91,18 +94,13 @@ def damping_rate(loop: ClosedLoop, t: float, motion: np.ndarray, sampled: bool =
     It is the sum of Lambda, beta lambda_n and the largest eigenvalues of M^-1 D, of M^-1 F, and of what
     another law than the paper's damps with. Where torque is held, a step knows nothing but the friction.
     """
-    reference, _, J = _measured(loop, t, motion)
-    sums = []
+    reference = loop.cell.references(np.array([t]))[0]
+    J, sums = _jacobians(loop, reference, motion), []
     for i, robot in enumerate(loop.cell.robots):
         M = robot.mass_matrix(motion[0, i, : robot.nv])
         _, dampers = _dampers(loop, reference, i, J[i, :, : robot.nv], M)
         sums.append(sum(rate.rate for rate in dampers if rate.gain == "friction" or not sampled))
     return max(sums)
-
-
-def _largest_share(loop: ClosedLoop) -> float:
-    """The largest eigenvalue of S^T S."""
-    return float(np.linalg.norm(loop.cell.coupling.matrix, 2) ** 2)
 
 
 def _measured(loop: ClosedLoop, t: float, motion: np.ndarray) -> tuple[Reference, Measurement, np.ndarray]:
@@ -111,6 +109,23 @@ def _measured(loop: ClosedLoop, t: float, motion: np.ndarray) -> tuple[Reference
     task = cell.task.measure(motion, reference.desired)
     J = np.broadcast_to(np.eye(cell.m, cell.nv), (cell.n, cell.m, cell.nv)) if task.J is None else task.J
     return reference, task, J
+
+
+def _jacobians(loop: ClosedLoop, reference: Reference, motion: np.ndarray) -> np.ndarray:
+    """The Jacobians, (n, m, nv), of some robots at a time: forests of all of them would take much memory."""
+    cell, space = loop.cell, loop.cell.space
+    if cell.n <= TOGETHER or not isinstance(space, TipSpace):
+        return _measured(loop, reference.t, motion)[2]
+    posture, J = space.redundancy.spread(cell.robots), np.zeros((cell.n, cell.m, cell.nv))
+    for first in range(0, cell.n, TOGETHER):
+        robots = cell.robots[first : first + TOGETHER]
+        rows, nv = slice(first, first + TOGETHER), max(robot.nv for robot in robots)
+        W_inv, preferred, gain = (part[rows, :nv] for part in posture)
+        tips = Tips(robots)
+        bound = space.over(tips, [[robot.nv] for robot in robots], (W_inv, preferred, gain))
+        J[rows, :, :nv] = bound.measure(motion[:, rows, :nv], reference.desired[:, rows]).J
+        vars(tips).clear()  # its parts hold each other, and would stay for a while
+    return J
 
 
 def _regressors(
@@ -137,7 +152,7 @@ def _dampers(
     K_r = np.minimum(controller.K_r[i], HUGE)
     damping = np.diag(K_r[:nv]) if controller.k_r_space == "joint" else J.T @ np.diag(K_r) @ J
     friction = np.diag((plant.viscous + plant.coulomb / plant.smoothing)[i, :nv])  # slope at rest
-    beta = min(float(controller.beta.max()), HUGE) * _largest_share(loop)
+    beta = min(float(controller.beta.max()), HUGE) * loop.cell.largest_share
     found = [
         LoopRate("Lambda", i, None, min(float(controller.Lambda.max()), HUGE)),
         LoopRate("beta", i, None, beta),
@@ -155,7 +170,7 @@ def _springs(
 ) -> list[tuple[str, np.ndarray]]:
     """What pulls a robot back, (nv, nv) each, by the name of its gain."""
     cJ = reference.c[i] @ J
-    coupling = _largest_share(loop) * cJ.T @ np.diag(np.minimum(loop.controller.K_eps, HUGE)) @ cJ
+    coupling = loop.cell.largest_share * cJ.T @ np.diag(np.minimum(loop.controller.K_eps, HUGE)) @ cJ
     found = [("K_eps", coupling), ("Gamma", _learned(loop, i, Y))]
     if type(loop.controller.law) is not BoundSunMills:
         found.append(("law", J.T @ _answers(loop, reference, i)[1] @ J))
@@ -168,7 +183,7 @@ def _answers(loop: ClosedLoop, reference: Reference, i: int) -> tuple[np.ndarray
     The other robots move with it in the way that the coupling answers most.
     """
     n, m = loop.cell.n, loop.cell.m
-    weights, share = reference.weights, _largest_share(loop)
+    weights, share = reference.weights, loop.cell.largest_share
     still = replace(no_errors(n, m), t=reference.t, weights=weights)
     rest = loop.controller.law.command(still).force[i]
     found = np.zeros((2, m, m))

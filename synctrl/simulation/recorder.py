@@ -21,10 +21,20 @@ from .clock import Clock
 from .closed_loop import ClosedLoop, State
 from .description import describe_run, sizes
 from .devices.fitted import DRIVEN, MEASURED, ROLES, LiveDevices
-from .limits import APPLIED, DampingLog, applied_output, limit_report, saturation_report
-from .memory import check_fits
+from .limits import (
+    APPLIED,
+    DAMPING,
+    applied_output,
+    damping_of,
+    damping_report,
+    limit_report,
+    may_damp,
+    saturation_report,
+)
+from .log import IN_MEMORY, Keeping, check_room, make_log
 from .plant import Output
 from .result import LAYOUT, Result
+from .result_file import KINDS
 
 
 class Account(NamedTuple):
@@ -39,63 +49,69 @@ NOTHING = Account({}, {})
 
 
 class Recorder:
-    """Arrays for all logged instants of a run; the system gives memory to those that are filled.
+    """The logged instants of a run, in memory or on their way to files, see `log.py`.
 
     Args:
         loop: the closed loop.
         clock: its instants.
         devices: sensors and actuators, which tell what they read.
+        kept: how the log is kept; by default in memory.
 
     Attributes:
-        count: how many instants are logged.
         reached: the last instant at which all was well, s.
         state: flat state that the run has come to.
 
     Raises:
-        InputError: the log does not fit into memory.
+        InputError: the log does not fit into memory, or onto the disk.
     """
 
-    def __init__(self, loop: ClosedLoop, clock: Clock, devices: LiveDevices):
-        self._loop, self._devices, instants = loop, devices, clock.rows
-        lengths = {"time": instants, **sizes(loop)}
-        shapes = {name: [lengths[d] for d in dimensions] for name, (dimensions, _) in LAYOUT.items()}
-        shapes |= {name: [instants, *shape] for name, shape in own_states(loop).items()}
-        shapes |= {name: [instants, *reading.shape] for name, reading in devices.readings.items()}
-        numbers = sum(int(np.prod(shape[1:])) for shape in shapes.values())
-        check_fits(clock, 8 * numbers)
-        self._arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
-        self._damping = DampingLog(instants, loop.cell.n)
-        self.count, self.reached, self.state = 0, 0.0, loop.initial_state()
+    def __init__(self, loop: ClosedLoop, clock: Clock, devices: LiveDevices, kept: Keeping = IN_MEMORY):
+        self._loop, self._devices, self._kept, lengths = loop, devices, kept, sizes(loop)
+        shapes = {name: tuple(lengths[d] for d in axes[1:]) for name, (axes, _) in LAYOUT.items()}
+        shapes |= own_states(loop)
+        shapes |= {name: reading.shape for name, reading in devices.readings.items()}
+        self._damped = DAMPING if may_damp(loop.cell.space) else ()
+        shapes |= dict.fromkeys(self._damped, (loop.cell.n,))
+        check_room(clock, 8 * sum(int(np.prod(shape)) for shape in shapes.values()), kept)
+        self._log = make_log(shapes, clock.rows, kept)
+        self.reached, self.state = 0.0, loop.initial_state()
+
+    @property
+    def count(self) -> int:
+        """How many instants are logged."""
+        return self._log.count
 
     def add(self, sample: Sample) -> None:
         """Log one instant."""
         state = self._loop.state(sample.y)
         integral = self._loop.controller.network.integral(state.memory)
-        readings = self._devices.readings
-        for name, array in self._arrays.items():
-            read = readings[name] if name in readings else ROW[name](sample, state, integral)
-            array[self.count] = read
-        self._damping.add(self.count, sample.signals)
-        self.count += 1
+        readings, damped = self._devices.readings, self._damped and damping_of(sample.signals)
+        given = {**readings, **dict(zip(self._damped, damped, strict=True))}
+        for name, array in self._log.rows.items():
+            array[self._log.at] = given[name] if name in given else ROW[name](sample, state, integral)
+        self._log.advance(1)
 
     def address_ahead(self, name: str) -> int | None:
-        """Where the part of an array begins that is not logged yet; None if there is no such array."""
-        array = self._damping.arrays.get(name, self._arrays.get(name))
-        return None if array is None else array[self.count :].ctypes.data
+        """Where the rows of an array begin that are filled next; None if there is no such array.
+
+        Rows of doubles follow each other there, as many as are to come, but not more than `AHEAD`.
+        """
+        array = self._log.rows.get(name)
+        return None if array is None else array[self._log.at :].ctypes.data
 
     def advance(self, times: np.ndarray) -> None:
         """Count rows that were filled from outside."""
-        self._arrays["t"][self.count : self.count + len(times)] = times
-        self.count += len(times)
+        self._log.rows["t"][self._log.at : self._log.at + len(times)] = times
+        self._log.advance(len(times))
 
     def last(self, name: str) -> np.ndarray:
         """An array at the last instant that was logged; zeros if there is none."""
-        array = self._arrays[name]
-        return array[self.count - 1] if self.count else np.zeros(array.shape[1:])
+        return self._log.last(name)
 
     def logged(self) -> dict[str, np.ndarray]:
         """What was logged until now, by name."""
-        return {name: array[: self.count] for name, array in self._arrays.items()}
+        found = self._log.logged()
+        return {name: array for name, array in found.items() if name not in self._damped}
 
     def account(self, info: Mapping[str, Any]) -> Account:
         """What plant and network say of their states until now, under names that nobody else has.
@@ -122,11 +138,12 @@ class Recorder:
         self, status: str, info: Mapping[str, Any], experiment: Any, account: Account = NOTHING
     ) -> Result:
         """What was logged until now, with what the plant says of it."""
-        arrays = {name: _taken(array, self.count) for name, array in self._arrays.items()}
+        arrays = self._log.taken()
+        damping = [arrays.pop(name) for name in self._damped]
         states = {name: arrays.pop(name) for name in own_states(self._loop)}
         read = {name: arrays.pop(name) for name in self._devices.readings}
         described = {"status": printable(status), **self._described, **info}
-        described["damping"] = self._damping.report(arrays["t"])
+        described["damping"] = damping_report(arrays["t"], *damping) if damping else []
         seen = (arrays[name] for name in ("t", "q", "v", "tau"))
         described["limits"] = limit_report(self._loop.cell, *seen)
         plant = self._loop.plant
@@ -137,7 +154,8 @@ class Recorder:
         found |= {**applied_output(plant, arrays["tau"]), **account.outputs}
         outputs = {name: array for name, (array, _, _) in found.items()}
         described["outputs"] = {n: {"unit": unit, "axes": list(axes)} for n, (_, unit, axes) in found.items()}
-        return Result(**arrays, info=described, outputs=outputs, experiment=experiment)
+        made = Result(**arrays, info=described, outputs=outputs, experiment=experiment)
+        return made if self._kept.folder is None else made.settled(self._kept.folder, self._kept.dtype)
 
     @cached_property
     def _described(self) -> dict[str, Any]:
@@ -195,11 +213,6 @@ def own_states(loop: ClosedLoop) -> dict[str, tuple[int, ...]]:
     return found | ({PLANT_STATE: loop.plant.hidden0.shape} if loop.plant.hidden0.size else {})
 
 
-def _taken(array: np.ndarray, count: int) -> np.ndarray:
-    """The rows that were logged; a copy only where the array is not all of that."""
-    return np.ascontiguousarray(array) if count == len(array) else array[:count].copy()
-
-
 def _check_names(where: str, entries: Any, taken: Collection[str]) -> None:
     if not isinstance(entries, Mapping):
         raise InputError.expected("entries by name", entries, where, shown=f"{entries!r:.80}")
@@ -221,7 +234,7 @@ def _check_output(where: str, output: Any, lengths: Mapping[str, int]) -> None:
         array, unit, axes = output
         named = isinstance(unit, str) and axes[0] == "time" and all(isinstance(axis, str) for axis in axes)
         fits = all(lengths.get(axis, k) == k for axis, k in zip(axes, array.shape, strict=True))
-        sound = named and fits and array.dtype == np.float64
+        sound = named and fits and array.dtype in KINDS
     except (TypeError, ValueError, AttributeError, IndexError):
         sound = False
     if not sound:

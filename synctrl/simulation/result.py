@@ -17,6 +17,7 @@ import numpy as np
 from ..checks import count, instance
 from ..errors import InputError, ResultError
 from ..robots.model import TURNS, joined, unit_for
+from .log_folder import complete, read_folder
 from .result_file import LAYOUT, check_shape, read_result, shapes, unit_of, write_result
 from .schema import FORMAT
 
@@ -60,6 +61,9 @@ class Result:
 
     Rows of robots with fewer joints or parameters than the largest are padded with zeros;
     `info["robots"]` has their numbers.
+
+    A run with `log_to` keeps its arrays in files of a folder, mapped into memory and read from there when
+    they are looked at. With `log_dtype="float32"` all but the times have seven digits.
     """
 
     t: np.ndarray
@@ -173,16 +177,26 @@ class Result:
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read what `save` wrote.
+        """Read what `save` wrote, or a folder of a run with `log_to`, whose arrays are mapped and not read.
 
         Raises:
             ResultError: the file is missing, damaged, or no result.
         """
         instance("path", path, (str, Path), "a path")
-        info, arrays = read_result(Path(path))
+        info, arrays = read_folder(Path(path)) if Path(path).is_dir() else read_result(Path(path))
         info.pop("format")
+        return cls._of(info, arrays)
+
+    def settled(self, folder: Path, dtype: str) -> Self:
+        """This result, of which a folder has the rows, with the rest there too, and all arrays mapped."""
+        arrays = complete(folder, {"format": FORMAT, **self.info}, self._arrays(), dtype)
+        return self._of(self.info, arrays, experiment=self.experiment)
+
+    @classmethod
+    def _of(cls, info: Mapping[str, Any], arrays: dict[str, np.ndarray], **others: Any) -> Self:
+        """A result of arrays under the names that they have in a file."""
         outputs = {name.removeprefix(OUTPUTS): arrays.pop(name) for name in [*arrays] if name not in LAYOUT}
-        return cls(**arrays, info=info, outputs=outputs)
+        return cls(**arrays, info=info, outputs=outputs, **others)
 
     def __eq__(self, other: object) -> bool:
         """Same arrays, bit for bit, and same info."""

@@ -9,35 +9,29 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import struct
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import chain
-from math import prod
 from pathlib import Path
 from types import MappingProxyType
-from typing import IO, Any, NamedTuple
+from typing import IO, Any
 
 import numpy as np
 
 from ..errors import ResultError
 from ..files import whole_file
 from ..robots.model import TURNS, unit_for
+from .memory import in_parts
+from .npy import Header, read_header, read_numbers
 from .schema import check_info, read_json
 
 #: what reading a file that is no archive, or a damaged one, may raise
 _DAMAGE = (OSError, ValueError, LookupError, EOFError, RuntimeError, MemoryError, ArithmeticError)
 _DAMAGE_OF_ARCHIVES = (*_DAMAGE, zipfile.BadZipFile, struct.error)
-#: bytes that are read at a time
-CHUNK = 2**20
-MAGIC = b"\x93NUMPY\x01\x00"
-_HEADER = re.compile(
-    rb"\{'descr': '([<>])([fU])(\d{1,10})', 'fortran_order': (True|False), "
-    rb"'shape': \(((?:\d{1,19}, )*(?:\d{1,19},?)?)\), \} *\n"
-)
-
+#: what arrays are made of
+KINDS = (np.dtype(np.float64), np.dtype(np.float32))
 #: largest time in a log, s, about 30,000 years: times beyond it are damage
 LATEST = 1e12
 
@@ -78,14 +72,14 @@ def write_result(path: Path, info: Mapping[str, Any], arrays: Mapping[str, np.nd
     Raises:
         ResultError: the file cannot be written, or the result does not follow the schema.
     """
-    with _named(path, "cannot write the result to"):
+    with named(path, "cannot write the result to"):
         try:
             text = json.dumps(info)
         except (TypeError, ValueError, RecursionError) as error:
             raise ResultError.expected("plain data", error, "info", shown=f"{error}") from None
         check_info(read_json(text))
         check_arrays(info, arrays)
-        content: dict[str, Any] = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+        content: dict[str, Any] = {name: np.ascontiguousarray(array, float) for name, array in arrays.items()}
         with whole_file(path) as file:
             np.savez(file, info=np.array(text), **content)
 
@@ -98,7 +92,7 @@ def read_result(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """
     if not path.is_file():
         raise ResultError(f"no result file at '{path}'", file=path)
-    with _named(path, "no result of synctrl can be read from"), path.open("rb") as file:
+    with named(path, "no result of synctrl can be read from"), path.open("rb") as file:
         size = os.fstat(file.fileno()).st_size  # of what is open: there may be another file of that name now
         with zipfile.ZipFile(file) as archive:
             members = _members(archive, size)
@@ -110,8 +104,12 @@ def read_result(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
 
 
 @contextmanager
-def _named(path: Path, what: str) -> Iterator[None]:
-    """Name the file in whatever goes wrong."""
+def named(path: Path, what: str) -> Iterator[None]:
+    """Name the file, or folder, in whatever goes wrong.
+
+    Raises:
+        ResultError: what cannot be done to it, and why.
+    """
     try:
         yield
     except (ResultError, *_DAMAGE_OF_ARCHIVES) as error:
@@ -143,7 +141,7 @@ def _read_arrays(
     if "t" not in members:
         raise ResultError("expected one, found none", subject="array 't'")
     with archive.open(members["t"]) as stream:
-        instants = _read_header(stream, members["t"]).shape
+        instants = _header_of(stream, members["t"]).shape
     expected = shapes(info, instants[0] if instants else 0)
     check_array_names(members, expected)
     return {name: _read_array(archive, members[name], name, expected[name]) for name in expected}
@@ -153,9 +151,9 @@ def _read_array(
     archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str, expected: tuple[int | None, ...]
 ) -> np.ndarray:
     with archive.open(member) as stream:
-        header = _read_header(stream, member)
+        header = _header_of(stream, member)
         check_shape(name, header.dtype.newbyteorder("="), header.shape, expected)
-        return _read_numbers(stream, header).astype(float, copy=False)
+        return read_numbers(stream, header).astype(float, copy=False)
 
 
 def _read_text(archive: zipfile.ZipFile, member: zipfile.ZipInfo | None) -> str:
@@ -163,53 +161,14 @@ def _read_text(archive: zipfile.ZipFile, member: zipfile.ZipInfo | None) -> str:
     if member is None:
         raise ResultError("expected one, found none", subject="array 'info'")
     with archive.open(member) as stream:
-        header = _read_header(stream, member)
+        header = _header_of(stream, member)
         if header.dtype.kind != "U" or header.shape:
             raise ResultError.expected("a text", (str(header.dtype), header.shape), "info")
-        return str(_read_numbers(stream, header))
+        return str(read_numbers(stream, header))
 
 
-# -- arrays -----------------------------------------------------------------------------------------------
-
-
-class Header(NamedTuple):
-    """What an .npy entry says of its array; all of it is there."""
-
-    dtype: np.dtype
-    order: Any
-    shape: tuple[int, ...]
-
-
-def _read_header(stream: IO[bytes], member: zipfile.ZipInfo) -> Header:
-    """The header of an .npy entry, in the only form in which numpy writes the arrays of a result."""
-    start = stream.read(len(MAGIC) + 2)
-    length = int.from_bytes(start[len(MAGIC) :], "little")
-    found = _HEADER.fullmatch(stream.read(length))
-    if not start.startswith(MAGIC) or found is None:
-        raise ResultError("expected an array of numbers or a text", subject=f"{member.filename!a}")
-    byte_order, kind, width, fortran, lengths = (part.decode("ascii") for part in found.groups())
-    shape = tuple(int(k) for k in lengths.replace(",", " ").split())
-    if kind == "f" and width != "8":
-        raise ResultError(f"expected float64, found float{8 * int(width)}", subject=f"{member.filename!a}")
-    size = int(width) * (4 if kind == "U" else 1) * prod(shape)
-    if len(start) + length + size != member.file_size:
-        raise ResultError.expected(
-            f"{size} bytes of an array of shape {shape}",
-            member.file_size - length - len(start),
-            f"{member.filename!a}",
-        )
-    return Header(np.dtype(f"{byte_order}{kind}{width}"), "F" if fortran == "True" else "C", shape)
-
-
-def _read_numbers(stream: IO[bytes], header: Header) -> np.ndarray:
-    array: np.ndarray = np.empty(header.shape, header.dtype, header.order)
-    left = memoryview(array.reshape(-1, order=header.order).view(np.uint8))  # type: ignore[arg-type]
-    while left:
-        read = stream.readinto(left[:CHUNK])  # type: ignore[attr-defined]
-        if not read:
-            raise EOFError("an array ends too early")
-        left = left[read:]
-    return array
+def _header_of(stream: IO[bytes], member: zipfile.ZipInfo) -> Header:
+    return read_header(stream, member.filename, member.file_size)
 
 
 # -- what arrays have to be ---------------------------------------------------------------------------------
@@ -238,11 +197,11 @@ def check_arrays(info: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> N
     check_array_names(arrays, expected)
     for name, array in arrays.items():
         check_shape(name, array.dtype, array.shape, expected[name])
-        if name in LAYOUT and not np.isfinite(array).all():
+        if name in LAYOUT and not all(np.isfinite(part).all() for part in in_parts(array)):
             where = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
             shown = f"{array[where]} at {where}"
             raise ResultError.expected("finite numbers", array[where], f"array '{name}'", shown=shown)
-    _check_times(arrays["t"])
+    check_times(arrays["t"])
 
 
 def check_array_names(found: Iterable[str], expected: Iterable[str]) -> None:
@@ -261,7 +220,7 @@ def check_array_names(found: Iterable[str], expected: Iterable[str]) -> None:
 
 
 def check_shape(name: str, dtype: np.dtype, found: tuple[int, ...], expected: tuple[int | None, ...]) -> None:
-    """Refuse an array of another kind or shape.
+    """Refuse an array of another kind or shape; float32 is what a log may be kept in.
 
     Raises:
         ResultError: see above.
@@ -269,12 +228,17 @@ def check_shape(name: str, dtype: np.dtype, found: tuple[int, ...], expected: tu
     fits = len(found) == len(expected) and all(
         e is None or e == f for e, f in zip(expected, found, strict=True)
     )
-    if not fits or dtype != np.float64:
+    if not fits or dtype not in KINDS:
         kind, shown = (str(dtype), found), f"{dtype} of shape {found}"
         raise ResultError.expected(f"float64 of shape {expected}", kind, f"array '{name}'", shown=shown)
 
 
-def _check_times(t: np.ndarray) -> None:
+def check_times(t: np.ndarray) -> None:
+    """Refuse times that do not grow, or are too large.
+
+    Raises:
+        ResultError: see above.
+    """
     wrong = np.flatnonzero(~(np.abs(t) <= LATEST) | (np.diff(t, prepend=-np.inf) <= 0))
     if wrong.size:
         k = wrong[0]

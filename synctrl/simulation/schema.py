@@ -238,6 +238,7 @@ INFO = entries(
         "outputs": each(entries({"unit": label, "axes": rows(label, least=1)})),
         **dict.fromkeys(("integrator", "engine", "plant"), label),
         **dict.fromkeys(("dt", "log_dt", "duration"), positive),
+        "log_dtype": plain("'float64' or 'float32'", lambda value: value in ("float64", "float32")),
         "control_period": optional(positive),
         "saturate": boolean,
         "decimated": whole(1),

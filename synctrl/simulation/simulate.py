@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,7 @@ from .devices import Actuator, Devices, Sensor
 from .engines import Engine, Run, carry_out
 from .guard import Progress
 from .limits import learning_within
+from .log import keeping
 from .plant import PHYSICS, Plant, torque_limits
 from .result import Result
 from .schedules import Disturbance, DisturbanceSchedule, Payload
@@ -136,6 +138,8 @@ class Experiment:
         plant: str = "pinocchio",
         control_period: float | None = None,
         log_dt: float | None = None,
+        log_to: str | Path | None = None,
+        log_dtype: str = "float64",
         rtol: float = 1e-9,
         atol: float = 1e-11,
         progress: Progress | None = None,
@@ -145,26 +149,24 @@ class Experiment:
         Args:
             duration: s; by default the experiment's.
             dt: step of "rk4", s.
-            integrator: "rk4", or a method of SciPy's solve_ivp: "RK45", "RK23", "DOP853", "Radau", "BDF" or
-                "LSODA".
+            integrator: "rk4", or of SciPy's methods "RK45", "RK23", "DOP853", "Radau", "BDF" or "LSODA".
             engine: "pinocchio", "compiled" (the same as generated C), or an `Engine` of one's own.
             plant: library that computes the plant, "pinocchio" or "mujoco".
             control_period: None for continuous control; else how long torque is held, a multiple of dt, s.
             log_dt: interval of the log, a multiple of dt, s; by default dt. Every dt is watched all the same.
-            rtol, atol: tolerances of SciPy's methods.
-            progress: called now and then with the time reached, s.
+            log_to, log_dtype: a folder for files, not there yet; "float64" or "float32"; see `Result`.
+            rtol, atol, progress: SciPy's tolerances; a function that is told the time reached, s.
 
         Raises:
-            InputError: a value that is wrong or does not go with another, or a log larger than memory.
-            UnreachableError: a robot cannot reach its desired positions; raised before anything runs.
+            InputError, UnreachableError: a wrong value; a log without room; a path out of reach.
             MissingDependencyError, CompilationError: the compiled engine cannot be had, and why.
             SimulationError, RunInterrupted: the run had to stop, or was interrupted.
 
         Warns:
             SaturationWarning, StepWarning: torque was cut off; the step of "rk4" was too long.
-            GainWarning, RobotWarning: forces inside an object may grow; nobody says if stated friction acts.
+            GainWarning, RobotWarning: forces inside may grow; nobody says if stated friction acts.
         """
-        run = self.plan(duration, dt, control_period, plant, log_dt)
+        run = self.plan(duration, dt, control_period, plant, log_dt, log_to, log_dtype)
         return carry_out(run, integrator, engine, (rtol, atol), progress)
 
     def controller(
@@ -199,9 +201,12 @@ class Experiment:
         control_period: float | None = None,
         plant: str = "pinocchio",
         log_dt: float | None = None,
+        log_to: str | Path | None = None,
+        log_dtype: str = "float64",
     ) -> Run:
         """Everything that a run needs; arguments as in `simulate`."""
         choice("plant", plant, tuple(PHYSICS))
+        kept = keeping(log_to, log_dtype)
         duration = self.duration if duration is None else duration
         loop = self.closed_loop(plant)
         schedule = DisturbanceSchedule(self.cell, self.disturbances)
@@ -214,7 +219,7 @@ class Experiment:
         clock = make_clock(duration, dt, edges, loop.cell.breaks, log_dt)
         every = None if control_period is None else multiple("control_period", control_period, dt)
         info: dict[str, Any] = {"integrator": "rk4", "dt": float(dt), "duration": float(duration)}
-        info["log_dt"] = float(dt if log_dt is None else log_dt)
+        info["log_dt"], info["log_dtype"] = float(dt if log_dt is None else log_dt), kept.dtype
         info["engine"], info["plant"], info["saturate"] = "pinocchio", plant, bool(self.saturate)
         info["title"], info["control_period"] = self.title or self.cell.name, control_period
         info["start"] = list(self.cell.starts)
@@ -224,7 +229,7 @@ class Experiment:
         events = [float(t) for t in np.sort(loop.events) if 0 <= t < clock.end - TIE * dt]
         info["events"] = [{"t": t, "part": type(loop.plant).__qualname__} for t in events]
         step_error = StepError(self.cell.n, self.cell.nv)
-        return Run(self, loop, clock, schedule, every, info, step_error, devices)
+        return Run(self, loop, clock, schedule, every, info, step_error, devices, kept)
 
 
 def simulate(
@@ -251,6 +256,8 @@ def simulate(
     plant: str = "pinocchio",
     control_period: float | None = None,
     log_dt: float | None = None,
+    log_to: str | Path | None = None,
+    log_dtype: str = "float64",
     rtol: float = 1e-9,
     atol: float = 1e-11,
     progress: Progress | None = None,
