@@ -9,7 +9,7 @@ beside it, nor on how many lanes there are.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from time import perf_counter
 from typing import NamedTuple
 
@@ -25,9 +25,9 @@ from .lanes import room, state_parts
 from .program import library_for
 from .quantities import QUANTITIES, shape
 from .report import Ending, Worst
-from .stepper import Pace, Stepper
+from .stepper import Pace, Stepper, Told
 from .structs import Mark
-from .tables import Tables
+from .tables import DesiredStretch, Tables
 
 
 class MeasuredErrors(NamedTuple):
@@ -111,7 +111,7 @@ class Batch:
             InputError: something that no run has a column for, or an array of another shape.
         """
         arrays = {name: self._checked(name, array, count) for name, array in columns.items()}
-        width, parts = self._program.lanes.width, list[Measured]()
+        width, parts = self._program.lanes.width, list[_Seen]()
         for first in range(0, count, width):
             chosen = np.minimum(np.arange(first, first + width), count - 1)
             self._side.begin()
@@ -136,6 +136,24 @@ class Batch:
         return found
 
 
+class _Seen(NamedTuple):
+    """What was seen of runs that stood in lanes; lanes come last.
+
+    Attributes:
+        times: instants that were looked at, s.
+        instants: how many they were.
+        ended: status, robot, time and value.
+        worst: error of the worst step, largest velocity, time and joint.
+        tally: what was counted up, by name.
+    """
+
+    times: np.ndarray
+    instants: int
+    ended: np.ndarray
+    worst: np.ndarray
+    tally: dict[str, np.ndarray]
+
+
 class _Side(Stepper):
     """Runs in the lanes of the library, from their start to their end; then others, with the same memory."""
 
@@ -147,6 +165,7 @@ class _Side(Stepper):
         self._stop = np.zeros(program.lanes.width)
         self._tally, self._kept = _tally(program, bands)
         self.steps.tally = ctypes.addressof(self._tally)
+        self._known: dict[int, Told] = {}
         self._start = self._y.copy(), {name: array.copy() for name, array in self._kept.items()}
 
     def begin(self) -> None:
@@ -172,7 +191,7 @@ class _Side(Stepper):
         else:
             self.program.tell_apart(self.steps, name, array)
 
-    def made(self) -> Measured:
+    def made(self) -> _Seen:
         """Make the runs."""
         for block in self._tables.blocks(self.program, self.run.clock):
             self.look_at(block)
@@ -181,12 +200,20 @@ class _Side(Stepper):
                 self.call(first, last)
                 self._pace.learn(last - first, perf_counter() - start)
             if self._ending.all:
-                return self._measured()
+                return self._seen()
         self.look_at_end()
         self.call(0, 1)
-        return self._measured()
+        return self._seen()
 
     # -- internals ----------------------------------------------------------------------------------------
+
+    def _read(self, block: DesiredStretch) -> Told:
+        """See `Stepper`; of a block that is kept for all runs once."""
+        if not self._tables.keeps(self.program, self.run.clock):
+            return super()._read(block)
+        if id(block) not in self._known:
+            self._known[id(block)] = super()._read(block)
+        return self._known[id(block)]
 
     def _made(self, times: np.ndarray, marks: np.ndarray) -> None:
         if self._ending.all:
@@ -207,35 +234,16 @@ class _Side(Stepper):
             begin += rows * length
         raise InputError.expected("a part of the state", name, "columns")
 
-    def _measured(self) -> Measured:
-        t, (status, _, robot, value) = np.concatenate(self._logged), self._ending.found
-        for array in self._kept.values():
-            array[..., status != 0] = np.nan  # of a run that ended early nothing is known
-        worst = self._worst
-        return Measured(
-            tracking_error=self._errors("tracking", t),
-            sync_error=self._errors("sync", t),
-            peak_torque=self._runs("torque torque"),
-            cut=self._runs("torque cut"),
-            step_error=np.stack((worst.largest, worst.speed, worst.time), axis=1),
-            joint=worst.joint(np.arange(len(status))),
-            status=status.copy(),
-            stop_time=self._stop.copy(),
-            robot=robot.copy(),
-            value=value.copy(),
+    def _seen(self) -> _Seen:
+        status, _, robot, value = self._ending.found
+        worst, lanes = self._worst, np.arange(len(status))
+        return _Seen(
+            times=np.concatenate(self._logged),
             instants=self._tally.rows,
+            ended=np.stack((status, robot, self._stop, value)),
+            worst=np.stack((worst.largest, worst.speed, worst.time, worst.joint(lanes))),
+            tally={name: array.copy() for name, array in self._kept.items()},
         )
-
-    def _errors(self, kind: str, t: np.ndarray) -> MeasuredErrors:
-        peak, ise, final, outside = (
-            self._runs(f"{kind} {name}") for name in ("peak", "ise", "final", "outside")
-        )
-        settled = np.append(t, (np.inf, np.nan))[np.nan_to_num(outside, nan=len(t)).astype(int) + 1]
-        return MeasuredErrors(peak, ise, settled, final)
-
-    def _runs(self, name: str) -> np.ndarray:
-        """An array of the tally with the runs first."""
-        return np.moveaxis(self._kept[name], -1, 0).copy()
 
 
 def _check_alone(run: Run) -> None:
@@ -274,21 +282,34 @@ def _tally(program: CompiledLoop, bands: Mapping) -> tuple[structs.Tally, dict[s
     return structs.Tally(*errors, **torque), kept
 
 
-def _joined(parts: Iterable[Measured], count: int) -> Measured:
+def _joined(parts: Sequence[_Seen], count: int) -> Measured:
     """Measures of all runs, without the lanes that were too many."""
-    listed = list(parts)
 
     def one(arrays: Iterable[np.ndarray]) -> np.ndarray:
-        return np.concatenate(list(arrays))[:count]
+        return np.ascontiguousarray(np.moveaxis(np.concatenate([*arrays], axis=-1), -1, 0)[:count])
 
-    def errors(kind: str) -> MeasuredErrors:
-        of_kind = [getattr(part, kind) for part in listed]
-        return MeasuredErrors(*(one(arrays) for arrays in zip(*of_kind, strict=True)))
-
-    names = [name for name in Measured._fields if name not in ("tracking_error", "sync_error", "instants")]
+    status, robot, stop_time, value = one(part.ended for part in parts).T
+    worst = one(part.worst for part in parts)
+    times = max((part.times for part in parts), key=len)
+    tally = {name: one(part.tally[name] for part in parts) for name in parts[0].tally}
+    for array in tally.values():
+        array[status != 0] = np.nan  # of a run that ended early nothing is known
     return Measured(
-        tracking_error=errors("tracking_error"),
-        sync_error=errors("sync_error"),
-        **{name: one(getattr(part, name) for part in listed) for name in names},
-        instants=max(part.instants for part in listed),
+        tracking_error=_errors("tracking", tally, times),
+        sync_error=_errors("sync", tally, times),
+        peak_torque=tally["torque torque"],
+        cut=tally["torque cut"],
+        step_error=worst[:, :3],
+        joint=worst[:, 3].astype(int),
+        status=status.astype(int),
+        stop_time=stop_time,
+        robot=robot.astype(int),
+        value=value,
+        instants=max(part.instants for part in parts),
     )
+
+
+def _errors(kind: str, tally: Mapping[str, np.ndarray], t: np.ndarray) -> MeasuredErrors:
+    peak, ise, final, outside = (tally[f"{kind} {name}"] for name in ("peak", "ise", "final", "outside"))
+    settled = np.append(t, (np.inf, np.nan))[np.nan_to_num(outside, nan=len(t)).astype(int) + 1]
+    return MeasuredErrors(peak, ise, settled, final)

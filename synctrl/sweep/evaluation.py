@@ -20,7 +20,7 @@ BATCH_TIME = 1.0
 #: batches per worker at least, so that all of them have something to do until the end
 SHARES = 4
 #: of how many runs at most whose step was too long one that does is looked for
-LOOKED_INTO = 16
+LOOKED_INTO = 4
 #: how often the rest is begun again after a worker has died without a single run being finished in between
 RETRIES = 2
 
