@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -162,6 +163,25 @@ def test_trajectories_and_a_users_own_factors_are_made_run_by_run(kept, tmp_path
     assert list(load(tmp_path)["status"]) == ["completed"] * 2
 
 
+def stiffer(experiment, value):
+    return replace(experiment, gains=experiment.gains.replace(K_eps=value, K_r=2 * value))
+
+
+def stiffer_columns(arrays, values):
+    arrays["K_eps"][...] = values[:, None, None]
+    arrays["K_r"][...] = 2 * values[:, None, None]
+
+
+def test_a_users_own_factor_may_have_columns(monkeypatch):
+    made = sweep(
+        [Factor("stiffness", Uniform(1, 2), stiffer, stiffer_columns), gain("beta", Uniform(1, 2))], 5
+    )
+    runner, tasks = Runner(made.study.job()), [made._task(run) for run in range(5)]
+    alone = [runner.outcome(task).row for task in tasks]
+    monkeypatch.setattr(Runner, "outcome", None)
+    assert [each.row for each in runner.outcomes(tasks)] == alone
+
+
 # -- the same table, whoever makes it ---------------------------------------------------------------------
 
 
@@ -179,6 +199,18 @@ def test_the_table_is_the_same_in_blocks_of_any_size(backend, workers, batch, wh
     if backend == "joblib":
         pytest.importorskip("joblib", reason="pip install 'synctrl[sweep]'")
     assert quiet(free(), tmp_path, workers, backend, batch=batch) == whole
+
+
+@pytest.mark.parametrize("width", [1, 2, 4, 8])
+def test_the_table_is_the_same_in_any_number_of_lanes(width, whole, tmp_path, monkeypatch):
+    from synctrl.compiled import processor
+
+    if width > processor.widest():
+        pytest.skip(f"this processor has {processor.widest()} lanes")
+    made = []
+    monkeypatch.setattr(processor, "widest", lambda: made.append(width) or width)
+    assert quiet(free(), tmp_path, backend="serial") == whole
+    assert made
 
 
 def test_the_table_is_the_same_from_a_cluster(whole, tmp_path):
