@@ -82,8 +82,8 @@ EXPERIMENTS = {
 
 def arrays_of(experiment: Experiment) -> dict[str, np.ndarray]:
     """What the engine is given of an experiment that differs from run to run."""
-    from synctrl.compiled.kind import classify
     from synctrl.compiled.arrays import _carried, _constants
+    from synctrl.compiled.kind import classify
 
     run = experiment.plan(0.01, 1e-3)
     classified = classify(run.loop)

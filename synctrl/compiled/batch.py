@@ -103,8 +103,8 @@ class Batch:
 
         Args:
             columns: what differs from the planned run, by names of quantities: constants of the cell, "q",
-                "v", "z" and "memory" at the start, (count, rows, columns); "pi" and "disturbance", (count,
-                windows, rows, columns).
+                "v", "z" and "memory" at the start, (count, rows, columns); "disturbance", (count, windows,
+                rows, columns); and "pi", true inertial parameters, (count, windows, n, 10 bodies).
             count: number of runs.
 
         Raises:
@@ -127,13 +127,14 @@ class Batch:
         if name not in QUANTITIES or QUANTITIES[name].owner not in ("cell", "state", "load", "disturbance"):
             raise InputError.expected("a quantity that runs have from their start", name, "columns")
         expected: tuple[int, ...] = shape(name, self._program.sizes)
-        windows = {"pi": self._program.carried, "disturbance": self._run.schedule.torques}
-        if name in windows:
-            expected = (len(windows[name]), *expected)
+        if name == "pi":
+            expected = self._program.parameters.shape
+        elif name == "disturbance":
+            expected = (len(self._run.schedule.torques), *expected)
         found = np.asarray(array, dtype=float)
         if found.shape != (count, *expected):
             raise InputError.expected(f"shape {(count, *expected)}", found.shape, f"columns, {name}")
-        return found
+        return self._program.lumped(found) if name == "pi" else found
 
 
 class _Seen(NamedTuple):

@@ -15,7 +15,7 @@ from ..simulation.guard import checks, limits_of
 from . import structs
 from .arrays import CompiledLoop
 from .structs import Mark
-from .tables import DesiredStretch, tabulated
+from .tables import DesiredStretch, desired_in
 
 #: how long the library may be away, s: Ctrl-C is seen when it comes back
 AWAY = 0.05
@@ -109,7 +109,7 @@ class Stepper:
         nothing = Stretch(clock.steps, np.repeat(clock.end, 2), yes, yes, np.array([clock.count]))
         due = np.array([run.every is None or clock.sampled_at_end(run.every)])
         before = clock.stretch(clock.steps - 1, clock.steps).middles
-        block = DesiredStretch(nothing, tabulated(run.loop.cell, np.array([clock.end] * 3)))
+        block = desired_in(run.loop.cell, nothing, ~yes)
         return self._made_ready(block, marked(yes, yes, due, no), before)
 
     def _read(self, block: DesiredStretch) -> Told:
@@ -136,6 +136,7 @@ class Stepper:
         for name, arrays in told.arrays.items():
             setattr(self.steps, name, arrays)
         self.steps.length, self._told = len(told.marks), told
+        self.steps.ends = told.block.ends.ctypes.data
 
     def _point(self, first: int, last: int) -> None:
         """Say which steps of the block are to be made."""

@@ -16,6 +16,7 @@ from ..simulation.engines import Run
 from .columns import Columns, apart
 from .distributions import Value
 from .factors import Setup
+from .further import further_values
 from .measures import doubt_of_row, measures_of_all
 from .rows import COMPLETED
 from .tasks import Job, Outcome, Task
@@ -92,7 +93,14 @@ class Blocks:
         made = [task for task, left in zip(tasks, columns.left, strict=True) if not left]
         if not made:
             return {}
-        return told(made, bench.run, bench.batch.measure(arrays, len(made)))
+        outcomes = told(made, bench.run, bench.batch.measure(arrays, len(made)))
+        return {task.run: self._further(task, outcomes[task.run]) for task in made if task.run in outcomes}
+
+    def _further(self, task: Task, outcome: Outcome) -> Outcome:
+        """A run with what a search asks for beside the measures of runs."""
+        names = self._job.further
+        found = further_values(names, self._job.setup(task.values)) if names else []
+        return outcome._replace(row=[*outcome.row, *found])
 
     def _bench(self, shared: tuple[Value, ...]) -> Bench | None:
         """The base run of a group, None if it cannot have one; made once."""

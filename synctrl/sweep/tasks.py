@@ -9,7 +9,7 @@ from ..analysis.metrics import Band
 from ..simulation.result import Result
 from .distributions import Value
 from .factors import Factor, Setup
-from .measures import Doubt
+from .measures import MEASURES, Doubt
 from .rows import Row, columns
 
 
@@ -42,12 +42,14 @@ class Job(NamedTuple):
         factors: how.
         bands: settling bands by kind of error.
         keep_every: which of the logged instants are kept, or None for no trajectories.
+        further: names of the measures of `FURTHER` that rows have too, after all others.
     """
 
     base: Setup
     factors: tuple[Factor, ...]
     bands: Mapping[str, Band]
     keep_every: int | None = None
+    further: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"Job: {self.base!r}, {len(self.factors)} factors"
@@ -55,7 +57,7 @@ class Job(NamedTuple):
     @property
     def columns(self) -> list[str]:
         """Names of the entries of a row."""
-        return columns(factor.name for factor in self.factors)
+        return columns((factor.name for factor in self.factors), (*MEASURES, *self.further))
 
     def setup(self, values: Sequence[Value]) -> Setup:
         """The base with all factors applied, in their order."""

@@ -16,6 +16,7 @@ from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .blocks import LANES, Blocks
 from .factors import Setup
+from .further import further_values
 from .measures import MEASURES, doubt_of, measures
 from .rows import COMPLETED, REFUSED, STOPPED
 from .tasks import Job, Outcome
@@ -161,10 +162,11 @@ class Runner:
         if error is not None:  # halves of surrogate pairs, which a name may have, become question marks
             cause = f"{type(error).__name__}: {error}".encode(errors="replace").decode()
         time = error.time if isinstance(error, SimulationError) else None
-        values: list[Any] = [None] * len(MEASURES)
+        values: list[Any] = [None] * (len(MEASURES) + len(self.job.further))
         doubt = None
         if status == COMPLETED and result is not None:
             values, doubt = measures(result, self.job.bands), doubt_of(result)
+            values += further_values(self.job.further, self.job.setup(task.values))
         row = [task.run, *task.values, status, cause, None if time is None else float(time), *values]
         return Outcome(row, self._keep(task, result), doubt)
 
