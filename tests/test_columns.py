@@ -89,8 +89,7 @@ def arrays_of(experiment: Experiment) -> dict[str, np.ndarray]:
     classified = classify(run.loop)
     state = run.loop.state(run.loop.initial_state())
     found = _constants(run.loop, classified)
-    bodies = max(kind.sizes["bodies"] for kind in classified.kinds)
-    found |= {"pi": _carried(run.loop.plant, bodies), "disturbance": run.schedule.torques}
+    found |= {"pi": _carried(run.loop.plant), "disturbance": run.schedule.torques}
     return {**found, "q": state.q, "v": state.v, "z": state.z, "memory": state.memory}
 
 
