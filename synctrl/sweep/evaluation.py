@@ -71,15 +71,16 @@ class Evaluation:
             SweepFileError: a run made before has other values than its task.
             SweepError: workers die again and again, or a function of the user fails.
         """
-        todo = [task for task in tasks if not self._has(task)]
+        at_once = self._runner.lanes == 1 or self.rows  # else values are drawn while others run
+        todo = [task for task in tasks if not self._has(task)] if at_once else tasks
         if todo and self._batch is None:
-            first, todo = todo[: self._runner.lanes], todo[self._runner.lanes :]
+            first, todo = [*todo[: self._runner.lanes]], todo[self._runner.lanes :]
             yield self._first(first, len(todo))
         attempts = RETRIES
         while todo:
             try:
                 size = self._batch or 1
-                batches = (todo[k : k + size] for k in range(0, len(todo), size))
+                batches = ([*todo[k : k + size]] for k in range(0, len(todo), size))
                 for outcomes in self._crew(batches):
                     yield self._write(outcomes)
                 return
