@@ -265,6 +265,25 @@ def test_a_sweep_that_is_killed_in_a_block_loses_blocks_in_flight_alone(backend,
     assert (tmp_path / "runs.jsonl").read_bytes().startswith(written)
 
 
+STOPPED = """
+import signal
+from test_sweep_blocks import after, free, quiet
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it otherwise
+after(2, lambda: signal.raise_signal(signal.SIGINT))
+quiet(free(), {folder!r}, 2, {backend!r}, batch=3)
+"""
+
+
+@pytest.mark.parametrize("backend", ["serial", "joblib"])
+def test_ctrl_c_ends_a_sweep_that_goes_on_from_the_blocks_before(backend, whole, tmp_path):
+    script = STOPPED.format(folder=str(tmp_path), backend=backend)
+    done = subprocess.run([sys.executable, "-c", script], cwd=TESTS.parent, env=ENV, capture_output=True)
+    assert b"KeyboardInterrupt" in done.stderr, done.stderr
+    assert (tmp_path / "runs.jsonl").read_bytes().count(b"\n") < 12
+    assert quiet(free(), tmp_path, 2) == whole
+
+
 @pytest.mark.parametrize("backend", ["serial", "joblib"])
 def test_an_interrupt_costs_the_blocks_in_flight(backend, whole, tmp_path, monkeypatch):
     from synctrl.compiled.batch import Batch
