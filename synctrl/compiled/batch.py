@@ -9,9 +9,8 @@ beside it, nor on how many lanes there are.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from time import perf_counter
-from typing import NamedTuple
 
 import numpy as np
 
@@ -22,51 +21,14 @@ from .arrays import CompiledLoop
 from .kind import classify
 from .known import check_known
 from .lanes import room, state_parts
+from .measured import Measured as Measured
+from .measured import Seen, joined
 from .program import library_for
 from .quantities import QUANTITIES, shape
 from .report import Ending, Worst
 from .stepper import Pace, Stepper, Told
 from .structs import Mark
 from .tables import DesiredStretch, Tables
-
-
-class MeasuredErrors(NamedTuple):
-    """Measures of one kind of error, (runs, rows, m) each; see `analysis.metrics.ErrorMetrics`."""
-
-    peak: np.ndarray
-    ise: np.ndarray
-    settling_time: np.ndarray
-    final: np.ndarray
-
-
-class Measured(NamedTuple):
-    """What was measured of runs; of one that ended early only how it ended means anything.
-
-    Attributes:
-        tracking_error, sync_error: of the errors; NaN, as torque and cut, in a run that ended early.
-        peak_torque: largest torque that was asked for, (runs, n, nv), N·m or N.
-        cut: at how many instants it was larger than the limit, (runs, n, nv).
-        step_error: error of the worst step and the largest velocity, in rad/s, and the end of that step, s,
-            (runs, 3); see `StepError`.
-        joint: in a row of all robots' joints, at which it was, (runs,); -1 if no step was looked at.
-        status: 0 of a run that went to its end, else what the guard found, see `stepper.found_check`,
-            (runs,).
-        stop_time: when it ended, s, (runs,).
-        robot, value: at which robot, and the number that was too large, (runs,).
-        instants: how many instants were looked at in a run that went to its end.
-    """
-
-    tracking_error: MeasuredErrors
-    sync_error: MeasuredErrors
-    peak_torque: np.ndarray
-    cut: np.ndarray
-    step_error: np.ndarray
-    joint: np.ndarray
-    status: np.ndarray
-    stop_time: np.ndarray
-    robot: np.ndarray
-    value: np.ndarray
-    instants: int
 
 
 class Batch:
@@ -111,14 +73,14 @@ class Batch:
             InputError: something that no run has a column for, or an array of another shape.
         """
         arrays = {name: self._checked(name, array, count) for name, array in columns.items()}
-        width, parts = self._program.lanes.width, list[_Seen]()
+        width, parts = self._program.lanes.width, list[Seen]()
         for first in range(0, count, width):
             chosen = np.minimum(np.arange(first, first + width), count - 1)
             self._side.begin()
             for name, array in arrays.items():
                 self._side.put(name, np.moveaxis(array[chosen], 0, -1))
             parts.append(self._side.made())
-        return _joined(parts, count)
+        return joined(parts, count)
 
     # -- internals ----------------------------------------------------------------------------------------
 
@@ -135,24 +97,6 @@ class Batch:
         if found.shape != (count, *expected):
             raise InputError.expected(f"shape {(count, *expected)}", found.shape, f"columns, {name}")
         return self._program.lumped(found) if name == "pi" else found
-
-
-class _Seen(NamedTuple):
-    """What was seen of runs that stood in lanes; lanes come last.
-
-    Attributes:
-        times: instants that were looked at, s.
-        instants: how many they were.
-        ended: status, robot, time and value.
-        worst: error of the worst step, largest velocity, time and joint.
-        tally: what was counted up, by name.
-    """
-
-    times: np.ndarray
-    instants: int
-    ended: np.ndarray
-    worst: np.ndarray
-    tally: dict[str, np.ndarray]
 
 
 class _Side(Stepper):
@@ -192,7 +136,7 @@ class _Side(Stepper):
         else:
             self.program.tell_apart(self.steps, name, array)
 
-    def made(self) -> _Seen:
+    def made(self) -> Seen:
         """Make the runs."""
         for block in self._tables.blocks(self.program, self.run.clock):
             self.look_at(block)
@@ -235,10 +179,10 @@ class _Side(Stepper):
             begin += rows * length
         raise InputError.expected("a part of the state", name, "columns")
 
-    def _seen(self) -> _Seen:
+    def _seen(self) -> Seen:
         status, _, robot, value = self._ending.found
         worst, lanes = self._worst, np.arange(len(status))
-        return _Seen(
+        return Seen(
             times=np.concatenate(self._logged),
             instants=self._tally.rows,
             ended=np.stack((status, robot, self._stop, value)),
@@ -281,36 +225,3 @@ def _tally(program: CompiledLoop, bands: Mapping) -> tuple[structs.Tally, dict[s
     ]
     torque = {name: kept[f"torque {name}"].ctypes.data for name in ("torque", "cut")}
     return structs.Tally(*errors, **torque), kept
-
-
-def _joined(parts: Sequence[_Seen], count: int) -> Measured:
-    """Measures of all runs, without the lanes that were too many."""
-
-    def one(arrays: Iterable[np.ndarray]) -> np.ndarray:
-        return np.ascontiguousarray(np.moveaxis(np.concatenate([*arrays], axis=-1), -1, 0)[:count])
-
-    status, robot, stop_time, value = one(part.ended for part in parts).T
-    worst = one(part.worst for part in parts)
-    times = max((part.times for part in parts), key=len)
-    tally = {name: one(part.tally[name] for part in parts) for name in parts[0].tally}
-    for array in tally.values():
-        array[status != 0] = np.nan  # of a run that ended early nothing is known
-    return Measured(
-        tracking_error=_errors("tracking", tally, times),
-        sync_error=_errors("sync", tally, times),
-        peak_torque=tally["torque torque"],
-        cut=tally["torque cut"],
-        step_error=worst[:, :3],
-        joint=worst[:, 3].astype(int),
-        status=status.astype(int),
-        stop_time=stop_time,
-        robot=robot.astype(int),
-        value=value,
-        instants=max(part.instants for part in parts),
-    )
-
-
-def _errors(kind: str, tally: Mapping[str, np.ndarray], t: np.ndarray) -> MeasuredErrors:
-    peak, ise, final, outside = (tally[f"{kind} {name}"] for name in ("peak", "ise", "final", "outside"))
-    settled = np.append(t, (np.inf, np.nan))[np.nan_to_num(outside, nan=len(t)).astype(int) + 1]
-    return MeasuredErrors(peak, ise, settled, final)
