@@ -11,9 +11,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from machines import random_robot
 from sweeps import DT, quiet
 from test_columns import small
 
+from synctrl import Cell, Coupling, Experiment, ExponentialApproach, Gains, JointSpace, Member
 from synctrl.control.laws import SunMills
 from synctrl.errors import StepWarning
 from synctrl.experiments import planar_four
@@ -64,7 +66,15 @@ def free() -> Sweep:
     return sweep([gain("beta", LogUniform(1, 100)), model_error(Uniform(-1, 1))], 12)
 
 
+def single() -> Experiment:
+    """Two pendulums, compared in one coordinate."""
+    members = [Member(random_robot(seed, 1), ExponentialApproach([0.1], [0.4])) for seed in range(2)]
+    cell = Cell(members, Coupling.pair([1.0, 1.0]), JointSpace())
+    return Experiment(cell, Gains(5.0, 5.0, 3.0, 1.0, 0.1), 1.0)
+
+
 SWEEPS = {
+    "one coordinate": (lambda: sweep([gain("beta", Uniform(1, 9))], 9, single(), dt=1e-3), 9),
     "numbers": (free, 12),
     "a start": (
         lambda: sweep(
