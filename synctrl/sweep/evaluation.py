@@ -106,7 +106,7 @@ class Evaluation:
 
     def _first(self, tasks: Sequence[Task], left: int) -> list[Row]:
         """Make some runs here, to see how long one takes."""
-        self._runner.prepare(tasks[0])
+        self._runner.go_together(tasks[:1])
         start = perf_counter()
         outcomes = [*self._runner.outcomes(tasks)]
         took = (perf_counter() - start) / len(tasks)
