@@ -7,12 +7,16 @@ import signal
 import subprocess
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from machines import random_robot
 from sweeps import DT, quiet
 from test_columns import small
 
+from synctrl import Cell, Coupling, Experiment, ExponentialApproach, Gains, JointSpace, Member
+from synctrl.control.adaptation import Box
 from synctrl.control.laws import SunMills
 from synctrl.errors import StepWarning
 from synctrl.experiments import planar_four
@@ -63,7 +67,15 @@ def free() -> Sweep:
     return sweep([gain("beta", LogUniform(1, 100)), model_error(Uniform(-1, 1))], 12)
 
 
+def single() -> Experiment:
+    """Two pendulums, compared in one coordinate."""
+    members = [Member(random_robot(seed, 1), ExponentialApproach([0.1], [0.4])) for seed in range(2)]
+    cell = Cell(members, Coupling.pair([1.0, 1.0]), JointSpace())
+    return Experiment(cell, Gains(5.0, 5.0, 3.0, 1.0, 0.1), 1.0)
+
+
 SWEEPS = {
+    "one coordinate": (lambda: sweep([gain("beta", Uniform(1, 9))], 9, single(), dt=1e-3), 9),
     "numbers": (free, 12),
     "a start": (
         lambda: sweep(
@@ -162,6 +174,34 @@ def test_trajectories_and_a_users_own_factors_are_made_run_by_run(kept, tmp_path
     assert list(load(tmp_path)["status"]) == ["completed"] * 2
 
 
+def stiffer(experiment, value):
+    return replace(experiment, gains=experiment.gains.replace(K_eps=value, K_r=2 * value))
+
+
+def stiffer_columns(arrays, values):
+    arrays["K_eps"][...] = values[:, None, None]
+    arrays["K_r"][...] = 2 * values[:, None, None]
+
+
+def test_a_users_own_factor_may_have_columns(monkeypatch):
+    made = sweep(
+        [Factor("stiffness", Uniform(1, 2), stiffer, stiffer_columns), gain("beta", Uniform(1, 2))], 5
+    )
+    runner, tasks = Runner(made.study.job()), [made._task(run) for run in range(5)]
+    alone = [runner.outcome(task).row for task in tasks]
+    monkeypatch.setattr(Runner, "outcome", None)
+    assert [each.row for each in runner.outcomes(tasks)] == alone
+
+
+def test_runs_that_cannot_go_together_are_left_to_processes(tmp_path, monkeypatch):
+    pytest.importorskip("joblib", reason="pip install 'synctrl[sweep]'")
+    learning = replace(small(), adaptation=Box(0.1, -9.0, 9.0), gains=small().gains.replace(Gamma=None))
+    made = sweep([model_error(Uniform(-0.1, 0.1))], 4, learning)
+    monkeypatch.setattr("synctrl.sweep.backends._threads", None)
+    table = quiet(made, tmp_path / "processes")
+    assert table == quiet(made, tmp_path / "serial", backend="serial")
+
+
 # -- the same table, whoever makes it ---------------------------------------------------------------------
 
 
@@ -179,6 +219,18 @@ def test_the_table_is_the_same_in_blocks_of_any_size(backend, workers, batch, wh
     if backend == "joblib":
         pytest.importorskip("joblib", reason="pip install 'synctrl[sweep]'")
     assert quiet(free(), tmp_path, workers, backend, batch=batch) == whole
+
+
+@pytest.mark.parametrize("width", [1, 2, 4, 8])
+def test_the_table_is_the_same_in_any_number_of_lanes(width, whole, tmp_path, monkeypatch):
+    from synctrl.compiled import processor
+
+    if width > processor.widest():
+        pytest.skip(f"this processor has {processor.widest()} lanes")
+    made = []
+    monkeypatch.setattr(processor, "widest", lambda: made.append(width) or width)
+    assert quiet(free(), tmp_path, backend="serial") == whole
+    assert made
 
 
 def test_the_table_is_the_same_from_a_cluster(whole, tmp_path):
@@ -233,6 +285,25 @@ def test_a_sweep_that_is_killed_in_a_block_loses_blocks_in_flight_alone(backend,
     assert (tmp_path / "runs.jsonl").read_bytes().startswith(written)
 
 
+STOPPED = """
+import signal
+from test_sweep_blocks import after, free, quiet
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it otherwise
+after(2, lambda: signal.raise_signal(signal.SIGINT))
+quiet(free(), {folder!r}, 2, {backend!r}, batch=3)
+"""
+
+
+@pytest.mark.parametrize("backend", ["serial", "joblib"])
+def test_ctrl_c_ends_a_sweep_that_goes_on_from_the_blocks_before(backend, whole, tmp_path):
+    script = STOPPED.format(folder=str(tmp_path), backend=backend)
+    done = subprocess.run([sys.executable, "-c", script], cwd=TESTS.parent, env=ENV, capture_output=True)
+    assert b"KeyboardInterrupt" in done.stderr, done.stderr
+    assert (tmp_path / "runs.jsonl").read_bytes().count(b"\n") < 12
+    assert quiet(free(), tmp_path, 2) == whole
+
+
 @pytest.mark.parametrize("backend", ["serial", "joblib"])
 def test_an_interrupt_costs_the_blocks_in_flight(backend, whole, tmp_path, monkeypatch):
     from synctrl.compiled.batch import Batch
@@ -245,7 +316,7 @@ def test_an_interrupt_costs_the_blocks_in_flight(backend, whole, tmp_path, monke
         after(2, interrupt)
         with pytest.raises(KeyboardInterrupt):
             quiet(free(), tmp_path, 1, backend, batch=3)
-    assert len(load(tmp_path)) == 6
+    assert len(load(tmp_path)) == {"serial": 6, "joblib": 3}[backend]  # joblib has tried one of them before
     assert quiet(free(), tmp_path, 2) == whole
 
 

@@ -98,8 +98,14 @@ def error_metrics(t: np.ndarray, e: np.ndarray, band: Band) -> ErrorMetrics:
 
 
 def integral_of_square(t: np.ndarray, e: np.ndarray) -> np.ndarray:
-    """Integral of e^2 over time by the trapezoidal rule, (...), for e of shape (T, ...)."""
-    return np.trapezoid(np.square(e), t, axis=0)
+    """Integral of e^2 over time by the trapezoidal rule, (...), for e of shape (T, ...).
+
+    One step is added after another, as by code that measures a run while it goes: the bits are the same.
+    """
+    square, steps = np.square(e), np.diff(t).reshape(-1, *[1] * (e.ndim - 1))
+    areas = np.zeros(e.shape)
+    areas[1:] = steps * (square[1:] + square[:-1]) / 2.0
+    return np.cumsum(areas, axis=0)[-1]
 
 
 def settling_time(t: np.ndarray, e: np.ndarray, band: Band) -> np.ndarray:

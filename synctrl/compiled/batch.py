@@ -9,9 +9,8 @@ beside it, nor on how many lanes there are.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from time import perf_counter
-from typing import NamedTuple
 
 import numpy as np
 
@@ -22,51 +21,14 @@ from .arrays import CompiledLoop
 from .kind import classify
 from .known import check_known
 from .lanes import room, state_parts
+from .measured import Measured as Measured
+from .measured import Seen, joined
 from .program import library_for
 from .quantities import QUANTITIES, shape
 from .report import Ending, Worst
-from .stepper import Pace, Stepper
+from .stepper import Pace, Stepper, Told
 from .structs import Mark
-from .tables import Tables
-
-
-class MeasuredErrors(NamedTuple):
-    """Measures of one kind of error, (runs, rows, m) each; see `analysis.metrics.ErrorMetrics`."""
-
-    peak: np.ndarray
-    ise: np.ndarray
-    settling_time: np.ndarray
-    final: np.ndarray
-
-
-class Measured(NamedTuple):
-    """What was measured of runs; of one that ended early only how it ended means anything.
-
-    Attributes:
-        tracking_error, sync_error: of the errors; NaN, as torque and cut, in a run that ended early.
-        peak_torque: largest torque that was asked for, (runs, n, nv), N·m or N.
-        cut: at how many instants it was larger than the limit, (runs, n, nv).
-        step_error: error of the worst step and the largest velocity, in rad/s, and the end of that step, s,
-            (runs, 3); see `StepError`.
-        joint: in a row of all robots' joints, at which it was, (runs,); -1 if no step was looked at.
-        status: 0 of a run that went to its end, else what the guard found, see `stepper.found_check`,
-            (runs,).
-        stop_time: when it ended, s, (runs,).
-        robot, value: at which robot, and the number that was too large, (runs,).
-        instants: how many instants were looked at in a run that went to its end.
-    """
-
-    tracking_error: MeasuredErrors
-    sync_error: MeasuredErrors
-    peak_torque: np.ndarray
-    cut: np.ndarray
-    step_error: np.ndarray
-    joint: np.ndarray
-    status: np.ndarray
-    stop_time: np.ndarray
-    robot: np.ndarray
-    value: np.ndarray
-    instants: int
+from .tables import DesiredStretch, Tables
 
 
 class Batch:
@@ -111,14 +73,14 @@ class Batch:
             InputError: something that no run has a column for, or an array of another shape.
         """
         arrays = {name: self._checked(name, array, count) for name, array in columns.items()}
-        width, parts = self._program.lanes.width, list[Measured]()
+        width, parts = self._program.lanes.width, list[Seen]()
         for first in range(0, count, width):
             chosen = np.minimum(np.arange(first, first + width), count - 1)
             self._side.begin()
             for name, array in arrays.items():
                 self._side.put(name, np.moveaxis(array[chosen], 0, -1))
             parts.append(self._side.made())
-        return _joined(parts, count)
+        return joined(parts, count)
 
     # -- internals ----------------------------------------------------------------------------------------
 
@@ -148,6 +110,7 @@ class _Side(Stepper):
         self._stop = np.zeros(program.lanes.width)
         self._tally, self._kept = _tally(program, bands)
         self.steps.tally = ctypes.addressof(self._tally)
+        self._known: dict[int, Told] = {}
         self._start = self._y.copy(), {name: array.copy() for name, array in self._kept.items()}
 
     def begin(self) -> None:
@@ -173,7 +136,7 @@ class _Side(Stepper):
         else:
             self.program.tell_apart(self.steps, name, array)
 
-    def made(self) -> Measured:
+    def made(self) -> Seen:
         """Make the runs."""
         for block in self._tables.blocks(self.program, self.run.clock):
             self.look_at(block)
@@ -182,12 +145,20 @@ class _Side(Stepper):
                 self.call(first, last)
                 self._pace.learn(last - first, perf_counter() - start)
             if self._ending.all:
-                return self._measured()
+                return self._seen()
         self.look_at_end()
         self.call(0, 1)
-        return self._measured()
+        return self._seen()
 
     # -- internals ----------------------------------------------------------------------------------------
+
+    def _read(self, block: DesiredStretch) -> Told:
+        """See `Stepper`; of a block that is kept for all runs once."""
+        if not self._tables.keeps(self.program, self.run.clock):
+            return super()._read(block)
+        if id(block) not in self._known:
+            self._known[id(block)] = super()._read(block)
+        return self._known[id(block)]
 
     def _made(self, times: np.ndarray, marks: np.ndarray) -> None:
         if self._ending.all:
@@ -208,35 +179,16 @@ class _Side(Stepper):
             begin += rows * length
         raise InputError.expected("a part of the state", name, "columns")
 
-    def _measured(self) -> Measured:
-        t, (status, _, robot, value) = np.concatenate(self._logged), self._ending.found
-        for array in self._kept.values():
-            array[..., status != 0] = np.nan  # of a run that ended early nothing is known
-        worst = self._worst
-        return Measured(
-            tracking_error=self._errors("tracking", t),
-            sync_error=self._errors("sync", t),
-            peak_torque=self._runs("torque torque"),
-            cut=self._runs("torque cut"),
-            step_error=np.stack((worst.largest, worst.speed, worst.time), axis=1),
-            joint=worst.joint(np.arange(len(status))),
-            status=status.copy(),
-            stop_time=self._stop.copy(),
-            robot=robot.copy(),
-            value=value.copy(),
+    def _seen(self) -> Seen:
+        status, _, robot, value = self._ending.found
+        worst, lanes = self._worst, np.arange(len(status))
+        return Seen(
+            times=np.concatenate(self._logged),
             instants=self._tally.rows,
+            ended=np.stack((status, robot, self._stop, value)),
+            worst=np.stack((worst.largest, worst.speed, worst.time, worst.joint(lanes))),
+            tally={name: array.copy() for name, array in self._kept.items()},
         )
-
-    def _errors(self, kind: str, t: np.ndarray) -> MeasuredErrors:
-        peak, ise, final, outside = (
-            self._runs(f"{kind} {name}") for name in ("peak", "ise", "final", "outside")
-        )
-        settled = np.append(t, (np.inf, np.nan))[np.nan_to_num(outside, nan=len(t)).astype(int) + 1]
-        return MeasuredErrors(peak, ise, settled, final)
-
-    def _runs(self, name: str) -> np.ndarray:
-        """An array of the tally with the runs first."""
-        return np.moveaxis(self._kept[name], -1, 0).copy()
 
 
 def _check_alone(run: Run) -> None:
@@ -273,23 +225,3 @@ def _tally(program: CompiledLoop, bands: Mapping) -> tuple[structs.Tally, dict[s
     ]
     torque = {name: kept[f"torque {name}"].ctypes.data for name in ("torque", "cut")}
     return structs.Tally(*errors, **torque), kept
-
-
-def _joined(parts: Iterable[Measured], count: int) -> Measured:
-    """Measures of all runs, without the lanes that were too many."""
-    listed = list(parts)
-
-    def one(arrays: Iterable[np.ndarray]) -> np.ndarray:
-        return np.concatenate(list(arrays))[:count]
-
-    def errors(kind: str) -> MeasuredErrors:
-        of_kind = [getattr(part, kind) for part in listed]
-        return MeasuredErrors(*(one(arrays) for arrays in zip(*of_kind, strict=True)))
-
-    names = [name for name in Measured._fields if name not in ("tracking_error", "sync_error", "instants")]
-    return Measured(
-        tracking_error=errors("tracking_error"),
-        sync_error=errors("sync_error"),
-        **{name: one(getattr(part, name) for part in listed) for name in names},
-        instants=max(part.instants for part in listed),
-    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,6 +41,26 @@ class Pace:
         self._steps = max(1, min(8 * self._steps, fitting))
 
 
+class Told(NamedTuple):
+    """What the library is told of a block.
+
+    Attributes:
+        block: the block.
+        times: where its steps begin, and the last one ends, s.
+        marks: what happens at the start of each.
+        acting: which disturbance and which load acts in each.
+        arrays: where what is desired stands, by name.
+        kept: what stands there.
+    """
+
+    block: DesiredStretch
+    times: np.ndarray
+    marks: np.ndarray
+    acting: list[np.ndarray]
+    arrays: dict[str, structs.Arrays]
+    kept: list[np.ndarray]
+
+
 class Stepper:
     """The structure `Steps` of a run, told of one block after another.
 
@@ -55,7 +76,7 @@ class Stepper:
         self.program, self.run = program, run
         period = run.info.get("control_period") or 0.0
         self.steps = structs.Steps(holds=run.every is not None, period=period)
-        self._block: DesiredStretch | None = None
+        self._told: Told | None = None
         self.say_what_acts()
 
     def say_what_acts(self) -> None:
@@ -65,53 +86,65 @@ class Stepper:
 
     def look_at(self, block: DesiredStretch) -> None:
         """Say what is desired and happens in the steps of a block, if that was not said before."""
-        if block is self._block:
-            return
-        steps, clock = block.steps, self.run.clock
-        sampled = _sampled(self.run, steps)
-        joined = clock.joined(steps.first, steps.starts)
-        self._say(block, steps.times, marked(steps.checked, steps.logged, sampled, joined), steps.middles)
+        if self._told is None or block is not self._told.block:
+            self._say(self._read(block))
 
     def look_at_end(self) -> None:
         """Say of the end of the run: one step of no length, in which acts what acted in the last step."""
-        run, clock, (block, before) = self.run, self.run.clock, self._end
-        yes, no = np.array([True]), np.array([False])
-        due = np.array([run.every is None or clock.sampled_at_end(run.every)])
-        self._say(block, block.steps.times, marked(yes, yes, due, no), before)
+        self._say(self._end)
 
     def call(self, first: int, last: int) -> None:
         """Make some steps of the block that was told of last."""
         self._point(first, last)
-        self._made(self._times[first : last + 1], self._marks[first:last])
+        told = self._told
+        assert told is not None
+        self._made(told.times[first : last + 1], told.marks[first:last])
 
     # -- internals ----------------------------------------------------------------------------------------
 
     @cached_property
-    def _end(self) -> tuple[DesiredStretch, np.ndarray]:
-        """The end as a step of no length, and the middle of the last step before it."""
-        clock, yes = self.run.clock, np.array([True])
+    def _end(self) -> Told:
+        """The end as a step of no length, in which acts what acted in the last step."""
+        run, clock, yes, no = self.run, self.run.clock, np.array([True]), np.array([False])
         nothing = Stretch(clock.steps, np.repeat(clock.end, 2), yes, yes, np.array([clock.count]))
+        due = np.array([run.every is None or clock.sampled_at_end(run.every)])
         before = clock.stretch(clock.steps - 1, clock.steps).middles
-        return desired_in(self.run.loop.cell, nothing, ~yes), before
+        block = desired_in(run.loop.cell, nothing, ~yes)
+        return self._made_ready(block, marked(yes, yes, due, no), before)
+
+    def _read(self, block: DesiredStretch) -> Told:
+        """What there is to say of a block."""
+        steps, clock = block.steps, self.run.clock
+        sampled, joined = _sampled(self.run, steps), clock.joined(steps.first, steps.starts)
+        return self._made_ready(block, marked(steps.checked, steps.logged, sampled, joined), steps.middles)
+
+    def _made_ready(self, block: DesiredStretch, marks: np.ndarray, middles: np.ndarray) -> Told:
+        """What there is to say of a block with such marks, in whose steps acts what does in these middles."""
+        schedules = self.run.schedule, self.program.loop.plant.schedule
+        acting = [schedule.windows(middles).astype(np.intc) for schedule in schedules]
+        self.program.tell(self.steps, block.desired)
+        arrays = {name: structs.Arrays.from_buffer_copy(getattr(self.steps, name)) for name in block.desired}
+        kept = [self.steps.kept[name] for name in block.desired]
+        return Told(block, np.ascontiguousarray(block.steps.times), marks, acting, arrays, kept)
 
     def _made(self, times: np.ndarray, marks: np.ndarray) -> None:
         """Call the library for steps between these times, with what happens at their starts."""
         raise NotImplementedError
 
-    def _say(self, block: DesiredStretch, times: np.ndarray, marks: np.ndarray, middles: np.ndarray) -> None:
-        """What is desired in a block, what happens and when, and what acts in the middles of its steps."""
-        self.program.tell(self.steps, block.desired)
-        self.steps.length, self._block = len(marks), block
-        self.steps.ends = block.ends.ctypes.data
-        self._times, self._marks = np.ascontiguousarray(times), marks
-        schedules = self.run.schedule, self.program.loop.plant.schedule
-        self._acting = [schedule.windows(middles).astype(np.intc) for schedule in schedules]
+    def _say(self, told: Told) -> None:
+        """Tell the library of a block."""
+        for name, arrays in told.arrays.items():
+            setattr(self.steps, name, arrays)
+        self.steps.length, self._told = len(told.marks), told
+        self.steps.ends = told.block.ends.ctypes.data
 
     def _point(self, first: int, last: int) -> None:
         """Say which steps of the block are to be made."""
-        steps, (disturbed, loaded) = self.steps, self._acting
+        steps, told = self.steps, self._told
+        assert told is not None
+        disturbed, loaded = told.acting
         steps.first, steps.count = first, last - first
-        steps.t, steps.marks = self._times[first:].ctypes.data, self._marks[first:].ctypes.data
+        steps.t, steps.marks = told.times[first:].ctypes.data, told.marks[first:].ctypes.data
         steps.disturbed, steps.loaded = disturbed[first:].ctypes.data, loaded[first:].ctypes.data
 
 

@@ -69,10 +69,14 @@ class Tables:
     def __init__(self) -> None:
         self._kept: tuple[list[Any], tuple, list[DesiredStretch]] = [], (), []
 
+    def keeps(self, program: CompiledLoop, clock: Clock) -> bool:
+        """Whether the blocks of a run are few enough to be kept."""
+        return clock.steps * _step_bytes(program.loop.cell) <= BLOCK_BYTES
+
     def blocks(self, program: CompiledLoop, clock: Clock) -> Iterable[DesiredStretch]:
         """The steps of a run, made anew if the run before had other motions, weights, instants or rows."""
         cell = program.loop.cell
-        if clock.steps * _step_bytes(cell) > BLOCK_BYTES:
+        if not self.keeps(program, clock):
             return blocks(program, clock)
         parts = [cell.coupling, type(cell.space), *(member.trajectory for member in cell.members)]
         known, instants, kept = self._kept

@@ -10,7 +10,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from traceback import walk_stack
 from types import ModuleType
@@ -46,7 +46,15 @@ def joblib(runner: Runner, workers: int, *_: Any) -> Iterator[Crew]:
     """
     _need("joblib")
     payload = pickled(runner.job)
-    yield _processes(payload, workers) if runner.lanes == 1 else _threads(runner, payload, workers)
+
+    def crew(batches: Iterable[Batch]) -> Iterator[list[Outcome]]:
+        waiting = iter(batches)
+        for first in waiting:
+            together = runner.go_together(first)
+            make = _threads(runner, payload, workers) if together else _processes(payload, workers)
+            yield from make(chain([first], waiting))
+
+    yield crew
 
 
 def _processes(payload: bytes, workers: int) -> Crew:
@@ -56,7 +64,7 @@ def _processes(payload: bytes, workers: int) -> Crew:
 
     def crew(batches: Iterable[Batch]) -> Iterator[list[Outcome]]:
         parallel = Parallel(n_jobs=workers, backend="loky", return_as="generator_unordered", batch_size=1)
-        outcomes = parallel(delayed(run_batch)(payload, batch) for batch in batches)
+        outcomes = parallel(delayed(run_batch)(payload, batch) for batch in [*batches])
         try:
             yield from outcomes
         except TerminatedWorkerError as error:

@@ -21,7 +21,7 @@ from .measures import doubt_of_row, measures_of_all
 from .rows import COMPLETED
 from .tasks import Job, Outcome, Task
 
-#: how many runs go side by side for all processors that are known
+#: so many runs fill the lanes of any processor
 LANES = 8
 #: base runs that are kept ready
 KEPT = 16

@@ -20,7 +20,7 @@ BATCH_TIME = 1.0
 #: batches per worker at least, so that all of them have something to do until the end
 SHARES = 4
 #: of how many runs at most whose step was too long one that does is looked for
-LOOKED_INTO = 16
+LOOKED_INTO = 4
 #: how often the rest is begun again after a worker has died without a single run being finished in between
 RETRIES = 2
 
@@ -71,15 +71,16 @@ class Evaluation:
             SweepFileError: a run made before has other values than its task.
             SweepError: workers die again and again, or a function of the user fails.
         """
-        todo = [task for task in tasks if not self._has(task)]
+        at_once = self._runner.lanes == 1 or self.rows  # else values are drawn while others run
+        todo = [task for task in tasks if not self._has(task)] if at_once else tasks
         if todo and self._batch is None:
-            first, todo = todo[: self._runner.lanes], todo[self._runner.lanes :]
+            first, todo = [*todo[: self._runner.lanes]], todo[self._runner.lanes :]
             yield self._first(first, len(todo))
         attempts = RETRIES
         while todo:
             try:
                 size = self._batch or 1
-                batches = (todo[k : k + size] for k in range(0, len(todo), size))
+                batches = ([*todo[k : k + size]] for k in range(0, len(todo), size))
                 for outcomes in self._crew(batches):
                     yield self._write(outcomes)
                 return
@@ -105,7 +106,7 @@ class Evaluation:
 
     def _first(self, tasks: Sequence[Task], left: int) -> list[Row]:
         """Make some runs here, to see how long one takes."""
-        self._runner.prepare(tasks[0])
+        self._runner.go_together(tasks[:1])
         start = perf_counter()
         outcomes = [*self._runner.outcomes(tasks)]
         took = (perf_counter() - start) / len(tasks)

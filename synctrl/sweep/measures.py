@@ -116,17 +116,18 @@ def measures_of_all(measured: Any, span: float) -> list[list[float | None]]:
             error = getattr(measured, kind)
             taken = {**error._asdict(), "rms": np.sqrt(error.ise / span)}
             for name, (_, over_all) in _OVER_ALL.items():
-                found.append(over_all(taken[name].reshape(len(error.ise), -1)))
+                rows = np.ascontiguousarray(taken[name])  # numpy adds in another order where it goes astride
+                found.append(over_all(rows.reshape(len(rows), -1)))
         torque, cut = (part.reshape(len(part), -1) for part in (measured.peak_torque, measured.cut))
         largest, speed = measured.step_error[:, :2].T
         estimate = np.minimum(largest / speed, float_info.max)
         estimate[~((largest > 0) & (speed > 0))] = np.nan
         table = np.stack([*found, torque.max(axis=1), cut.max(axis=1) / measured.instants, estimate], axis=1)
     gaps = ~np.isfinite(table)
-    rows: list[list[float | None]] = table.tolist()
+    told: list[list[float | None]] = table.tolist()
     for run, column in np.argwhere(gaps).tolist():
-        rows[run][column] = None
-    return rows
+        told[run][column] = None
+    return told
 
 
 def cut_off(result: Result) -> float:

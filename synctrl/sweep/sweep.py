@@ -23,7 +23,7 @@ from .further import FURTHER
 from .journal import Journal
 from .measures import MEASURES, definitions, warn_of
 from .rows import Draws, columns
-from .tasks import Job, Task
+from .tasks import Drawn, Job, Task
 from .worker import Prepared, Runner
 
 
@@ -246,7 +246,7 @@ class Sweep:
         job = self.study.job(journal.known(), keep_every)
         journal.begin(self.about(job), self._draws)
         evaluation = crew(job, journal)
-        tasks = [self._task(run) for run in range(len(self))]
+        tasks = Drawn(self._draws, range(len(self)))
         with progress_bar(len(tasks), len(journal.rows), progress) as bar, evaluation.open():
             for rows in evaluation.run(tasks):
                 bar.update(len(rows))
@@ -256,8 +256,7 @@ class Sweep:
 
     def _task(self, run: int) -> Task:
         """A run and its values."""
-        number = index("run", run, len(self))
-        return Task(number, tuple(self._draws.at(number)))  # type: ignore[arg-type]
+        return Drawn(self._draws, range(len(self)))[index("run", run, len(self))]
 
 
 def _checked_factors(factors: Sequence[Factor]) -> tuple[Factor, ...]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, overload
 
 from ..analysis.metrics import Band
 from ..simulation.result import Result
 from .distributions import Value
 from .factors import Factor, Setup
 from .measures import MEASURES, Doubt
-from .rows import Row, columns
+from .rows import Draws, Row, columns
 
 
 class Task(NamedTuple):
@@ -18,6 +18,30 @@ class Task(NamedTuple):
 
     run: int
     values: tuple[Value, ...]
+
+
+class Drawn(Sequence[Task]):
+    """Runs of a sweep, whose values are drawn when somebody asks for them.
+
+    Args:
+        draws: what says the values of a run.
+        runs: numbers of the runs.
+    """
+
+    def __init__(self, draws: Draws, runs: range):
+        self._draws, self._runs = draws, runs
+
+    def __len__(self) -> int:
+        return len(self._runs)
+
+    @overload
+    def __getitem__(self, k: int) -> Task: ...
+    @overload
+    def __getitem__(self, k: slice) -> Drawn: ...
+    def __getitem__(self, k: int | slice) -> Task | Drawn:
+        if isinstance(k, slice):
+            return Drawn(self._draws, self._runs[k])
+        return Task(self._runs[k], self._draws.at(self._runs[k]))  # type: ignore[arg-type]
 
 
 class Outcome(NamedTuple):

@@ -126,9 +126,9 @@ class Runner:
         found = self._blocks.outcomes(tasks)
         return (found[task.run] if task.run in found else self.outcome(task) for task in tasks)
 
-    def prepare(self, task: Task) -> None:
-        """Have ready what runs like this one share."""
-        self._blocks.outcomes([task])
+    def go_together(self, tasks: Sequence[Task]) -> bool:
+        """Whether runs like these can be made side by side; what they share is ready from then on."""
+        return bool(self._blocks.outcomes(tasks[: self.lanes]))
 
     def outcome(self, task: Task) -> Outcome:
         """Make a run by itself.
