@@ -128,7 +128,8 @@ def imported(*folders: str) -> set[str]:
 
 
 def test_every_library_that_the_package_imports_is_asked_for():
-    assert imported("synctrl") <= set.union(*map(modules_of, asked("compiled", "mujoco", "sweep", "tune", "xacro")))
+    extras = "compiled", "mujoco", "sweep", "tune", "xacro"
+    assert imported("synctrl") <= set.union(*map(modules_of, asked(*extras)))
 
 
 @pytest.mark.parametrize(
