@@ -23,7 +23,8 @@ from .further import FURTHER
 from .journal import Journal
 from .measures import MEASURES, definitions, warn_of
 from .rows import Draws, columns
-from .worker import Job, Prepared, Runner, Task
+from .tasks import Job, Task
+from .worker import Prepared, Runner
 
 
 class StudyOptions(TypedDict, total=False):
@@ -187,7 +188,8 @@ class Sweep:
     def run_one(self, run: int) -> dict[str, Any]:
         """A run's row of the table, made again."""
         job = self.study.job()
-        return dict(zip(job.columns, Runner(job).outcome(self._task(run)).row, strict=True))
+        (outcome,) = Runner(job).outcomes([self._task(run)])
+        return dict(zip(job.columns, outcome.row, strict=True))
 
     # -- all runs -----------------------------------------------------------------------------------------
 

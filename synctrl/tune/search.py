@@ -21,7 +21,7 @@ from ..sweep.journal import Journal
 from ..sweep.measures import MEASURES, definitions, warn_of
 from ..sweep.rows import COMPLETED, Generations, columns
 from ..sweep.sweep import Study, StudyOptions
-from ..sweep.worker import Job, Task
+from ..sweep.tasks import Job, Task
 from .asking import for_one, for_several, need_optuna, spread
 from .goals import TORQUE, Goal, Judge, read_goals, read_limits
 from .tuned import FRONT, Tuned
