@@ -10,8 +10,8 @@ VENV := .venv
 PY := $(VENV)/bin/python
 LOWEST := .venv-lowest
 # What meets every library where its versions differ.
-LOWEST_TESTS := $(addprefix tests/test_,compiler_zig.py documents.py frozen.py gain_condition.py integrators.py mujoco.py scene.py \
-                  sweep.py symbolic.py tune.py)
+LOWEST_TESTS := $(addprefix tests/test_,compiler_zig.py documents.py front.py frozen.py gain_condition.py integrators.py mujoco.py \
+                  scene.py sweep.py symbolic.py tune.py)
 WORKERS ?= 2
 
 export MPLBACKEND := Agg

@@ -246,6 +246,18 @@ def test_a_front_does_not_depend_on_the_number_of_workers(found):
         assert tuned(backend="joblib", workers=workers).history == found.history
 
 
+def test_runs_side_by_side_are_asked_for_and_found_alike_whatever_the_number_of_workers():
+    pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
+    pytest.importorskip("joblib", reason="pip install 'synctrl[sweep]'")
+    options = {"engine": "compiled", "maximize": "delay_margin", "population": 11, "duration": LONG}
+    alone = tuned(DAMPING, **options)
+    for workers in (1, 2):
+        assert tuned(DAMPING, backend="joblib", workers=workers, **options).history == alone.history
+    row = alone.history[alone.run]
+    result = alone.experiment.simulate(LONG, DT)
+    np.testing.assert_allclose(np.abs(result.tau).max(), row["peak_torque"], rtol=1e-9)
+
+
 def test_limits_keep_runs_off_the_front(found):
     limit = float(np.median([row["step_error"] for row in found.history]))
     kept = tuned(limits={"step_error": limit})
