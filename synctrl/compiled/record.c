@@ -10,9 +10,11 @@ static void know(const Cell *c, Quantities *a) {
 
 /* Rows out of so many lanes, one after another. */
 static void take_out(const vec *rows, int lanes, int count, int length, double *numbers) {
-    for (int i = 0; i < count; i += lanes, rows += length)
-        for (int l = 0; l < lanes && i + l < count; l++, numbers += length)
-            for (int j = 0; j < length; j++) numbers[j] = lane(rows[j], l);
+    for (int i = 0; i < count; i += lanes, rows += length) {
+        const double *from = (const double *)rows;
+        for (int l = 0; l < lanes && i + l < count; l++)
+            for (int j = 0; j < length; j++) *numbers++ = from[j * LANES + l];
+    }
 }
 
 /* How many rows there really are, of robots, pairs, and what network and plant remember. */
