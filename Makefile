@@ -55,9 +55,9 @@ clean:
 	find . -path "./$(VENV)*" -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)/.installed-core: WHAT := .[compiled,mujoco]
-$(VENV)/.installed-test: WHAT := .[test,notebooks,compiled,compiler,mujoco,sweep,xacro]
+$(VENV)/.installed-test: WHAT := .[test,notebooks,compiled,compiler,mujoco,sweep,tune,xacro]
 $(VENV)/.installed-dev:  WHAT := .[dev]
-$(LOWEST)/.installed-lowest: WHAT := .[test,compiled,compiler,mujoco,sweep]
+$(LOWEST)/.installed-lowest: WHAT := .[test,compiled,compiler,mujoco,sweep,tune]
 
 $(VENV)/.installed-%: $(VENV)/.made pyproject.toml constraints.txt
 	$(call install,$(VENV),$(WHAT),constraints.txt)

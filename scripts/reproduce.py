@@ -8,66 +8,47 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-
-from synctrl.analysis import Comparison
+from synctrl.analysis import Certificate, Comparison
 from synctrl.analysis.consistency import Consistency
-from synctrl.analysis.convergence import Identification, identify
-from synctrl.analysis.metrics import as_data, metrics, settling_bands, write_metrics
+from synctrl.analysis.metrics import metrics, write_metrics
 from synctrl.errors import SynctrlError
 from synctrl.experiments.a460_pair import DURATION
-from synctrl.paper.bodies import bodies_are_left, bodies_of, bodies_section
-from synctrl.paper.carry_task import CARRY
+from synctrl.paper.bodies import bodies_are_left
 from synctrl.paper.claims import Claim, tally
 from synctrl.paper.claims_of_cells import a460_claims, own_findings, planar_four_claims
-from synctrl.paper.edge_task import EDGE
-from synctrl.paper.fairness import another_law_does_better, fair_section, what_parts_do
-from synctrl.paper.judge import judge_section
-from synctrl.paper.margin_section import margin_section
-from synctrl.paper.network_section import NETWORK
+from synctrl.paper.fairness import (
+    FAIR,
+    another_law_does_better,
+    what_parts_do,
+)
+from synctrl.paper.margin_section import margins_told
+from synctrl.paper.page_parts import BODIES, SCENES, TASKS, measured, of_runs, without_runs
 from synctrl.paper.paper_sections import (
-    a460_section,
     honesty_section,
     introduction,
-    planar_section,
     trial_section,
 )
-from synctrl.paper.path_task import PATH
 from synctrl.paper.plant_sections import (
-    friction_section,
-    full_a460_section,
     identification_section,
     step_section,
 )
-from synctrl.paper.promises_section import promises_section
-from synctrl.paper.report import Links, Section, write_page
-from synctrl.paper.reproduction import PLANNED, PlannedRun, judge_runs, judged, run_all
-from synctrl.paper.tasks import planned_runs, runs_of, task_section
-from synctrl.paper.theory import certificate_section, examine
-from synctrl.paper.value_grid import grid_section, judge_grid
-from synctrl.show.animation import payload_pair_scene, planar_scene
+from synctrl.paper.processes import processes
+from synctrl.paper.promises_section import told
+from synctrl.paper.report import Section, write_page
+from synctrl.paper.reproduction import PLANNED, PlannedRun, begun, finished, judge_runs
+from synctrl.paper.saved_runs import SavedRuns
+from synctrl.paper.tasks import planned_runs
+from synctrl.paper.theory import CERTIFIED, certificate_section, examined
+from synctrl.paper.value_grid import grid_section
 from synctrl.show.style import display
 from synctrl.simulation.result import Result
 
-ANIMATED = (
-    "a460_pair_synchronized",
-    "a460_pair_independent",
-    "planar_four_synchronized",
-    "planar_four_independent",
-    "planar_four_synchronized_disturbed",
-    "planar_four_independent_disturbed",
-)
-#: the tasks of the paper's introduction, and robots that talk
-TASKS = (CARRY, EDGE, PATH, NETWORK)
 TRIAL = 1.0  # s
-#: the run whose estimated bodies are drawn
-BODIES = "a460_pair_synchronized"
-SCENES = {"a460_pair": payload_pair_scene, "planar_four": planar_scene}
 
 
 def main() -> int:
@@ -108,41 +89,67 @@ def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun], limit:
 
     Controllers are compared over at most `limit` seconds.
     """
-    every = run_all(out / "runs", workers, planned)
-    runs = {name: every[name] for name in PLANNED}
-    print("\nchecking the proof along every run, comparing controllers, drawing ...", flush=True)
-    with ThreadPoolExecutor(1) as background:
-        examined = background.submit(examine, out / "runs", out / "figures", workers, limit=limit)
-        sections, bodies, learned = drawn(runs, out), bodies_of(runs), identified(runs)
-        tried = min(DURATION, limit)
-        grid = judge_grid(tried)
-        certificates, compared = examined.result()
-    claims, own = papers_claims(runs), our_findings(runs, bodies[BODIES], compared["planar_four"][0])
-    found, tasks = of_tasks(every, out)
-    checked = [*claims, *own, *found]
+    with processes(workers) as pool:
+        making = begun(pool, out / "runs", planned)
+        early = {name: pool.submit(*each) for name, each in without_runs(out, limit).items()}
+        every = finished(pool, making, out / "runs")
+        print("\nchecking the proof along every run, comparing controllers, drawing ...", flush=True)
+        late = {name: pool.submit(*each) for name, each in of_runs(every, out).items()}
+        proofs = {name: pool.submit(examined, name, every, out / "figures") for name in CERTIFIED}
+        data = measured(every)
+        done = {name: future.result() for name, future in (early | late).items()}
+        certificates = {name: future.result() for name, future in proofs.items()}
+    return page_of(out, every, min(DURATION, limit), done, certificates, data)
+
+
+def page_of(
+    out: Path,
+    every: SavedRuns,
+    tried: float,
+    done: Mapping[str, Any],
+    certificates: Mapping[str, Certificate],
+    data: Mapping[str, Any],
+) -> Path:
+    """Write the page, and all of its numbers beside it.
+
+    Args:
+        out: the folder of the page.
+        every: the runs.
+        tried: time over which cases of the grid were run, s.
+        done: what came of `without_runs` and of `of_runs`.
+        certificates: by name of the run.
+        data: the metrics of every run.
+    """
+    runs, fair = every.named(*PLANNED), {name: done[f"fair {name}"] for name in FAIR}
+    (bodies, bodies_drawn), learned = done["bodies"], done["learned"]
+    claims, own = papers_claims(runs), our_findings(runs, bodies[BODIES], fair["planar_four"][0])
+    found, tasks = zip(*(done[f"task {k}"] for k in range(len(TASKS))), strict=True)
+    checked = [*claims, *own, *chain.from_iterable(found)]
     sections = [
         introduction(checked),
-        *sections,
+        *(done[name] for name in (*SCENES, "full", "friction")),
         *tasks,
-        margin_section(out),
-        honesty_section(own, what_parts_do(compared["planar_four"][1])),
-        grid_section(grid, tried),
-        bodies_section(bodies, BODIES, out / "figures" / "bodies"),
+        margins_told(done["margins"], done["map"]),
+        honesty_section(own, what_parts_do(fair["planar_four"][1])),
+        grid_section(done["grid"], tried),
+        bodies_drawn,
         identification_section(learned),
-        *(fair_section(*pair, out / "figures" / f"fair_{name}") for name, pair in compared.items()),
-        promises_section(certificates, runs, out / "figures"),
+        *(section for _, _, section in fair.values()),
+        told(certificates, done["promises"]),
         certificate_section(certificates, out / "figures"),
-        judge_section(judged(every), out / "figures"),
+        done["judge"],
         step_section(runs),
     ]
     write_metrics(
         out / "metrics.json",
-        {n: as_data(run, metrics(run, settling_bands(*peers(every, n)))) for n, run in every.items()},
+        data,
         [{**asdict(claim), "ours": claim.ours} for claim in checked],
         certificates={name: certificate.as_dict() for name, certificate in certificates.items()},
-        comparisons={name: [each.as_dict() for each in pair] for name, pair in compared.items()},
+        comparisons={name: [each.as_dict() for each in pair] for name, (*pair, _) in fair.items()},
         consistency={name: each.as_dict() for name, each in bodies.items()},
-        identification={title: [robot.as_dict() for robot in robots] for title, robots in learned.items()},
+        identification={
+            title: [robot.as_dict() for robot in each] for title, each in done["learned"].items()
+        },
     )
     print_table(runs)
     print(f"\n{tally(checked)} The page says which do not, and why.")
@@ -155,69 +162,15 @@ def write(path: Path, sections: list[Section], longest: float) -> Path:
     return write_page(path, "Adaptive synchronized control, reproduced", [*trial, *sections])
 
 
-def papers_claims(runs: Mapping[str, Result]) -> list[Claim]:
+def papers_claims(runs: SavedRuns) -> list[Claim]:
     """What the paper claims of its experiments."""
-    return [*a460_claims(select(runs, "a460_pair_")), *planar_four_claims(select(runs, "planar_four_"))]
+    return [*a460_claims(runs.under("a460_pair_")), *planar_four_claims(runs.under("planar_four_"))]
 
 
-def our_findings(runs: Mapping[str, Result], bodies: Consistency, laws: Comparison) -> list[Claim]:
+def our_findings(runs: SavedRuns, bodies: Consistency, laws: Comparison) -> list[Claim]:
     """What the paper leaves unsaid."""
-    found = own_findings(select(runs, "planar_four_"))
+    found = own_findings(runs.under("planar_four_"))
     return [*found, bodies_are_left(BODIES, bodies), another_law_does_better(laws, "ChungSlotine")]
-
-
-def drawn(runs: Mapping[str, Result], out: Path) -> list[Section]:
-    """The sections of the experiments."""
-    a460, planar = select(runs, "a460_pair_"), select(runs, "planar_four_")
-    (pair, four), figures = (PLANNED[f"{cell}_synchronized"].make() for cell in SCENES), out / "figures"
-    return [
-        a460_section(a460, pair, figures, animations(runs, out, "a460_pair")),
-        planar_section(planar, four, figures, animations(runs, out, "planar_four")),
-        full_a460_section(a460, figures),
-        friction_section(a460, figures),
-    ]
-
-
-def of_tasks(every: Mapping[str, Result], out: Path) -> tuple[list[Claim], list[Section]]:
-    """What is found of the tasks, and their sections."""
-    runs = {task: runs_of(task, every) for task in TASKS}
-    found = {task: task.claims(runs[task]) for task in TASKS}
-    return [*chain.from_iterable(found.values())], [
-        task_section(task, runs[task], found[task], out) for task in TASKS
-    ]
-
-
-def select(runs: Mapping[str, Result], prefix: str) -> dict[str, Result]:
-    """The runs of one cell, without its name."""
-    return {name.removeprefix(prefix): run for name, run in runs.items() if name.startswith(prefix)}
-
-
-def identified(runs: Mapping[str, Result]) -> dict[str, tuple[Identification, ...]]:
-    """What the synchronized runs say about parameters, by the title of the run; every 5 ms are enough."""
-    names = [name for name in runs if name.endswith("_synchronized")]
-    return {
-        str(runs[name].info["title"]): identify(runs[name].decimated(5), PLANNED[name].make())
-        for name in names
-    }
-
-
-def peers(runs: Mapping[str, Result], name: str) -> list[Result]:
-    """The synchronized and the independent run that are compared with each other, of which this is one."""
-    twins = {name.replace("independent", "synchronized"), name.replace("synchronized", "independent")}
-    return [runs[twin] for twin in sorted(twins)]
-
-
-def animations(runs: Mapping[str, Result], out: Path, cell: str) -> Links:
-    """Write those of a cell; runs that are compared share the error at which a mark is fully red."""
-    links = []
-    for name in ANIMATED:
-        if not name.startswith(cell):
-            continue
-        limit = max(float(np.linalg.norm(run.sync_error, axis=2).max()) for run in peers(runs, name))
-        scene = SCENES[cell](runs[name], PLANNED[name].make(), limit)
-        path = scene.write(out / "animations" / f"{name}.html")
-        links.append((path.relative_to(out).as_posix(), f"Animation: {runs[name].info['title']}"))
-    return Links(tuple(links))
 
 
 def print_table(runs: Mapping[str, Result]) -> None:

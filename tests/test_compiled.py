@@ -14,6 +14,7 @@ from synctrl import CartesianSpace, Cell, Circle, Coupling, Disturbance, Gains, 
 from synctrl.compiled import build, tables
 from synctrl.compiled.program import Program
 from synctrl.compiled.quantities import DESIRED
+from synctrl.compiled.weighing import weighing_of
 from synctrl.errors import (
     CompilationError,
     InputError,
@@ -222,11 +223,13 @@ def test_tables_hold_what_the_cell_desires(coupling):
     instants = np.array([[0.0, 0.1], [0.05, 0.15], [0.1, 0.2]])
     found = tables.tabulated(cell, instants)
     desired = np.stack([found[name] for name in DESIRED], axis=2).reshape(3, 2, 2, 3, 2)
-    c = np.broadcast_to(found["weights"].reshape(-1, 2, 4, 2, 2), (6, 2, 4, 2, 2)).reshape(3, 2, 2, 4, 2, 2)
+    weighing = weighing_of(cell)
+    numbers = np.broadcast_to(found["weights"], (6, 2, weighing.count(2))).reshape(3, 2, 2, -1)
     for stage, times in enumerate(instants):
         for step, reference in enumerate(cell.references(times)):
             np.testing.assert_allclose(desired[stage, step].swapaxes(0, 1), reference.desired)
-            np.testing.assert_allclose(c[stage, step].swapaxes(0, 1), reference.weights)
+            for each, *c in zip(numbers[stage, step], *reference.weights, strict=True):
+                np.testing.assert_allclose(weighing.weights(each, 2), c)
 
 
 def test_two_processes_may_build_the_same_code_at_once(monkeypatch, tmp_path):

@@ -36,9 +36,9 @@ from synctrl.assembly.grasp import Fixture, Grasp, fixture_wrenches, grasp_matri
 from synctrl.assembly.plant import CarryingPlant
 from synctrl.compiled import program
 from synctrl.compiled.carrying import _solve
+from synctrl.compiled.header import functions_of
 from synctrl.compiled.known import check_known
 from synctrl.compiled.program import Program
-from synctrl.compiled.header import functions_of
 from synctrl.control.adaptation import Leakage
 from synctrl.control.laws import ComputedTorque
 from synctrl.coupling.cell import Reference

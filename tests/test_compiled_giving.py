@@ -129,9 +129,9 @@ def test_what_a_hand_feels_is_what_the_plant_says_wherever_the_object_is(seed):
     wrenches[plant._hands] = np.matvec(grasp_matrix(levers), plant._wrenches(q, v, body)[0])
     lift, expected, shares = wrenches.sum(axis=0), plant.felt(q, v, body), _shares(plant)
     np.testing.assert_allclose(shares.sum(axis=0).reshape(6, 6), np.eye(6), atol=1e-12)
-    for row, wrench, share in zip(expected, wrenches, shares, strict=True):
+    for felt, wrench, share in zip(expected, wrenches, shares, strict=True):
         found = felt_at_origin(wrench, share, lift, body)
-        np.testing.assert_allclose(found, row, rtol=0, atol=1e-11 * np.abs(wrenches).max())
+        np.testing.assert_allclose(found, felt, rtol=0, atol=1e-11 * np.abs(wrenches).max())
 
 
 # -- the code ---------------------------------------------------------------------------------------------

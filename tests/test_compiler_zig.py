@@ -159,7 +159,7 @@ def test_the_code_compiles_for_other_systems(zig, bare, monkeypatch, target):
     flags = [flag for flag in compiler.FLAGS if flag != compiler.NATIVE and not (windows and flag == "-fPIC")]
     monkeypatch.setattr(compiler, "FLAGS", tuple(flags))
     monkeypatch.setattr(compiler, "compiler", lambda: (*zig, "-target", target))
-    sources = program.generate(classify(experiments.planar_four().closed_loop()).kinds)
+    sources = program.generate(classify(experiments.planar_four().closed_loop()).kinds, width=2)
     made = parts(zig, target, sources, bare) if windows else [compiler.compile_library(sources, bare)]
     assert {path.read_bytes()[: len(TARGETS[target])] for path in made} == {TARGETS[target]}
 

@@ -18,7 +18,8 @@ from synctrl.control.laws import SlotineLi
 from synctrl.errors import ResultError
 from synctrl.paper.report import SideBySide, Table, write_page
 from synctrl.paper.reproduction import PLANNED
-from synctrl.paper.theory import CERTIFIED, certificate_section, draw_certificate, examine
+from synctrl.paper.saved_runs import SavedRuns
+from synctrl.paper.theory import CERTIFIED, certificate_section, draw_certificate, examined
 from synctrl.show.lyapunov_plots import growth_mark, lyapunov_figure
 
 PUSH = Disturbance(robot=0, torque=-60.0, start=0.01, stop=0.03)
@@ -102,4 +103,5 @@ def test_every_run_of_the_figures_is_certified() -> None:
 
 def test_a_missing_run_is_a_clear_error(tmp_path: Path) -> None:
     with refused(ResultError, file=str(tmp_path / "planar_four_synchronized.npz")):
-        examine(tmp_path, tmp_path, 1, ["planar_four_synchronized"])
+        runs = SavedRuns(tmp_path, ["planar_four_synchronized"])
+        examined("planar_four_synchronized", runs, tmp_path)

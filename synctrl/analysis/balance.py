@@ -24,13 +24,14 @@ def drift(
         rates: of the terms of V, (R,) each.
         V, V_dot: (R,).
     """
-    missed, bound = np.zeros(len(run.logged)), 0.0
+    missed, bound, columns = np.zeros(len(run.logged)), 0.0, np.stack((V_dot, *rates), axis=1)
     for first, last, rows in run.pieces:
         t = run.result.t[first : last + 1]
-        missing = V[rows] - V[rows][0] - _integral(t, V_dot[rows])
+        gained, *terms = _integral(t, columns[rows]).T
+        missing = V[rows] - V[rows][0] - gained
         missed[last + 1 :] = missed[first] + missing[-1]
         missed[first : last + 1] = missed[first] + missing
-        bound += sum(_halving(t, rate[rows]) for rate in rates)
+        bound += _halving(t, columns[rows, 1:], np.transpose(terms))
     return missed, bound
 
 
@@ -43,10 +44,10 @@ def jumped(run: Replay, V: np.ndarray) -> float:
     return float(sum(V[b.start] - V[a.stop - 1] for a, b in pairwise(parts)))
 
 
-def supplied(run: Replay, rate: np.ndarray) -> float:
-    """Integral of a power, (R,), over all pieces of the run."""
-    t = run.result.t
-    return sum(float(_integral(t[first : last + 1], rate[rows])[-1]) for first, last, rows in run.pieces)
+def supplied(run: Replay, rates: np.ndarray) -> np.ndarray:
+    """Integrals of powers, (R, ...), over all pieces of the run, (...)."""
+    t, none = run.result.t, np.zeros(rates.shape[1:])
+    return sum((_integral(t[first : last + 1], rates[rows])[-1] for first, last, rows in run.pieces), none)
 
 
 def accumulated(run: Replay, rates: np.ndarray) -> np.ndarray:
@@ -65,13 +66,13 @@ def accumulated(run: Replay, rates: np.ndarray) -> np.ndarray:
 
 
 def _integral(t: np.ndarray, rate: np.ndarray) -> np.ndarray:
-    """Integral of a smooth rate from the first instant to each."""
+    """Integrals of smooth rates, (T, ...), from the first instant to each."""
     from scipy.interpolate import make_interp_spline
 
     return make_interp_spline(t, rate, k=min(3, len(t) - 1)).antiderivative()(t)
 
 
-def _halving(t: np.ndarray, rate: np.ndarray) -> float:
-    """How much the integral of a rate changes when every second instant is left out."""
+def _halving(t: np.ndarray, rates: np.ndarray, integrals: np.ndarray) -> float:
+    """How much integrals of rates, (T, k), change when every second instant is left out, in all."""
     half = np.unique(np.append(np.arange(0, len(t), 2), len(t) - 1))
-    return float(np.abs(_integral(t[half], rate[half]) - _integral(t, rate)[half]).max())
+    return float(np.abs(_integral(t[half], rates[half]) - integrals[half]).max(axis=0).sum())

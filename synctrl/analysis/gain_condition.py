@@ -123,7 +123,11 @@ def gain_condition(result: Result | Replay, experiment: Experiment | None = None
     for i, robot in enumerate(run.loop.cell.robots):
         k = robot.nv
         M, J, J_inv = x.M[:, i, :k, :k], x.J[:, i, :, :k], x.J_inv[:, i, :k]
-        values = _values(controller, i, M, x.c_inv[:, i], x.c_dot[:, i], J, J_inv)
+        c_inv, c_dot = x.c_inv[:, i], x.c_dot[:, i]
+        along = M, c_inv, c_dot, J, J_inv
+        if not c_dot.any() and all(np.isfinite(each).all() for each in along):
+            M, c_inv, c_dot, J, J_inv = (each[:1] for each in along)  # B = 0 at all times
+        values = _values(controller, i, M, c_inv, c_dot, J, J_inv)
         row = int(np.argmin(values[0]))
         at = int(np.searchsorted(run.logged, row))
         smallest = [float(value[row]) for value in values]

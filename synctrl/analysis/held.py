@@ -16,7 +16,8 @@ import numpy as np
 from ..simulation.closed_loop import ClosedLoop
 from .jumps import SmoothPart
 from .lyapunov import reference_gap
-from .replay import Moment, Replay, state_at
+from .moment import Moment
+from .replay import Replay, state_at
 
 
 class Held(NamedTuple):

@@ -146,7 +146,7 @@ def lyapunov(result: Result | Replay, experiment: Experiment | None = None) -> L
         operations(run.loop) * EPS * _magnitude(run, proof)[run.logged],
         missed,
         bound + operations(run.loop) * EPS * float(np.max(V)),
-        {name: supplied(run, term) for name, term in power.items()},
+        dict(zip(power, supplied(run, np.stack([*power.values()], axis=1)).tolist(), strict=True)),
         inside_of(run, proof),
         jumps_of_v(run.result.t, run.loop.cell, run.events),
         jumped(run, V),
@@ -179,7 +179,10 @@ def proof_along(run: Replay) -> Proof:
     along = Along(x.epsilon, x.epsilon_dot, x.E, x.sigma, x.sigma_dot, x.e_star, x.r, x.c, x.slips)
     if not hasattr(law, "proof"):
         return Proof({}, {}, {})
-    proof, moves = law.proof(along), replace(along, sigma=x.sigma + x.E_gap)  # in rates it stands for E'
+    proof = law.proof(along)
+    if not x.E_gap.any():
+        return proof
+    moves = replace(along, sigma=x.sigma + x.E_gap)  # in rates it stands for E'
     return proof._replace(rates=law.proof(moves).rates)
 
 

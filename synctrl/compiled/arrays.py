@@ -41,7 +41,8 @@ class CompiledLoop:
         sizes: lengths of rows, see `SIZES`, and the numbers of robots, pairs and objects, n, p and o, and
             r and h, of what network and plant remember.
         cell, quantities, work: what the driver is given; see `structs.py`.
-        carried: true inertial parameters with every load, (loads, n, bodies).
+        parameters: true inertial parameters with every load, (loads, n, 10 bodies).
+        carried: the same, lumped, as generated code reads them, (loads, n, bodies).
 
     Raises:
         CompilationError: an array of another shape than generated code reads.
@@ -51,6 +52,8 @@ class CompiledLoop:
         self, loop: ClosedLoop, classified: Classified, library: ctypes.CDLL, scattered: bool = False
     ):
         self.loop, self.library = loop, library
+        self._weighing = classified.kinds[0].weighing
+        self._lumpings = [classified.kinds[k].lumping for k in classified.kind_of]
         width = int(library.lanes())
         self.lanes = Lanes(width, scattered and width > 1)
         cell, objects = loop.cell, int(isinstance(loop.plant, CarryingPlant))
@@ -69,7 +72,16 @@ class CompiledLoop:
         for name, array in self._arrays.items():
             setattr(self.quantities, name, self.address(array))
         self.work = self._work()
-        self.carried = _carried(loop.plant, self.sizes["bodies"])
+        self.parameters = _carried(loop.plant)
+        self.carried = self.lumped(self.parameters)
+
+    def lumped(self, pi: np.ndarray) -> np.ndarray:
+        """True inertial parameters, (..., n, 10 bodies), as generated code reads them, (..., n, bodies)."""
+        found = np.zeros((*pi.shape[:-1], self.sizes["bodies"]))
+        for i, lumping in enumerate(self._lumpings):
+            size, count = lumping.matrix.shape
+            found[..., i, :size] = pi[..., i, :count] @ lumping.matrix.T
+        return found
 
     def packed_state(self, y: np.ndarray) -> np.ndarray:
         """A flat state in lanes, flat."""
@@ -95,7 +107,7 @@ class CompiledLoop:
         y, first, found = self.packed_state(y), np.zeros(1, dtype=np.intc), np.zeros(self.loop.size)
         y_dot = room(y.size)
         desired = dict(zip((*DESIRED, *SLIDE), reference.desired, strict=False))
-        weights = one_after_another(reference.weights)
+        weights = self._weighing.numbers(reference.weights)
         t = np.full(2, float(reference.t))
         addresses = {"disturbed": first, "loaded": first, "t": t}
         steps = structs.Steps(**{name: array.ctypes.data for name, array in addresses.items()})
@@ -211,12 +223,6 @@ class CompiledLoop:
         return self._scratch[-1]
 
 
-def one_after_another(weights: Sequence[np.ndarray]) -> np.ndarray:
-    """c, c', c'' and c^-1, (..., n, m, m) each, as rows of numbers, (..., n, 4 m m)."""
-    together = np.stack(weights, axis=-3)
-    return together.reshape(*together.shape[:-3], -1)
-
-
 def _constants(loop: ClosedLoop, classified: Classified) -> dict[str, np.ndarray]:
     """Arrays of the quantities that do not change in a run, by name; zeros for those that nothing reads."""
     controller, plant, cell = loop.controller, loop.plant, loop.cell
@@ -246,10 +252,11 @@ def _placements(bases: Sequence[Any]) -> np.ndarray:
     return np.array([np.append(base.rotation.ravel(), base.translation) for base in bases])
 
 
-def _carried(plant: Plant, bodies: int) -> np.ndarray:
-    """True inertial parameters with every load of the schedule, (windows, n, bodies)."""
+def _carried(plant: Plant) -> np.ndarray:
+    """True inertial parameters with every load of the schedule, (windows, n, 10 bodies)."""
     windows = plant.schedule.robots
-    pi = np.zeros((len(windows), len(windows[0]), bodies))
+    bodies = max(robot.body_count for robot in windows[0])
+    pi = np.zeros((len(windows), len(windows[0]), 10 * bodies))
     for rows, robots in zip(pi, windows, strict=True):
         for row, robot in zip(rows, robots, strict=True):
             row[: 10 * robot.body_count] = robot.inertial_parameters

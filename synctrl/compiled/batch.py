@@ -96,17 +96,15 @@ class Batch:
         classified, known = classify(run.loop), {} if libraries is None else libraries
         library = library_for(run.loop, classified, known, processor.widest() if width is None else width)
         self._run, self._program = run, CompiledLoop(run.loop, classified, library)
-        self._tables = Tables()
-        self._bands = bands
-        self._start = run.loop.initial_state()
+        self._side = _Side(self._program, run, bands)
 
     def measure(self, columns: Mapping[str, np.ndarray], count: int) -> Measured:
         """Make some runs.
 
         Args:
             columns: what differs from the planned run, by names of quantities: constants of the cell, "q",
-                "v", "z" and "memory" at the start, (count, rows, columns); "pi" and "disturbance", (count,
-                windows, rows, columns).
+                "v", "z" and "memory" at the start, (count, rows, columns); "disturbance", (count, windows,
+                rows, columns); and "pi", true inertial parameters, (count, windows, n, 10 bodies).
             count: number of runs.
 
         Raises:
@@ -116,10 +114,10 @@ class Batch:
         width, parts = self._program.lanes.width, list[Measured]()
         for first in range(0, count, width):
             chosen = np.minimum(np.arange(first, first + width), count - 1)
-            side = _Side(self._program, self._run, self._bands, self._start)
+            self._side.begin()
             for name, array in arrays.items():
-                side.put(name, np.moveaxis(array[chosen], 0, -1))
-            parts.append(side.made(self._tables))
+                self._side.put(name, np.moveaxis(array[chosen], 0, -1))
+            parts.append(self._side.made())
         return _joined(parts, count)
 
     # -- internals ----------------------------------------------------------------------------------------
@@ -129,26 +127,39 @@ class Batch:
         if name not in QUANTITIES or QUANTITIES[name].owner not in ("cell", "state", "load", "disturbance"):
             raise InputError.expected("a quantity that runs have from their start", name, "columns")
         expected: tuple[int, ...] = shape(name, self._program.sizes)
-        windows = {"pi": self._program.carried, "disturbance": self._run.schedule.torques}
-        if name in windows:
-            expected = (len(windows[name]), *expected)
+        if name == "pi":
+            expected = self._program.parameters.shape
+        elif name == "disturbance":
+            expected = (len(self._run.schedule.torques), *expected)
         found = np.asarray(array, dtype=float)
         if found.shape != (count, *expected):
             raise InputError.expected(f"shape {(count, *expected)}", found.shape, f"columns, {name}")
-        return found
+        return self._program.lumped(found) if name == "pi" else found
 
 
 class _Side(Stepper):
-    """Runs in the lanes of the library, from their start to their end."""
+    """Runs in the lanes of the library, from their start to their end; then others, with the same memory."""
 
-    def __init__(self, program: CompiledLoop, run: Run, bands: Mapping, start: np.ndarray):
-        program.reset()
+    def __init__(self, program: CompiledLoop, run: Run, bands: Mapping):
         super().__init__(program, run)
-        self._y, self._ending = program.packed_state(start), Ending(program.lanes.width)
+        self._tables, self._pace = Tables(), Pace()
+        self._y, self._ending = program.packed_state(run.loop.initial_state()), Ending(program.lanes.width)
         self._worst, self._logged = Worst(program, run.loop.cell.v0), list[np.ndarray]()
         self._stop = np.zeros(program.lanes.width)
         self._tally, self._kept = _tally(program, bands)
         self.steps.tally = ctypes.addressof(self._tally)
+        self._start = self._y.copy(), {name: array.copy() for name, array in self._kept.items()}
+
+    def begin(self) -> None:
+        """Go back to the start, with the numbers of the planned run."""
+        self.program.reset()
+        self.say_what_acts()
+        self._y[...], kept = self._start
+        for name, array in kept.items():
+            self._kept[name][...] = array
+        self._ending.begin()
+        self._worst.begin()
+        self._stop[:], self._tally.rows, self._logged = 0, 0, []
 
     def put(self, name: str, array: np.ndarray) -> None:
         """Let runs have their own values of a quantity, (..., rows, columns, lanes)."""
@@ -162,15 +173,14 @@ class _Side(Stepper):
         else:
             self.program.tell_apart(self.steps, name, array)
 
-    def made(self, tables: Tables) -> Measured:
+    def made(self) -> Measured:
         """Make the runs."""
-        pace = Pace()
-        for block in tables.blocks(self.program, self.run.clock):
+        for block in self._tables.blocks(self.program, self.run.clock):
             self.look_at(block)
-            for first, last in pace.parts(len(block.steps.starts)):
+            for first, last in self._pace.parts(len(block.steps.starts)):
                 start = perf_counter()
                 self.call(first, last)
-                pace.learn(last - first, perf_counter() - start)
+                self._pace.learn(last - first, perf_counter() - start)
             if self._ending.all:
                 return self._measured()
         self.look_at_end()

@@ -10,7 +10,6 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import json
-import os
 import platform
 import struct
 import sys
@@ -21,8 +20,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import CompilationError, MissingDependencyError
-from .cache import building_folder, executable_place, open_cache, read_file, remove_leftovers
-from .compiler import FLAGS, compile_library, compiler, compiler_version, fault
+from .cache import building_folder, executable_place, open_cache, read_file, remove_leftovers, write_file
+from .compiler import FLAGS, SUFFIX, compile_library, compiler, compiler_version
+from .process import fault
 from .processor import cpu_features
 
 #: rooms of the package that generated code is made from, or compared with
@@ -130,7 +130,7 @@ def load(content: bytes, folder: Path) -> ctypes.CDLL:
     if sys.platform == "linux" and not is_whole(content):
         raise OSError("no shared library, or only a part of one")
     with building_folder(executable_place(folder)) as place:
-        copy = place / "library.so"
+        copy = place / f"library{SUFFIX}"
         copy.write_bytes(content)
         return ctypes.CDLL(str(copy))
 
@@ -165,7 +165,7 @@ def is_whole(content: bytes) -> bool:
 def _stored(folder: Path, key: str, check: Check) -> ctypes.CDLL | None:
     """The library if its file is what was once published, and computes what it should; else None."""
     try:
-        digest, content = read_file(folder / f"{key}.sha256", DIGEST), read_file(folder / f"{key}.so")
+        digest, content = read_file(folder / f"{key}.sha256", DIGEST), read_file(folder / f"{key}{SUFFIX}")
     except OSError:
         return None
     if digest is None or content is None or digest.strip() != _digest(key, content).encode():
@@ -202,10 +202,9 @@ def _publish(place: Path, target: Path, key: str, content: bytes) -> None:
 
     In between, a reader finds a digest that does not fit.
     """
-    for suffix, data in ((".so", content), (".sha256", _digest(key, content).encode())):
+    for suffix, data in ((SUFFIX, content), (".sha256", _digest(key, content).encode())):
         file = place / f"published{suffix}"
-        with open(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as stream:
-            stream.write(data)
+        write_file(file, data)
         file.replace(f"{target}{suffix}")
 
 

@@ -1,43 +1,37 @@
-"""The machine's C compiler: found by name, and run within limits of time and of what it may print."""
+"""The machine's C compiler: found by name, asked what it knows, and told to make a library."""
 
 from __future__ import annotations
 
 import os
-import selectors
 import shlex
 import shutil
-import signal
-import subprocess
 import sys
 import threading
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import monotonic
 
-from ..errors import CompilationError, MissingDependencyError
+from ..errors import MissingDependencyError
+from .process import fault, run
 
 #: for the processor of this machine, which is in the key of the cache, where the compiler knows how
 NATIVE = "-march=native"
+#: code may stand anywhere in memory; for Windows that goes without saying, and clang refuses to be told
+_IN_LIBRARIES = () if sys.platform == "win32" else ("-fPIC",)
 #: products and sums are rounded one by one, so that results do not depend on the compiler
-FLAGS = ("-O2", NATIVE, "-ffp-contract=off", "-fno-math-errno", "-fPIC")
+FLAGS = ("-O2", NATIVE, "-ffp-contract=off", "-fno-math-errno", *_IN_LIBRARIES)
+#: how names of libraries end
+SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 #: what the program of the package ziglang is called with: without checks that end a process, and without the
 #: libraries for them and for arithmetic that processors do not have, which it would have to compile first
 ZIG = ("cc", "-fno-sanitize=undefined", *(() if sys.platform == "win32" else ("--rtlib=none",)))
-#: variables by which it is told where to keep what it makes on the way
-_ZIG_PLACES = ("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR")
 #: how long one call of the compiler may take, s; the largest arms take about a minute on a slow machine
 LONGEST = 900.0
 #: how long it may take to say its version, s
 LONGEST_VERSION = 30.0
-#: what one call may print, bytes
-MOST_PRINTED = 1_000_000
-#: how often a running compiler is looked after, s
-GLANCE = 0.05
 
 
 def compiler() -> tuple[str, ...]:
@@ -101,50 +95,7 @@ def compile_library(sources: Iterable[str], folder: Path) -> Path:
             stop.set()
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    return _make(folder / "library.so", [*command, "-shared", *objects, "-lm"], stop)
-
-
-def run(
-    command: Iterable[str], seconds: float, place: Path, stop: threading.Event | None = None
-) -> tuple[int, str]:
-    """Run a program in a process group of its own, and leave none of that group behind.
-
-    Args:
-        command: the program and its arguments.
-        seconds: how long it may take, s.
-        place: a folder for what it makes on the way.
-        stop: ends it early.
-
-    Returns:
-        Its exit status, and what it printed.
-
-    Raises:
-        CompilationError: it cannot be run, takes longer, prints without end, or was stopped.
-    """
-    command = list(command)
-    try:
-        process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-            env={**os.environ, **dict.fromkeys(_ZIG_PLACES, str(place / "zig"))},
-        )
-    except (OSError, ValueError) as error:
-        raise fault(command[0], "cannot be run", f": {error}") from error
-    with process:
-        try:
-            printed = _follow(process, command[0], seconds, stop or threading.Event())
-        finally:
-            with suppress(ProcessLookupError, PermissionError):
-                os.killpg(process.pid, signal.SIGKILL)  # with the children that it has left
-    return process.returncode, printed.decode(errors="replace").strip()
-
-
-def fault(program: str, found: str, more: str = "") -> CompilationError:
-    """The error about a compiler that does something else than to compile."""
-    return CompilationError(f"'{program}' {found}{more}", subject="C compiler", found=found)
+    return _make(folder / f"library{SUFFIX}", [*command, "-shared", *objects, "-lm"], stop)
 
 
 # -- internals --------------------------------------------------------------------------------------------
@@ -230,41 +181,3 @@ def _make(target: Path, command: list[str], stop: threading.Event) -> Path:
         named = f"; is it a compiler? It was named by {'CC' if os.environ.get('CC') else 'PATH'}"
         raise fault(command[0], f"ended without an error, but wrote no '{target.name}'", named + said)
     return target
-
-
-def _follow(process: subprocess.Popen[bytes], name: str, seconds: float, stop: threading.Event) -> bytes:
-    """What a program prints until it ends.
-
-    A child that it leaves behind may hold the pipe open: the end of the program counts, not that of the pipe.
-    """
-    printed, deadline, ended = bytearray(), monotonic() + seconds, False
-    with selectors.DefaultSelector() as pipe:
-        pipe.register(process.stdout, selectors.EVENT_READ)  # type: ignore[arg-type]
-        while not ended:
-            _check_limits(name, len(printed), seconds, deadline, stop)
-            if not pipe.get_map():
-                ended = _ends_soon(process)
-            elif not pipe.select(GLANCE):
-                ended = process.poll() is not None
-            elif chunk := os.read(process.stdout.fileno(), 65536):  # type: ignore[union-attr]
-                printed += chunk
-            else:
-                pipe.unregister(process.stdout)  # type: ignore[arg-type]
-    return bytes(printed)
-
-
-def _check_limits(name: str, printed: int, seconds: float, deadline: float, stop: threading.Event) -> None:
-    """Raise if a running program must be stopped."""
-    way_out = " with the processes that it had started; name another one by CC, or use engine='pinocchio'"
-    if stop.is_set():
-        raise fault(name, "was stopped", ", because something else failed")
-    if printed > MOST_PRINTED:
-        raise fault(name, "printed without end and was stopped", way_out)
-    if monotonic() > deadline:
-        raise fault(name, f"did not end within {seconds:g} s and was stopped", way_out)
-
-
-def _ends_soon(process: subprocess.Popen[bytes]) -> bool:
-    with suppress(subprocess.TimeoutExpired):
-        process.wait(GLANCE)
-    return process.returncode is not None

@@ -30,7 +30,8 @@ _WRITTEN: dict[Any, str] = {ctypes.c_int: "int ", ctypes.c_long: "long ", ctypes
 
 def vectors(width: int) -> str:
     """The C text about numbers of so many lanes."""
-    return f"#define LANES {width}\n" + (FOLDER / "vectors.h").read_text(encoding="utf-8")
+    parts = [(FOLDER / name).read_text(encoding="utf-8") for name in ("vectors.h", "elementary.h")]
+    return "".join([f"#define LANES {width}\n", *parts])
 
 
 def prelude(kinds: list[Kind], width: int) -> str:

@@ -1,14 +1,15 @@
 """Lanes: what stands side by side in the vectors of generated code, and how arrays are put there.
 
 An array of a quantity has a row per robot or pair. In the code a number is a vector of `width` lanes. Lanes
-are either runs of one cell, or robots of one run: then a row of the code is one of `width` robots, or pairs, one
-after another, and lanes that are too many repeat the last one. Whatever is neither a robot's nor a pair's is
-the same in all lanes. With one lane both are the arrays as they are.
+are either runs of one cell, or robots of one run: then a row of the code is one of `width` robots, or pairs,
+one after another, and lanes that are too many repeat the last one. Whatever is neither a robot's nor a pair's
+is the same in all lanes. With one lane both are the arrays as they are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ COSTS: Mapping[int, float] = {1: 1.0, 2: 1.1, 4: 1.2, 8: 1.9}
 
 def room(*shape: int) -> np.ndarray:
     """Zeros that begin where the widest vectors may begin."""
-    size = int(np.prod(shape))
+    size = prod(shape)
     whole = np.zeros(size + ALIGNED // 8)
     skipped = -whole.ctypes.data % ALIGNED // 8
     return whole[skipped : skipped + size].reshape(shape)

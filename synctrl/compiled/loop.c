@@ -31,9 +31,10 @@ static vec *at_row(const Arrays *x, long row) {
     return x->spread;
 }
 
-/* Point at what is desired at a stage of a step; stage 0: start, 1: middle, 2: end. */
+/* Point at what is desired at a stage of a step; stage 0: start, 1: middle, 2: end. Rows are those of all starts and of
+ * the last end, then those of the middles; see `DesiredStretch`. */
 static void look_up(Quantities *a, const Steps *s, int stage, int step) {
-    long row = (long)stage * s->length + s->first + step;
+    long place = s->first + step, row = stage == 0 ? place : stage == 1 ? s->length + 1 + place : s->ends[place];
 #define LOOK_UP(name, rows, columns) a->name = at_row(&s->name, row);
     INSTANT(LOOK_UP)
 }

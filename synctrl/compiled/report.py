@@ -23,6 +23,11 @@ class Ending:
         status, step, robot = np.zeros((3, runs), dtype=np.intc)
         self.found = status, step, robot, np.zeros(runs)
 
+    def begin(self) -> None:
+        """Forget what was found."""
+        for part in self.found:
+            part[...] = 0
+
     @property
     def all(self) -> bool:
         """Whether all runs have ended."""
@@ -48,10 +53,17 @@ class Worst:
         self._joints = v0.shape[1]
         size = program.lanes.rows(len(v0)) * self._joints
         self.largest, self.time, self.speed, self.at = (room(width) for _ in range(4))
-        self.speed[:], self.at[:] = np.abs(v0).max(), -1
-        self._before = room(2, size, width), room(2, size, width)
+        self._before, self._first_speed = (room(2, size, width), room(2, size, width)), np.abs(v0).max()
         buffers = self.largest, self.speed, self.time, self.at, *self._before
-        program.work.step_error = structs.StepError(0, 0, *(part.ctypes.data for part in buffers))
+        self._told = [part.ctypes.data for part in buffers]
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget all steps."""
+        for part in (self.largest, self.time, *self._before):
+            part[...] = 0
+        self.speed[:], self.at[:] = self._first_speed, -1
+        self._program.work.step_error = structs.StepError(0, 0, *self._told)
 
     def of_all(self) -> tuple[float, float, int, float]:
         """Error, largest velocity, joint and end of the worst step of a run whose robots stand in lanes.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from ..simulation.guard import checks, limits_of
 from . import structs
 from .arrays import CompiledLoop
 from .structs import Mark
-from .tables import DesiredStretch, tabulated
+from .tables import DesiredStretch, desired_in
 
 #: how long the library may be away, s: Ctrl-C is seen when it comes back
 AWAY = 0.05
@@ -55,7 +56,12 @@ class Stepper:
         period = run.info.get("control_period") or 0.0
         self.steps = structs.Steps(holds=run.every is not None, period=period)
         self._block: DesiredStretch | None = None
-        program.tell(self.steps, {"disturbance": run.schedule.torques, "pi": program.carried})
+        self.say_what_acts()
+
+    def say_what_acts(self) -> None:
+        """Say what acts from outside, and what is carried."""
+        program, torques = self.program, self.run.schedule.torques
+        program.tell(self.steps, {"disturbance": torques, "pi": program.carried})
 
     def look_at(self, block: DesiredStretch) -> None:
         """Say what is desired and happens in the steps of a block, if that was not said before."""
@@ -68,13 +74,10 @@ class Stepper:
 
     def look_at_end(self) -> None:
         """Say of the end of the run: one step of no length, in which acts what acted in the last step."""
-        run, clock = self.run, self.run.clock
-        end, yes, no = np.array([clock.end]), np.array([True]), np.array([False])
-        nothing = Stretch(clock.steps, np.repeat(end, 2), yes, yes, np.array([clock.count]))
+        run, clock, (block, before) = self.run, self.run.clock, self._end
+        yes, no = np.array([True]), np.array([False])
         due = np.array([run.every is None or clock.sampled_at_end(run.every)])
-        before = clock.stretch(clock.steps - 1, clock.steps).middles
-        block = DesiredStretch(nothing, tabulated(run.loop.cell, np.array([clock.end] * 3)))
-        self._say(block, nothing.times, marked(yes, yes, due, no), before)
+        self._say(block, block.steps.times, marked(yes, yes, due, no), before)
 
     def call(self, first: int, last: int) -> None:
         """Make some steps of the block that was told of last."""
@@ -82,6 +85,14 @@ class Stepper:
         self._made(self._times[first : last + 1], self._marks[first:last])
 
     # -- internals ----------------------------------------------------------------------------------------
+
+    @cached_property
+    def _end(self) -> tuple[DesiredStretch, np.ndarray]:
+        """The end as a step of no length, and the middle of the last step before it."""
+        clock, yes = self.run.clock, np.array([True])
+        nothing = Stretch(clock.steps, np.repeat(clock.end, 2), yes, yes, np.array([clock.count]))
+        before = clock.stretch(clock.steps - 1, clock.steps).middles
+        return desired_in(self.run.loop.cell, nothing, ~yes), before
 
     def _made(self, times: np.ndarray, marks: np.ndarray) -> None:
         """Call the library for steps between these times, with what happens at their starts."""
@@ -91,6 +102,7 @@ class Stepper:
         """What is desired in a block, what happens and when, and what acts in the middles of its steps."""
         self.program.tell(self.steps, block.desired)
         self.steps.length, self._block = len(marks), block
+        self.steps.ends = block.ends.ctypes.data
         self._times, self._marks = np.ascontiguousarray(times), marks
         schedules = self.run.schedule, self.program.loop.plant.schedule
         self._acting = [schedule.windows(middles).astype(np.intc) for schedule in schedules]

@@ -118,6 +118,7 @@ class Steps(ctypes.Structure):
         period: how long they are held, s.
         t: instants of those to be made, (count + 1), s.
         marks: what happens at the start of each, see `Mark`.
+        ends: in which row is what is desired at the ends of all steps of the block, see `DesiredStretch`.
         disturbed, loaded: which disturbance and which load acts in each.
         sense, act: what sensors and actuators do, see `hooks.py`; 0 where there are none.
         tally: measures to be taken instead of a log, or 0.
@@ -133,6 +134,7 @@ class Steps(ctypes.Structure):
         ("period", ctypes.c_double),
         ("t", Doubles),
         ("marks", Chars),
+        ("ends", Ints),
         ("disturbed", Ints),
         ("loaded", Ints),
         *((name, Callbacks) for name in ("sense", "act")),

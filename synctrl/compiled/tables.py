@@ -12,8 +12,9 @@ from ..coupling.cell import Cell
 from ..coupling.desired import rows_of
 from ..simulation.advance import up_to_a_failure
 from ..simulation.clock import Clock, Stretch
-from .arrays import CompiledLoop, one_after_another
+from .arrays import CompiledLoop
 from .quantities import DESIRED, SLIDE
+from .weighing import weighing_of
 
 #: bytes of references that one block of steps may need
 BLOCK_BYTES = 32_000_000
@@ -22,10 +23,19 @@ BLOCK_STEPS = 1024
 
 
 class DesiredStretch(NamedTuple):
-    """Consecutive steps with what is desired at their start, middle and end, by the names of quantities."""
+    """Consecutive steps with what is desired in them.
+
+    Attributes:
+        steps: the k steps.
+        desired: by the names of quantities, at the k starts and the last end, at the k middles, and at
+            whatever ends have rows of their own.
+        ends: in which row is what is desired at the end of each step, (k,): that of the next start, unless
+            something jumps there.
+    """
 
     steps: Stretch
     desired: dict[str, np.ndarray]
+    ends: np.ndarray
 
 
 def blocks(program: CompiledLoop, clock: Clock) -> Iterator[DesiredStretch]:
@@ -34,7 +44,10 @@ def blocks(program: CompiledLoop, clock: Clock) -> Iterator[DesiredStretch]:
 
     def make(first: int, last: int) -> DesiredStretch:
         stretch = clock.stretch(first, last)
-        return DesiredStretch(stretch, tabulated(cell, stretch.stages))
+        try:
+            return desired_in(cell, stretch, np.isin(stretch.times[1:], clock.jumps))
+        except Exception:  # of the instant after the last step nothing need be known
+            return desired_in(cell, stretch, np.ones(last - first, dtype=bool))
 
     length = min(BLOCK_STEPS, max(1, BLOCK_BYTES // _step_bytes(cell)))
     for first, last in clock.stretches(length):
@@ -43,7 +56,7 @@ def blocks(program: CompiledLoop, clock: Clock) -> Iterator[DesiredStretch]:
 
 def _step_bytes(cell: Cell) -> int:
     """Bytes of what is desired in one step."""
-    weights = 0 if cell.coupling.is_constant else 4 * cell.m**2
+    weights = 0 if cell.coupling.is_constant else weighing_of(cell).count(cell.m)
     return 3 * 8 * cell.n * (rows_of(cell.space) * cell.m + weights)
 
 
@@ -80,16 +93,29 @@ class Tables:
         self._kept = parts, asked, found
 
 
-def tabulated(cell: Cell, instants: np.ndarray) -> dict[str, np.ndarray]:
-    """Desired motion and weights at the instants of three stages, (3, T), one stage after another.
+def desired_in(cell: Cell, steps: Stretch, jumps: np.ndarray) -> DesiredStretch:
+    """What is desired in steps.
 
-    Every motion is asked once and goes straight to its place: what a step costs does not grow with n.
+    Args:
+        cell: who desires.
+        steps: k of them.
+        jumps: at which ends something may jump, (k,), so that what was before is asked for; if at the last
+            one, nothing is asked at the instant itself.
     """
-    flat = instants.ravel()
-    names = (*DESIRED, *SLIDE)[: rows_of(cell.space)]
-    desired = {name: np.empty((flat.size, cell.n, cell.m)) for name in names}
-    for i in range(cell.n):
-        for name, part in zip(names, cell.told(i, flat), strict=True):
-            desired[name][:, i] = part
-    weights = cell.weights(flat[:1] if cell.coupling.is_constant else flat)
-    return {**desired, "weights": one_after_another(weights)}
+    starts, middles, before = steps.stages
+    own = np.flatnonzero(jumps)
+    last = starts[-1] if jumps[-1] else steps.times[-1]
+    ends = np.arange(1, len(starts) + 1, dtype=np.intc)
+    ends[own] = 2 * len(starts) + 1 + np.arange(len(own))
+    instants = np.concatenate((starts, [last], middles, before[own]))
+    return DesiredStretch(steps, tabulated(cell, instants), ends)
+
+
+def tabulated(cell: Cell, instants: np.ndarray) -> dict[str, np.ndarray]:
+    """Desired motion and weights at instants, (T,), by the names of quantities.
+
+    Every motion is asked once, at best many of them together: what a step costs does not grow with n.
+    """
+    desired = dict(zip((*DESIRED, *SLIDE), cell.told_together(range(cell.n), instants), strict=False))
+    weights = cell.weights(instants[:1] if cell.coupling.is_constant else instants)
+    return {**desired, "weights": weighing_of(cell).numbers(weights)}

@@ -21,7 +21,7 @@ from ..experiments.ur5_payload import ur5_payload
 from ..show.delay_figures import delay_map_figure
 from ..tasks.spaces import JointSpace
 from ..tasks.trajectories import Hold
-from .report import Section, Table, Text, as_picture, number
+from .report import Picture, Section, Table, Text, as_picture, number
 
 #: receivers, and what the page calls them
 RECEIVERS: Mapping[str, str] = {"hold": "hold", "extrapolate": "extrapolate", "filter": "filter, 50 rad/s"}
@@ -63,11 +63,19 @@ def margin_section(out: Path) -> Section:
     Args:
         out: the folder of the page.
     """
-    cells = talking_cells()
-    maps = maps_of(cells)
-    figure = as_picture(delay_map_figure(maps), out / "figures" / "delay_map", map_caption(maps))
+    return margins_told(margin_table(talking_cells()), map_picture(out))
+
+
+def margins_told(table: Table, picture: Picture) -> Section:
+    """The section of a `margin_table` and a `map_picture`."""
     words = (Text(each) for each in _MARGINS)
-    return Section("How much delay can this cell take?", (*words, margin_table(cells), figure))
+    return Section("How much delay can this cell take?", (*words, table, picture))
+
+
+def map_picture(out: Path) -> Picture:
+    """The maps of the first three cells, drawn into the folder of the page."""
+    maps = maps_of(talking_cells())
+    return as_picture(delay_map_figure(maps), out / "figures" / "delay_map", map_caption(maps))
 
 
 def margin_table(cells: Mapping[str, Talking]) -> Table:

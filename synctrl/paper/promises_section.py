@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -39,22 +39,32 @@ def promises_section(
         runs: by name, `PLANNED`.
         folder: where figures go.
     """
+    return told(certificates, promised_bounds(runs, folder))
+
+
+def told(certificates: Mapping[str, Certificate], bounds: Sequence[Block]) -> Section:
+    """The section of certificates, and of the `promised_bounds`."""
+    return Section(TITLE, (*promised_means(certificates), *bounds))
+
+
+def promised_bounds(runs: Mapping[str, Result], folder: Path) -> list[Block]:
+    """What Theorems B and C say of both cells, for which no certificate is needed; arguments as above."""
     a460, planar = (
         {name.removeprefix(cell): run for name, run in runs.items() if name.startswith(cell)}
         for cell in ("a460_pair_", "planar_four_")
     )
-    blocks = promised_means(certificates)
+    blocks: list[Block] = []
     for cell in CELLS:
         name = f"{cell}_synchronized"
         blocks += promised_errors(runs[name], PLANNED[name].make(), folder / f"modal_{cell}")
-    return Section(TITLE, (*blocks, *promised_rates(a460, planar, folder / "rates_over_gamma")))
+    return [*blocks, *promised_rates(a460, planar, folder / "rates_over_gamma")]
 
 
 def promised_means(certificates: Mapping[str, Certificate]) -> list[Block]:
     """What the certificate of each run says, and what Theorem A bounds beside what it was."""
-    told = {name: certificates[name] for name in PROMISED if name in certificates}
-    points = Points(tuple(said(each) for each in told.values()))
-    return [Text(_ABOUT), points, Text(_THEOREM_A), dissipation_table(told)]
+    those = {name: certificates[name] for name in PROMISED if name in certificates}
+    points = Points(tuple(said(each) for each in those.values()))
+    return [Text(_ABOUT), points, Text(_THEOREM_A), dissipation_table(those)]
 
 
 def said(certificate: Certificate) -> str:

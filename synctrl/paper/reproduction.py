@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import signal
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Future
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
-from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Any, Self
+from typing import Self
 
 from ..compiled.build import require_casadi
 from ..compiled.compiler import compiler
@@ -27,11 +25,11 @@ from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from .judge import DURATION as JUDGED_DURATION
 from .judge import Agreement, compare_runs, joint_pair
+from .processes import Processes, processes, report
+from .saved_runs import SavedRuns
 
 LAYOUT = "{desc:36} {percentage:3.0f}% |{bar}| {n:.1f}/{total:g} s  [{elapsed}]"
 INTERVAL = 0.1  # s between two reports of a run
-#: tells the parent how far a run is; set when a process starts, for it cannot be handed over with a run
-_report: Any = None
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,7 @@ def fastest_engine() -> str:
     return "compiled"
 
 
-def run_all(folder: Path, workers: int, planned: Mapping[str, PlannedRun]) -> dict[str, Result]:
+def run_all(folder: Path, workers: int, planned: Mapping[str, PlannedRun]) -> SavedRuns:
     """Make runs, with a progress bar each in simulated seconds, and save each as soon as it is complete.
 
     Args:
@@ -80,18 +78,31 @@ def run_all(folder: Path, workers: int, planned: Mapping[str, PlannedRun]) -> di
             stopped what was computed.
         ResultError: a file cannot be written.
     """
+    with processes(workers) as pool:
+        return finished(pool, begun(pool, folder, planned), folder)
+
+
+def begun(pool: Processes, folder: Path, planned: Mapping[str, PlannedRun]) -> dict[str, Future[Path]]:
+    """`run_all` as far as giving the runs to processes; those that take longest, by their engine, are first.
+
+    Raises:
+        ResultError: nothing can be written into the folder.
+    """
     with reported("write into the folder", folder):  # before anything runs
         folder.mkdir(parents=True, exist_ok=True)
         TemporaryFile(dir=folder).close()
-    context = get_context("spawn")
-    events = context.SimpleQueue()
-    with ProcessPoolExecutor(workers, context, initializer=_start, initargs=(events.put,)) as pool:
-        futures = {name: pool.submit(_work, name, run, folder) for name, run in planned.items()}
-        try:
-            _watch(futures, events)
-        except KeyboardInterrupt:
-            pool.shutdown(cancel_futures=True)
-            raise
+    order = sorted(planned, key=lambda name: planned[name].engine == "compiled")
+    futures = {name: pool.submit(_work, name, planned[name], folder) for name in order}
+    return {name: futures[name] for name in planned}
+
+
+def finished(pool: Processes, futures: Mapping[str, Future[Path]], folder: Path) -> SavedRuns:
+    """The runs that were `begun`, when all are complete.
+
+    Raises:
+        SimulationError, ResultError: as of `run_all`.
+    """
+    _watch(futures, pool)
     for name, future in futures.items():
         error = future.exception()
         if isinstance(error, BrokenExecutor):
@@ -99,17 +110,17 @@ def run_all(folder: Path, workers: int, planned: Mapping[str, PlannedRun]) -> di
             raise ended.about(name)
         if error is not None:
             raise error
-    return {name: Result.load(future.result()) for name, future in futures.items()}
+    return SavedRuns(folder, futures)
 
 
-def _watch(futures: Mapping[str, Future[Path]], events: Any) -> None:
+def _watch(futures: Mapping[str, Future[Path]], pool: Processes) -> None:
     """Draw a bar for every run until all are done."""
     with _bars() as draw:
         done = False
         while not done:
             done = all(future.done() for future in futures.values())
-            while not events.empty():
-                draw(*events.get())
+            for event in pool.reports():
+                draw(*event)
             time.sleep(0 if done else INTERVAL)
 
 
@@ -135,13 +146,6 @@ def _bars() -> Iterator[Callable[[str, float, float], None]]:
     finally:
         for bar in bars.values():
             bar.close()
-
-
-def _start(report: Callable) -> None:
-    """Prepare a process: it reports to its parent, which alone answers to an interrupt."""
-    global _report
-    _report = report
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _work(name: str, run: PlannedRun, folder: Path) -> Path:
@@ -173,7 +177,7 @@ def _reporter(name: str, duration: float) -> Callable[[float], None]:
         now = time.monotonic()
         if now - last >= INTERVAL or t >= duration:
             last = now
-            _report((name, t, duration))
+            report(name, t, duration)
 
     return progress
 

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from collections.abc import Mapping
 from pathlib import Path
 
 from ..analysis.certify import Certificate, certify
-from ..analysis.comparison import Comparison
 from ..show.lyapunov_plots import growth_mark, lyapunov_figure
 from ..show.plots import save
 from ..simulation.result import Result
-from .fairness import FAIR, compare_laws, compare_parts
 from .report import Picture, Section, SideBySide, Table, Text, number
 from .reproduction import PLANNED
 
@@ -29,38 +25,18 @@ V' = - Σ_i s_iᵀ K_r s_i - Σ_k ε_kᵀ K_ε Λ ε_k - Σ_i σ_iᵀ K_ε β σ
 with d = θ - θ̂, E = Sᵀ ∫ε, σ = Sᵀ ε"""
 
 
-def examine(
-    folder: Path,
-    figures: Path,
-    workers: int = 2,
-    names: Iterable[str] = CERTIFIED,
-    limit: float = float("inf"),
-) -> tuple[dict[str, Certificate], dict[str, tuple[Comparison, Comparison]]]:
-    """Certify saved runs and draw their certificates, and compare laws, and parts of a law, on both cells.
+def examined(name: str, runs: Mapping[str, Result], figures: Path) -> Certificate:
+    """Certify a planned run, and draw its certificate.
 
     Args:
-        folder: where `run_all` has saved the runs.
-        figures: where the figures of the certificates go.
-        workers: number of processes.
-        names: runs to certify.
-        limit: longest run that is compared, s.
+        name: of the run.
+        runs: the runs by name.
+        figures: where the figure goes.
 
     Raises:
-        ResultError: a run is missing or damaged, or a figure cannot be written.
+        ResultError: the run is missing or damaged, or the figure cannot be written.
     """
-    names = tuple(names)
-    for name in names:
-        Result.load(folder / f"{name}.npz")
-    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-        laws = {name: pool.submit(compare_laws, name, limit) for name in FAIR}
-        parts = {name: pool.submit(compare_parts, name, limit) for name in FAIR}
-        certified = {name: pool.submit(_certify, name, folder, figures) for name in names}
-        compared = {name: (laws[name].result(), parts[name].result()) for name in FAIR}
-        return {name: future.result() for name, future in certified.items()}, compared
-
-
-def _certify(name: str, folder: Path, figures: Path) -> Certificate:
-    certificate = certify(Result.load(folder / f"{name}.npz"), PLANNED[name].make())
+    certificate = certify(runs[name], PLANNED[name].make())
     draw_certificate(name, certificate, figures)
     return certificate
 

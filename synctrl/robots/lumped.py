@@ -3,14 +3,15 @@
 Mass on the axis of a turning joint moves with the body before the joint as well as with that behind it, and
 mass that only has a second moment moves through a sliding joint unnoticed. So what of a body is like that may
 be counted to the body before it, from the tips to the base, where it does not matter any more (Khalil and
-Dombre, *Modeling, Identification and Control of Robots*, 2002, chapter 9). Of a body behind a turning joint seven
-of ten numbers remain. Of one that can only turn about one direction, such as all of a planar arm and the
-first of any, one moment of inertia stands for six. Torques, in numbers or in symbols, stay what they were.
+Dombre, *Modeling, Identification and Control of Robots*, 2002, chapter 9). Of a body behind a turning joint
+seven of ten numbers remain. Of one that can only turn about one direction, such as all of a planar arm and
+the first of any, one moment of inertia stands for six. Torques stay what they were.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,7 +53,7 @@ class Lumping(NamedTuple):
     places: np.ndarray
 
     @property
-    def count(self) -> int:
+    def size(self) -> int:
         """How many lumped parameters there are."""
         return len(self.places)
 
@@ -63,7 +64,9 @@ class Lumping(NamedTuple):
         every = [ca.SX(0)] * (10 * len(self.fixed.joints))
         for k, place in enumerate(self.places.tolist()):
             every[place] = numbers[k]
-        return [_unpacked(every[10 * i : 10 * i + 10], d is not None) for i, d in enumerate(spins(self.fixed))]
+        return [
+            _unpacked(every[10 * i : 10 * i + 10], d is not None) for i, d in enumerate(spins(self.fixed))
+        ]
 
 
 def bodies_of(pi: Any) -> list[Body]:
@@ -83,8 +86,9 @@ def lumped_bodies(fixed: Mechanism, pi: Any) -> list[Body]:
     return bodies
 
 
+@lru_cache(maxsize=64)
 def lumping(fixed: Mechanism) -> Lumping:
-    """How the parameters of any such bodies are lumped."""
+    """How the parameters of any such bodies are lumped; robots that were placed from one ask but once."""
     import casadi as ca
 
     pi = ca.SX.sym("pi", 10 * len(fixed.joints))
@@ -141,9 +145,9 @@ def _joined(body: Body, passed: Body, joint: MechanismJoint, spin: np.ndarray | 
     p, axis = joint.translation, _snapped(joint.rotation @ joint.axis)
     mass, along, sigma = passed
     first = body.first + along * ca.SX(ca.DM(axis)) + mass * ca.SX(ca.DM(p))
-    parts = np.outer(p, p), np.outer(p, axis) + np.outer(axis, p), np.outer(axis, axis)
+    parts = [np.outer(p, p), np.outer(p, axis) + np.outer(axis, p), np.outer(axis, axis)]
     if spin is not None:
-        parts = tuple(np.array(np.trace(part) - spin @ part @ spin) for part in parts)
+        parts = [np.array(np.trace(part) - spin @ part @ spin) for part in parts]
     whole, both, rod = (ca.SX(ca.sparsify(ca.DM(_snapped(part)))) for part in parts)
     return Body(body.mass + mass, first, body.second + (mass * whole + along * both + sigma * rod))
 
@@ -160,7 +164,9 @@ def _body(pi: Any, spin: np.ndarray | None) -> Body:
         axis = ca.SX(ca.DM(spin))
         return Body(pi[0], pi[1:4], ca.dot(axis, ca.mtimes(_matrix(rows), axis)))
     half = 0.5 * (pi[4] + pi[6] + pi[9])
-    return Body(pi[0], pi[1:4], _symmetric([half - pi[4], -pi[5], half - pi[6], -pi[7], -pi[8], half - pi[9]]))
+    return Body(
+        pi[0], pi[1:4], _symmetric([half - pi[4], -pi[5], half - pi[6], -pi[7], -pi[8], half - pi[9]])
+    )
 
 
 def _packed(body: Body) -> Any:

@@ -112,14 +112,14 @@ class MetricGradient:
         return z
 
     def storage(self, z: np.ndarray, theta: np.ndarray) -> float:
-        return float(0.5 * np.sum((theta - z) * self.metric.lowered(theta - z)))
+        return 0.5 * _sum((theta - z) * self.metric.lowered(theta - z))
 
     def storage_rate(self, z: np.ndarray, z_dot: np.ndarray, theta: np.ndarray) -> float:
-        return float(-np.sum(self.metric.lowered(theta - z) * z_dot))
+        return -_sum(self.metric.lowered(theta - z) * z_dot)
 
     def powers(self, z: np.ndarray, theta: np.ndarray, seen: Seen) -> Mapping[str, float]:
         frozen = self.metric.frozen(theta - z)
-        return {"model error": float(np.sum(seen.s_q * np.matvec(seen.regressor, frozen)))}
+        return {"model error": _sum(seen.s_q * np.matvec(seen.regressor, frozen))}
 
 
 class BoundGradient(MetricGradient):
@@ -127,6 +127,11 @@ class BoundGradient(MetricGradient):
 
     def rate(self, z: np.ndarray, seen: Seen) -> np.ndarray:
         return self.Gamma * seen.gradient
+
+
+def _sum(term: np.ndarray) -> Any:
+    """Over robots and their entries: a number, or with more axes in front one for each instant."""
+    return term.sum(axis=(-2, -1))
 
 
 def metric_of(Gamma: Any, cell: Cell) -> Metric:
