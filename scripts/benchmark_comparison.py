@@ -113,7 +113,7 @@ def _features(figures: Figures, amount: Amount, then: str) -> Table:
     for name in amount.features or FEATURES:
         cost = _spread(figures, f"{name}, cost", inverse=True) or _why(figures, f"{name}, cost")
         of_all = _spread(figures, f"{name}, cost of all", inverse=True)
-        gain = _spread(figures, f"{name}, factor") or "not there"
+        gain = _spread(figures, f"{name}, factor") or "not there" * (f"{name}, factor" in figures.missing)
         rows.append([name, FEATURES[name].cell, cost, of_all, gain])
     note = (
         "What a step takes with a feature by what it takes without: with desired motions and weights looked "
