@@ -1,14 +1,15 @@
 """What a closed loop costs, in this version and against another one.
 
 python scripts/benchmark.py [--quick] [--page docs/performance.md] [folder]
-python scripts/benchmark.py --against [COMMIT] [--reproduce] [--quick] [--page docs/performance.md] [folder]
+python scripts/benchmark.py --against [COMMIT] [--reproduce] [--runs 3] [--only PART,...] [--quick]
+                            [--page docs/performance.md] [folder]
 
 The first form compares both engines with a naive loop, bare Pinocchio calls, and other libraries. The second
 compares the compiled engine of the working tree with that of another commit of the repository, by default of
 version 0.1, and says which aims are reached. Both are on one machine and take turns. They write benchmark.md
-and benchmark.json to the folder, by default out/benchmark or out/benchmark_against, and, unless it is quick,
-the second writes its part of docs/performance.md; `--page` names another page or asks the first to write its
-part.
+and benchmark.json to the folder, by default out/benchmark or out/benchmark_against. The second also writes
+its part of docs/performance.md, unless it is quick or measures only some of its parts; `--page` names another
+page, or asks the first to write its part. Ctrl-C ends the second early, with tables of what it has measured.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: the matrices are small
 
-from benchmark_comparison import compare, into_page
+from benchmark_comparison import ALWAYS, PARTS, compare, into_page
 from benchmark_pair import REPOSITORY, VERSION_0_1, Unmeasured
 from benchmark_report import Table, described, machine, markdown
 from benchmark_tables import FULL, QUICK, measure
@@ -35,7 +36,7 @@ PAGE = REPOSITORY / "docs" / "performance.md"
 def main(options: argparse.Namespace) -> Path:
     """Measure, and write everything; returns the path of the report."""
     figures: dict[str, Any] = {}
-    part, page = "against", options.page or (None if options.quick else PAGE)
+    part, page = "against", options.page or (None if options.quick or options.only else PAGE)
     if options.against is None:
         part, page = "engines", options.page
     if page is not None:
@@ -43,7 +44,8 @@ def main(options: argparse.Namespace) -> Path:
     if options.against is None:
         about, tables = machine(), measure(QUICK if options.quick else FULL)
     else:
-        about, tables, found = compare(options.against, options.quick, options.reproduce)
+        parts = options.only or [*(part.__name__ for part in ALWAYS), *["reproduction"] * options.reproduce]
+        about, tables, found = compare(options.against, options.quick, options.runs, parts)
         figures = {"figures": found.values, "missing": found.missing, "remarks": found.remarks}
     folder = options.folder or Path("out") / ("benchmark" if part == "engines" else "benchmark_against")
     return write(folder, page, part, about, tables, figures)
@@ -67,6 +69,15 @@ def write(
     return report
 
 
+def some(text: str) -> list[str]:
+    """Names of parts, separated by commas."""
+    names = text.split(",")
+    for name in names:
+        if name not in PARTS:
+            raise argparse.ArgumentTypeError(f"expected some of {', '.join(PARTS)}, found '{name}'")
+    return names
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -75,6 +86,10 @@ if __name__ == "__main__":
     parser.add_argument("--against", metavar="COMMIT", nargs="?", const=VERSION_0_1, help="another version")
     parser.add_argument(
         "--reproduce", action="store_true", help="with --against, the paper's experiments too"
+    )
+    parser.add_argument("--runs", type=int, help="with --against, how often all is measured; by default 3")
+    parser.add_argument(
+        "--only", metavar="PART,...", type=some, help=f"with --against, of {', '.join(PARTS)}"
     )
     parser.add_argument("--page", type=Path, help="a page with a part for the tables")
     parser.add_argument("folder", nargs="?", type=Path)

@@ -149,7 +149,7 @@ def verdict(aim: Aim, bounds: list[Bound], figures: Figures) -> str:
     remark = figures.remarks.get(aim.known_as, "")
     if not there:
         names = [aim.known_as, *(bound.figure for bound in bounds)]
-        why = next((figures.missing[name] for name in names if name in figures.missing), "not asked for")
+        why = next((figures.missing[name] for name in names if name in figures.missing), "left out")
         return f"not measured: {_short(why)}"
     met = [bound for bound in there if _holds(bound, figures.median(bound.figure))]
     words = "yes" if len(met) == len(bounds) else "missed" if not met else f"only {_listed(met)}"

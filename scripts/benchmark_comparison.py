@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,38 +18,49 @@ from benchmark_report import Table, machine, vectors
 from benchmark_steps import features, lanes, rings, steps
 from benchmark_whole import certificates, compilation, large_cells, reproduction, sweeps
 
-PARTS = (steps, large_cells, rings, features, lanes, sweeps, certificates, compilation)
+ALWAYS = (steps, large_cells, rings, features, lanes, sweeps, certificates, compilation)
+PARTS = {part.__name__: part for part in (*ALWAYS, reproduction)}
 
 
-def compare(commit: str, quick: bool, reproduce: bool) -> tuple[dict[str, str], list[Table], Figures]:
+def compare(
+    commit: str, quick: bool, runs: int | None, parts: Sequence[str]
+) -> tuple[dict[str, str], list[Table], Figures]:
     """What was measured on what, the tables, and all figures.
+
+    Args:
+        commit: the other version.
+        quick: whether little is measured.
+        runs: how often; by default as often as the amount says.
+        parts: names of `PARTS`.
 
     Raises:
         Unmeasured: there is no such commit.
     """
     amount, load = QUICK if quick else FULL, _load()
+    amount = amount._replace(runs=runs or amount.runs)
     with side_by_side(commit) as pair:
-        figures, took = measured(pair, amount, reproduce)
+        figures, took, ended = measured(pair, amount, parts)
         about = {"working tree": pair.now_is, "compared with": pair.then_is, **machine()}
         about |= {
-            "runs": str(amount.runs),
+            "runs": f"{amount.runs}{'' if ended else ', interrupted'}",
             "made on": time.strftime("%-d %B %Y"),
             "took": f"{took / 60:.0f} min",
             "programs that wanted a core": f"{load} before, {_load()} after",
         }
-        return about, tables(figures, amount, pair.then_is), figures
+        return about, tables(figures, amount, pair.then_is, not quick), figures
 
 
-def measured(pair: Pair, amount: Amount, reproduce: bool) -> tuple[Figures, float]:
-    """All figures, and how long that took, s."""
+def measured(pair: Pair, amount: Amount, parts: Sequence[str]) -> tuple[Figures, float, bool]:
+    """All figures, how long that took, s, and whether it came to its end: Ctrl-C leaves out the rest."""
     figures, start = Figures(), time.perf_counter()
-    for run in range(amount.runs):
-        for part in PARTS:
-            part(pair, amount, figures)
-            _say(f"{time.perf_counter() - start:5.0f} s, run {run + 1} of {amount.runs}: {part.__name__}")
-    if reproduce:
-        reproduction(pair, amount, figures)
-    return figures, time.perf_counter() - start
+    try:
+        for run in range(amount.runs):
+            for name in parts:
+                PARTS[name](pair, amount, figures)
+                _say(f"{time.perf_counter() - start:5.0f} s, run {run + 1} of {amount.runs}: {name}")
+    except KeyboardInterrupt:
+        return figures, time.perf_counter() - start, False
+    return figures, time.perf_counter() - start, True
 
 
 def _load() -> str:
@@ -66,10 +78,10 @@ def _say(text: str) -> None:
 # -- tables -----------------------------------------------------------------------------------------------
 
 
-def tables(figures: Figures, amount: Amount, then: str) -> list[Table]:
+def tables(figures: Figures, amount: Amount, then: str, aims: bool) -> list[Table]:
     """All of them; the aims only where what they are about was measured in full."""
     return [
-        *([benchmark_aims.table(figures, vectors(), then)] if amount is FULL else []),
+        *([benchmark_aims.table(figures, vectors(), then)] if aims else []),
         _steps(figures, amount, then),
         _features(figures, amount, then),
         _lanes(figures, amount),
@@ -101,7 +113,7 @@ def _features(figures: Figures, amount: Amount, then: str) -> Table:
     for name in amount.features or FEATURES:
         cost = _spread(figures, f"{name}, cost", inverse=True) or _why(figures, f"{name}, cost")
         of_all = _spread(figures, f"{name}, cost of all", inverse=True)
-        gain = _spread(figures, f"{name}, factor") or "not there"
+        gain = _spread(figures, f"{name}, factor") or "not there" * (f"{name}, factor" in figures.missing)
         rows.append([name, FEATURES[name].cell, cost, of_all, gain])
     note = (
         "What a step takes with a feature by what it takes without: with desired motions and weights looked "

@@ -10,7 +10,7 @@ import sys
 import tarfile
 import tempfile
 from collections.abc import Hashable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from threading import Timer
 from typing import Any, NamedTuple, TypeVar
@@ -21,6 +21,8 @@ SCRIPTS = Path(__file__).resolve().parent
 REPOSITORY = SCRIPTS.parent
 #: how long one job may take, s
 LONGEST = 900.0
+#: how long a process may take to end, s
+PATIENCE = 5.0
 Key = TypeVar("Key", bound=Hashable)
 
 
@@ -86,11 +88,15 @@ class Worker:
             raise Unmeasured(f"{name} ended with {run.returncode}: {run.stderr.strip().splitlines()[-1:]}")
 
     def close(self) -> None:
-        """End the process."""
-        if self._process is not None:
-            with suppress(OSError):  # what was not written is of no use any more
-                self._process.communicate(timeout=10)
-            self._process = None
+        """End the process, in the middle of a job if it has one."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        try:
+            process.communicate(timeout=PATIENCE)
+        except (OSError, subprocess.TimeoutExpired):
+            process.kill()
+            process.communicate()
 
     def _start(self) -> subprocess.Popen[str]:
         command = [sys.executable, str(SCRIPTS / "benchmark_worker.py")]

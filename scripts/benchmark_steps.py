@@ -81,8 +81,9 @@ def features(pair: Pair, amount: Amount, figures: Figures) -> None:
         for key in ("", " of all"):
             put_factor(figures, f"{name}, cost{key}", found, f"plain{key}", f"with{key}")
         put_factor(figures, f"{name}, factor", found, "with", "then")
-        if "with" in failed:
-            figures.lack(f"{name}, cost", failed["with"])
+        for key, what in (("with", "cost"), ("then", "factor")):
+            if key in failed:
+                figures.lack(f"{name}, {what}", failed[key])
 
 
 def lanes(pair: Pair, amount: Amount, figures: Figures) -> None:

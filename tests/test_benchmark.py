@@ -139,6 +139,17 @@ def test_what_a_version_does_not_have_is_said_and_the_rest_is_measured(tmp_path)
     assert list(found) == ["there"] and found["there"].shape == (2,) and list(failed) == ["not"]
 
 
+def test_a_process_is_ended_in_the_middle_of_a_job(tmp_path, monkeypatch):
+    monkeypatch.setattr("benchmark_pair.PATIENCE", 0.1)
+    worker = Worker(REPOSITORY, tmp_path)
+    worker.ask("hello")
+    process = worker._process
+    process.stdin.write('{"do": "per_step", "cell": "ring of 300", "seconds": 600}\n')
+    process.stdin.flush()
+    worker.close()
+    assert process.returncode < 0
+
+
 def test_a_process_that_ends_is_started_anew(tmp_path):
     worker = Worker(REPOSITORY, tmp_path)
     try:
