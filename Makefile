@@ -10,7 +10,7 @@ VENV := .venv
 PY := $(VENV)/bin/python
 LOWEST := .venv-lowest
 # What meets every library where its versions differ.
-LOWEST_TESTS := $(addprefix tests/test_,documents.py frozen.py gain_condition.py integrators.py mujoco.py scene.py \
+LOWEST_TESTS := $(addprefix tests/test_,compiler_zig.py documents.py frozen.py gain_condition.py integrators.py mujoco.py scene.py \
                   sweep.py symbolic.py tune.py)
 WORKERS ?= 2
 
@@ -55,9 +55,9 @@ clean:
 	find . -path "./$(VENV)*" -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)/.installed-core: WHAT := .[compiled,mujoco]
-$(VENV)/.installed-test: WHAT := .[test,notebooks,compiled,mujoco,sweep,xacro]
+$(VENV)/.installed-test: WHAT := .[test,notebooks,compiled,compiler,mujoco,sweep,tune,xacro]
 $(VENV)/.installed-dev:  WHAT := .[dev]
-$(LOWEST)/.installed-lowest: WHAT := .[test,compiled,mujoco,sweep]
+$(LOWEST)/.installed-lowest: WHAT := .[test,compiled,compiler,mujoco,sweep,tune]
 
 $(VENV)/.installed-%: $(VENV)/.made pyproject.toml constraints.txt
 	$(call install,$(VENV),$(WHAT),constraints.txt)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,8 +21,21 @@ START = {"ur5": (0.1, -1.2, 0.8, -0.6, 0.4, 0.3), "panda": (0.0, -0.5, 0.0, -2.0
 DAMPING = {"ur5": (12.0, 12.0, 8.0, 0.4, 0.2, 0.04), "panda": (4.0, 4.0, 2.0, 2.0, 0.4, 0.4, 0.1)}
 
 
+class Parts(NamedTuple):
+    """What an experiment is made of."""
+
+    cell: Cell
+    gains: Gains
+    duration: float
+
+
 def joint_cell(name: str, n: int) -> Experiment:
     """n robots of one kind in joint space, all inertial parameters adapted."""
+    return Experiment(*joint_parts(name, n))
+
+
+def joint_parts(name: str, n: int) -> Parts:
+    """What `joint_cell` is made of."""
     robot, start = load_robot(name), np.array(START[name])
     members = [
         Member(
@@ -31,11 +45,16 @@ def joint_cell(name: str, n: int) -> Experiment:
         )
         for i in range(n)
     ]
-    return Experiment(Cell(members, _coupling(n)), Gains(8, 8, DAMPING[name], 1, 0.01), MOTION)
+    return Parts(Cell(members, _coupling(n)), Gains(8, 8, DAMPING[name], 1, 0.01), MOTION)
 
 
 def planar_ring(n: int) -> Experiment:
     """n planar two-link arms with Cartesian tasks in one signed ring; theta (50) is adapted."""
+    return Experiment(*ring_parts(n))
+
+
+def ring_parts(n: int) -> Parts:
+    """What `planar_ring` is made of."""
     arm, q0 = load_robot("planar2r"), np.array([0.4, 1.2])
     members = []
     for i in range(n):
@@ -45,7 +64,7 @@ def planar_ring(n: int) -> Experiment:
         path = Cubic(tip, tip + np.array([-0.1, 0.05]), MOTION)
         members.append(Member(robot, path, q0, parameters=parameters, theta_hat0=0.5 * parameters.theta))
     cell = Cell(members, _coupling(n), CartesianSpace("xy"))
-    return Experiment(cell, Gains(10, 20, 1, 1, 0.1), MOTION)
+    return Parts(cell, Gains(10, 20, 1, 1, 0.1), MOTION)
 
 
 def planar_chain(joints: int) -> Experiment:

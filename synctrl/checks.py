@@ -94,6 +94,8 @@ def finite_number(name: str, value: object) -> float:
     Raises:
         InputError: not one number, or not finite; True and False are no numbers.
     """
+    if type(value) is float and isfinite(value):
+        return value
     if isinstance(value, (bool, np.bool_)):
         raise InputError.expected("a number", value, name)
     return float(finite_array(name, value, ()))  # type: ignore[arg-type]

@@ -326,10 +326,13 @@ def script(path: Path, text: str, bits: int = 0o755) -> Path:
     return path
 
 
+#: how a compiler begins that says its version, and that it knows all flags
+ANSWERS = '#!/bin/sh\ncase "$*" in --version | *" -E "*) echo test; exit;; esac'
+
+
 def as_compiler(tmp_path: Path, monkeypatch, body: str) -> None:
-    """A compiler that says its version, and for the rest does what the text says."""
-    text = f'#!/bin/sh\nif [ "$1" = --version ]; then echo test; exit; fi\n{body}\n'
-    monkeypatch.setenv("CC", str(script(tmp_path / "compiler", text)))
+    """A compiler that answers questions, and for the rest does what the text says."""
+    monkeypatch.setenv("CC", str(script(tmp_path / "compiler", f"{ANSWERS}\n{body}\n")))
 
 
 @pytest.mark.parametrize(
@@ -465,7 +468,7 @@ def test_an_interrupt_ends_the_compilers(folder, tmp_path, monkeypatch):
 def test_folders_of_builds_that_were_killed_are_removed_by_the_next_build(folder, tmp_path, monkeypatch):
     started = tmp_path / "started"
     os.mkfifo(started)
-    text = f'#!/bin/sh\necho $$ > "{started}"; exec sleep 1000\n'
+    text = f'{ANSWERS}\necho $$ > "{started}"; exec sleep 1000\n'
     code = "from synctrl.compiled import build\nbuild.cached_library('key', lambda: iter(['int a;']), print)"
     environment = {**os.environ, "CC": str(script(tmp_path / "compiler", text))}
     process = subprocess.Popen([sys.executable, "-c", code], env=environment)

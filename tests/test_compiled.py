@@ -7,12 +7,14 @@ import sys
 
 import numpy as np
 import pytest
+from faults import row
 from refusals import refused
 
 from synctrl import CartesianSpace, Cell, Circle, Coupling, Disturbance, Gains, Member, load_robot
-from synctrl.compiled import build, engine
+from synctrl.compiled import build, tables
 from synctrl.compiled.program import Program
 from synctrl.compiled.quantities import DESIRED
+from synctrl.compiled.weighing import weighing_of
 from synctrl.errors import (
     CompilationError,
     InputError,
@@ -185,10 +187,8 @@ def test_code_that_differs_from_pinocchio_is_refused(monkeypatch, tmp_path):
     compile_sources = build.compile_library
 
     def tampered(sources, folder):
-        *functions, driver = sources
-        broken = driver.replace("X(Gamma, n, P) X(limits", "X(pi, n, P) X(limits")
-        assert broken != driver
-        return compile_sources([*functions, broken], folder)
+        broken = [source.replace(*row("Gamma", "P", "pi")) for source in sources]
+        return compile_sources(broken, folder)
 
     monkeypatch.setattr(build, "compile_library", tampered)
     with refused(CompilationError, "generated code") as caught:
@@ -221,13 +221,15 @@ def test_what_goes_wrong_while_code_is_written_comes_through(monkeypatch, tmp_pa
 def test_tables_hold_what_the_cell_desires(coupling):
     cell = planar_cell(2, coupling).cell
     instants = np.array([[0.0, 0.1], [0.05, 0.15], [0.1, 0.2]])
-    tables = engine._tables(cell, instants)
-    desired = np.stack([tables[name] for name in DESIRED], axis=2).reshape(3, 2, 2, 3, 2)
-    c = np.broadcast_to(tables["weights"].reshape(-1, 2, 4, 2, 2), (6, 2, 4, 2, 2)).reshape(3, 2, 2, 4, 2, 2)
+    found = tables.tabulated(cell, instants)
+    desired = np.stack([found[name] for name in DESIRED], axis=2).reshape(3, 2, 2, 3, 2)
+    weighing = weighing_of(cell)
+    numbers = np.broadcast_to(found["weights"], (6, 2, weighing.count(2))).reshape(3, 2, 2, -1)
     for stage, times in enumerate(instants):
         for step, reference in enumerate(cell.references(times)):
             np.testing.assert_allclose(desired[stage, step].swapaxes(0, 1), reference.desired)
-            np.testing.assert_allclose(c[stage, step].swapaxes(0, 1), reference.weights)
+            for each, *c in zip(numbers[stage, step], *reference.weights, strict=True):
+                np.testing.assert_allclose(weighing.weights(each, 2), c)
 
 
 def test_two_processes_may_build_the_same_code_at_once(monkeypatch, tmp_path):
@@ -242,18 +244,6 @@ def test_two_processes_may_build_the_same_code_at_once(monkeypatch, tmp_path):
     assert len(printed) == 1
     assert len(list(tmp_path.glob("*.so"))) == 1
     assert not list(tmp_path.glob("building-*"))
-
-
-def test_scratch_arrays_have_the_sizes_that_the_code_asks_for():
-    program = Program(a460_pair().closed_loop())
-    import ctypes
-
-    sizes = [(ctypes.c_longlong * 4)() for _ in range(3)]
-    for function, size in zip(("measure", "control", "plant"), sizes, strict=True):
-        work = getattr(program.library, f"kind0_{function}_work")
-        addresses = [ctypes.addressof(size) + 8 * k for k in range(4)]
-        work(*(ctypes.c_void_p(address) for address in addresses))
-    assert program.scratch == tuple(max(column) for column in zip(*sizes, strict=True))
 
 
 @pytest.mark.parametrize("engine", ["pinocchio", "compiled"])

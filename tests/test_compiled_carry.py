@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from faults import check_fault, empty_cache, sources_of
+from faults import check_fault, empty_cache, row, sources_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import random_robot, rod_arm
@@ -36,9 +36,9 @@ from synctrl.assembly.grasp import Fixture, Grasp, fixture_wrenches, grasp_matri
 from synctrl.assembly.plant import CarryingPlant
 from synctrl.compiled import program
 from synctrl.compiled.carrying import _solve
+from synctrl.compiled.header import functions_of
 from synctrl.compiled.known import check_known
 from synctrl.compiled.program import Program
-from synctrl.compiled.structs import functions_of
 from synctrl.control.adaptation import Leakage
 from synctrl.control.laws import ComputedTorque
 from synctrl.coupling.cell import Reference
@@ -280,11 +280,11 @@ def test_only_robots_that_hold_something_have_code_for_their_hands(loops):
 
 #: faults of the driver and of the lists before it: a text, and what stands in its place
 FAULTS = {
-    "only the last hand lifts": ("a->lift[j] += a->wrench", "a->lift[j] = a->wrench"),
+    "only the last hand lifts": ("a->lift[j] += one;", "a->lift[j] = one;"),
     "hands do not pull": ("a->moving[i * nv + j] += a->pull[i * nv + j]", "(void)0"),
-    "another robot's grasp": ("X(grasp, n, hand*24)", "X(grasp, one, hand*24)"),
-    "where the hand is": ("X(true_tool, n, hand*12)", "X(tool, n, hand*12)"),
-    "where the robot stands": ("X(true_base, n, 12) X(true_tool", "X(base, n, 12) X(true_tool"),
+    "another robot's grasp": row("grasp", "hand*24"),
+    "where the hand is": row("true_tool", "hand*12", "tool"),
+    "where the robot stands": row("true_base", "12", "base"),
 }
 
 

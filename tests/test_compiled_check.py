@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from cells import SMALL_GAINS, random_experiment, small_cell, smooth_motion
-from faults import check_fault, empty_cache, sources_of
+from faults import check_fault, empty_cache, row, sources_of
 from machines import random_robot, rod_arm
 from refusals import refused
 
@@ -197,25 +197,24 @@ def test_robots_that_nobody_chose_pass_the_check(seed):
 # -- what the check finds ---------------------------------------------------------------------------------
 
 #: how Gamma is handed to the law
-GAMMA = "X(Gamma, n, P) X(limits"
+GAMMA = row("Gamma", "P")
 #: faults of the driver and of the lists before it: a text, and what stands in its place
 FAULTS = {
-    "a sign of S is lost": ("epsilon[j] += c->sign[t] * w[j]", "epsilon[j] += w[j]"),
-    "a share takes another pair": ("sign * a->integral[pair + j]", "sign * a->integral[j]"),
-    "the integral's sign is lost": ("sign * a->integral[pair + j]", "a->integral[pair + j]"),
-    "the place of the base": ("X(base, n, 12) X(desired", "X(base, one, 12) X(desired"),
-    "the posture's gain": ("X(gain, n, nv) X(z, n, Z)", "X(posture, n, nv) X(z, n, Z)"),
-    "the weights of W": ("X(weights, n, 4*m*m) X(W_inv, n, nv)", "X(weights, n, 4*m*m) X(gain, n, nv)"),
-    "another robot's damping": ("X(leak, one, m) X(K_r, n, K)", "X(leak, one, m) X(K_r, one, K)"),
-    "another robot's true parameters": ("X(pi, n, bodies) X(true_base", "X(pi, one, bodies) X(true_base"),
-    "Coulomb friction": ("* tanh(a->v[j] / a->smoothing[j])", "* (a->v[j] / a->smoothing[j])"),
+    "a sign of S is lost": ("sum += c->sign[t] * fetch(", "sum += fetch("),
+    "a share takes another pair": ("c->incident + t * LANES", "c->incident"),
+    "a share's sign is lost": ("sum += c->incident_sign[t] * fetch(", "sum += fetch("),
+    "the place of the base": row("base", "12"),
+    "the posture's gain": row("gain", "nv", "posture"),
+    "the weights of W": row("W_inv", "nv", "gain"),
+    "another robot's damping": row("K_r", "K"),
+    "another robot's true parameters": row("pi", "bodies"),
+    "Coulomb friction": ("* v_tanh(a->v[j] / a->smoothing[j])", "* (a->v[j] / a->smoothing[j])"),
     "the disturbance": ("+ a->disturbance[j]", ""),
-    "what adapts": (GAMMA, GAMMA.replace("Gamma, n", "Gamma, one")),
+    "what adapts": GAMMA,
     "which kind a robot is": ("kinds[c->kind[i]].function(", "kinds[c->kind[0]].function("),
     "the integral's rate": ("a->memory_dot[j] = a->epsilon[j]", "a->memory_dot[j] = a->epsilon_dot[j]"),
     "the leak of the integral": (" - a->leak[j % m] * a->integral[j]", ""),
-    "the order of what is desired": ("X(desired_dot, n, m) X(desired_ddot, n, m) X(slide,",
-                                     "X(desired_ddot, n, m) X(desired_dot, n, m) X(slide,"),
+    "the order of what is desired": row("desired_dot", "m", "desired_ddot"),
 }  # fmt: skip
 
 
@@ -236,19 +235,18 @@ def test_code_that_was_made_from_a_wrong_line_of_the_law_is_found(monkeypatch):
     from synctrl.control import law
 
     with monkeypatch.context() as patch:
-        patch.setattr(law, "compute_weighted_errors", lambda weights, error: np.matvec(weights.c, error))
+        patch.setattr(law, "compute_weighted_errors", lambda weights, error: 2 * error)
         wrong = sources_of(loop)
-    monkeypatch.setattr(program, "generate", lambda kinds: iter(wrong))
+    monkeypatch.setattr(program, "generate", lambda kinds, width: iter(wrong))
     with refused(CompilationError, "generated code") as caught:
         Program(loop)
     assert not caught.value.found <= program.AGREEMENT
 
 
 def test_a_wrong_library_in_the_cache_is_built_again(sources, monkeypatch, tmp_path):
-    *functions, driver = sources
-    broken = [*functions, driver.replace(GAMMA, GAMMA.replace("Gamma, n", "Gamma, one"))]
+    broken = [source.replace(*GAMMA) for source in sources]
     with monkeypatch.context() as patch:
-        patch.setattr(program, "generate", lambda kinds: iter(broken))
+        patch.setattr(program, "generate", lambda kinds, width: iter(broken))
         patch.setattr(program, "_compare", lambda *arguments: None)
         Program(mixed().closed_loop())
     (before,) = (path.read_bytes() for path in (tmp_path / "cache").glob("*.so"))

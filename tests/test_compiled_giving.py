@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from faults import check_fault, empty_cache, sources_of
+from faults import check_fault, empty_cache, row, sources_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
@@ -129,9 +129,9 @@ def test_what_a_hand_feels_is_what_the_plant_says_wherever_the_object_is(seed):
     wrenches[plant._hands] = np.matvec(grasp_matrix(levers), plant._wrenches(q, v, body)[0])
     lift, expected, shares = wrenches.sum(axis=0), plant.felt(q, v, body), _shares(plant)
     np.testing.assert_allclose(shares.sum(axis=0).reshape(6, 6), np.eye(6), atol=1e-12)
-    for row, wrench, share in zip(expected, wrenches, shares, strict=True):
+    for felt, wrench, share in zip(expected, wrenches, shares, strict=True):
         found = felt_at_origin(wrench, share, lift, body)
-        np.testing.assert_allclose(found, row, rtol=0, atol=1e-11 * np.abs(wrenches).max())
+        np.testing.assert_allclose(found, felt, rtol=0, atol=1e-11 * np.abs(wrenches).max())
 
 
 # -- the code ---------------------------------------------------------------------------------------------
@@ -146,9 +146,9 @@ def test_other_masses_and_dampings_and_none_need_no_new_code():
 
 #: faults of the lists before the driver and of the driver: a text, and what stands in its place
 FAULTS = {
-    "another hand's share": ("X(share, n, gives*36)", "X(share, one, gives*36)"),
-    "forces of a moment ago": ("    if (c->o) { turn(c, a); feel(c, a, k); }\n", ""),
-    "another robot's force": ("X(felt, n, gives*6)", "X(felt, one, gives*6)"),
+    "another hand's share": row("share", "gives*36"),
+    "forces of a moment ago": ("    if (c->o) { turn(c, a); feel(c, a); }\n", ""),
+    "another robot's force": row("felt", "gives*6"),
 }
 
 

@@ -140,7 +140,7 @@ def test_a_run_over_a_network_is_the_same_bit_for_bit_when_it_is_repeated():
 def test_the_code_of_a_cell_is_the_same_over_every_network():
     libraries = {}
     for network in (None, *NETWORKS.values()):
-        Program(planar_four(network=network).closed_loop(), libraries)
+        Program(planar_four(network=network).closed_loop(), libraries, widest=1)
     assert len(libraries) == 1
 
 

@@ -14,9 +14,12 @@ from refusals import refused
 
 from synctrl import CartesianSpace, Cell, Experiment
 from synctrl.compiled import structs
+from synctrl.compiled.address import CALLBACK
+from synctrl.compiled.arrays import _constants
 from synctrl.compiled.compiler import compiler
+from synctrl.compiled.header import declared, functions_of, header, largest, vectors
 from synctrl.compiled.kind import classify
-from synctrl.compiled.program import Program, _constants
+from synctrl.compiled.program import Program
 from synctrl.compiled.quantities import (
     FUNCTIONS,
     LOGS,
@@ -27,7 +30,6 @@ from synctrl.compiled.quantities import (
     owned_by,
     shape,
 )
-from synctrl.compiled.structs import functions_of, header, largest
 from synctrl.compiled.trace import Trace
 from synctrl.control.adaptation import Natural
 from synctrl.errors import CompilationError
@@ -146,7 +148,7 @@ def test_structures_have_the_same_layout_in_c_and_in_python(tmp_path):
         for field in (name for name, *_ in structure._fields_):
             places += [f"offsetof({title}, {field})", f"sizeof((({title} *)0)->{field})"]
             expected += [getattr(structure, field).offset, getattr(structure, field).size]
-    declarations = structs.CALLBACK + "".join(map(structs.declared, structs.STRUCTURES))
+    declarations = vectors(1) + CALLBACK + "".join(map(declared, structs.STRUCTURES))
     lines = "".join(f'    printf("%zu\\n", {place});\n' for place in places)
     source = f"#include <stddef.h>\n#include <stdio.h>\n{declarations}int main(void) {{\n{lines}}}\n"
     assert [int(line) for line in printed(source, tmp_path).split()] == expected
@@ -169,7 +171,7 @@ def test_the_driver_counts_columns_as_python_does(name, tmp_path):
 SMALL = dict(
     zip(
         (*SIZES, "n", "p", "o", "r", "h"),
-        (2, 3, 5, 7, 3, 30, 1, 1, 1, 1, 2, 1, 1, 4, 6, 1, 9, 14),
+        (2, 3, 5, 7, 3, 30, 1, 1, 1, 1, 2, 16, 1, 1, 4, 6, 1, 9, 14),
         strict=True,
     )
 )

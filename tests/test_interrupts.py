@@ -27,7 +27,7 @@ from synctrl import (
     Member,
     load_robot,
 )
-from synctrl.compiled import engine as compiled
+from synctrl.compiled import stepper, tables
 from synctrl.errors import CouplingError, NonFiniteError, RunInterrupted, SimulationError, TrajectoryError
 from synctrl.simulation import advance
 from synctrl.simulation import engines as runs
@@ -466,18 +466,18 @@ def test_bits_do_not_depend_on_the_blocks_in_which_a_run_is_made(engine, control
     options = {"engine": engine, "control_period": control_period, "duration": 0.06}
     expected = run.simulate(**options)
     for block, away in ((1, 0.05), (7, 1e-12), (1000, 1e-12), (1000, 1e9)):
-        monkeypatch.setattr(compiled, "BLOCK_STEPS", block)
-        monkeypatch.setattr(compiled, "AWAY", away)
+        monkeypatch.setattr(tables, "BLOCK_STEPS", block)
+        monkeypatch.setattr(stepper, "AWAY", away)
         monkeypatch.setattr(advance, "BLOCK", block)
         assert run.simulate(**options) == expected
 
 
 @given(per_step=st.floats(1e-7, 0.02), count=st.integers(1, 5000))
 def test_the_library_is_back_within_its_time_at_any_speed(per_step, count):
-    pace, steps = compiled.Pace(), 0
+    pace, steps = stepper.Pace(), 0
     for first, last in pace.parts(count):
         assert first == steps < last
-        assert (last - first) * per_step <= compiled.AWAY
+        assert (last - first) * per_step <= stepper.AWAY
         pace.learn(last - first, (last - first) * per_step)
         steps = last
     assert steps == count

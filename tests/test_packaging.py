@@ -85,6 +85,7 @@ MODULES = {
 }
 #: asked for although nothing imports them, and why
 UNIMPORTED = {
+    "ziglang": "a compiler, which is run and not imported",
     "meshcat": "pages hold its viewer, which is read from its folder",
     "example-robot-data": "a folder of URDF files and meshes",
     "pycollada": "trimesh reads DAE files with it",
@@ -128,7 +129,9 @@ def imported(*folders: str) -> set[str]:
 
 
 def test_every_library_that_the_package_imports_is_asked_for():
-    assert imported("synctrl") <= set.union(*map(modules_of, asked("compiled", "mujoco", "sweep", "xacro")))
+    assert imported("synctrl") <= set.union(
+        *map(modules_of, asked("compiled", "mujoco", "sweep", "tune", "xacro"))
+    )
 
 
 @pytest.mark.parametrize(
@@ -136,8 +139,10 @@ def test_every_library_that_the_package_imports_is_asked_for():
     [
         (None, ["synctrl"]),
         ("compiled", ["synctrl"]),
+        ("compiler", ["synctrl"]),
         ("mujoco", ["synctrl"]),
         ("sweep", ["synctrl"]),
+        ("tune", ["synctrl"]),
         ("xacro", ["synctrl"]),
         ("benchmark", ["synctrl", "scripts"]),
         ("notebooks", ["notebooks", "tests"]),
@@ -153,7 +158,7 @@ def test_every_library_that_is_asked_for_is_used(extra, users):
 
 def test_the_lowest_versions_are_those_of_the_lower_bounds():
     lowest = dict(line.split("==") for line in (ROOT / "constraints-lowest.txt").read_text().splitlines()[1:])
-    for requirement in asked("compiled", "mujoco", "sweep", "test"):
+    for requirement in asked("compiled", "compiler", "mujoco", "sweep", "tune", "test"):
         bound = re.search(r">=([\d.]+)", requirement).group(1)
         assert (lowest[name_of(requirement)] + ".0.0").startswith(bound + "."), requirement
 
@@ -161,5 +166,5 @@ def test_the_lowest_versions_are_those_of_the_lower_bounds():
 def test_the_versions_of_every_library_that_is_asked_for_are_written_down():
     text = (ROOT / "constraints.txt").read_text()
     names = {line.partition("==")[0].lower() for line in text.splitlines()}
-    needed = asked("compiled", "mujoco", "sweep", "xacro", "test", "notebooks", "dev")
+    needed = asked("compiled", "compiler", "mujoco", "sweep", "tune", "xacro", "test", "notebooks", "dev")
     assert {name_of(requirement).lower() for requirement in needed} <= names

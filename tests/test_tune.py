@@ -12,8 +12,8 @@ from sweeps import DT, base
 
 from synctrl.errors import InputError, SweepError
 from synctrl.sweep import Grid, LogUniform, Uniform, control_period, gain, load, model_error
-from synctrl.sweep.sweep import Study
-from synctrl.tune import _Search, tune
+from synctrl.tune import Goal, tune
+from synctrl.tune.goals import Judge
 
 pytest.importorskip("scipy")
 SEARCH = {"beta": LogUniform(1, 100), "K_r": LogUniform(0.1, 10)}
@@ -97,11 +97,10 @@ def test_a_measure_that_no_run_has_is_named_as_the_cause():
 
 
 def test_a_run_without_the_measure_is_worse_than_those_with_it_and_better_than_those_outside_the_limit():
-    study = Study(base(), [gain("beta", Uniform(1, 2))], dt=DT)
-    cost = _Search(study, "sync_settling_time", 10.0, 5).cost
+    told = Judge((Goal("sync_settling_time"),), {"peak_torque": 10.0}, 0.01).told
     settled = {"status": "completed", "stop_time": None, "sync_settling_time": 1e3, "peak_torque": 10.0}
     never, outside = {**settled, "sync_settling_time": None}, {**settled, "peak_torque": 10.1}
-    assert cost(settled) < cost(never) < cost(outside)
+    assert told(settled) < told(never) < told(outside)
 
 
 def test_a_search_goes_on_from_its_folder(free, tmp_path):
@@ -139,13 +138,12 @@ def rank(row, limit):
 
 
 @given(a=outcomes, b=outcomes, limit=st.floats(0.1, 1e3))
-def test_costs_are_in_the_order_of_what_is_better(a, b, limit):
-    study = Study(base(), [gain("beta", Uniform(1, 2))], dt=DT)
-    cost = _Search(study, "sync_rms", limit, 5).cost
+def test_what_a_search_is_told_is_in_the_order_of_what_is_better(a, b, limit):
+    told = Judge((Goal("sync_rms"),), {"peak_torque": limit}, 0.01).told
     if rank(a, limit) < rank(b, limit):
-        assert cost(a) <= cost(b)
+        assert told(a) <= told(b)
     if rank(a, limit)[0] < rank(b, limit)[0]:
-        assert cost(a) < cost(b)
+        assert told(a) < told(b)
 
 
 @pytest.mark.parametrize(

@@ -42,6 +42,9 @@ class ChainPlant(HoldingPlant):
         self._mover  # noqa: B018 (made here)
         return super().prepare()
 
+    def check_robots(self) -> None:
+        self.prepare()
+
     def move(
         self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, hidden: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:

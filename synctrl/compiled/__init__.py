@@ -8,12 +8,13 @@ goes through these modules:
 1. `engine`: as `simulate(engine="compiled")` finds it;
 2. `known`: is every part of the closed loop the package's own, or one that can be traced? If not, the run is
    refused, and the part named;
-3. `kind`: which robots are equal, and can share code;
+3. `kind`: which robots are equal, and can share code; `weighing`: what numbers weights are made of;
 4. `trace`, with `plugged` for laws and adaptations of a user's own: the functions of a robot of a kind;
    `carrying`: that of an object in the hands of several;
 5. `structs`, made from the table in `quantities`: what stands in C before `network.c` and `driver.c`;
    `hearing`: what these are told of the network;
-6. `build`, with `compiler` and `cache`: from C to a library that is loaded;
+6. `build`, with `compiler`, `process` and `processor`, `cache` and `owners`: from C to a library that is
+   loaded;
 7. `program`: library and arrays together. Once in every process, before it is used, the library is compared
    with the reference engine, on the small closed loop of `specimen`;
 8. `engine` again: takes the run through time, some steps with every call of `advance` in `driver.c`. What

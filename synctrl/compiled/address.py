@@ -15,9 +15,9 @@ def _address(written: str) -> type[Address]:
     return type("Address", (Address,), {"written": written})
 
 
-Doubles, Ints, Chars, Longs = map(_address, ("double *", "int *", "char *", "long long *"))
+Doubles, Ints, Chars = map(_address, ("double *", "int *", "char *"))
+#: numbers of all lanes
+Vectors = _address("vec *")
 #: a function in Python that the driver calls: time, the middle of the step, whether a sample falls on it -> 0
 Callback = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.c_double, ctypes.c_int)
 Callbacks, CALLBACK = _address("Callback *"), "typedef int Callback(double, double, int);\n"
-#: what generated functions read, and what they write
-Arguments, Results = map(_address, ("const double **", "double **"))

@@ -10,7 +10,6 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import json
-import os
 import platform
 import struct
 import sys
@@ -21,8 +20,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import CompilationError, MissingDependencyError
-from .cache import building_folder, executable_place, open_cache, read_file, remove_leftovers
-from .compiler import FLAGS, compile_library, compiler, compiler_version, fault
+from .cache import building_folder, executable_place, open_cache, read_file, remove_leftovers, write_file
+from .compiler import FLAGS, SUFFIX, compile_library, compiler, compiler_version
+from .process import fault
+from .processor import cpu_features
 
 #: rooms of the package that generated code is made from, or compared with
 ROOMS = ("robots", "tasks", "coupling", "control", "simulation", "assembly", "compiled")
@@ -70,13 +71,15 @@ def require_casadi() -> str:
 
 
 def content_key(*parts: object) -> str:
-    """Digest of plain data, of all code that generates code or that it is compared with, and of the compiler.
+    """Digest of plain data, of all code that generates code or is compared with it, compiler and processor.
+
+    So two machines may share a cache, and neither runs code that was made for the other's processor.
 
     Raises:
         MissingDependencyError, CompilationError: there is no compiler, or it cannot be run.
     """
     command = compiler()
-    version, machine = compiler_version(command), [platform.system(), platform.machine()]
+    version, machine = compiler_version(command), [platform.system(), platform.machine(), cpu_features()]
     content = json.dumps([*parts, command, version, machine, FLAGS, digest_of_sources()], sort_keys=True)
     return hashlib.sha256(content.encode()).hexdigest()
 
@@ -87,7 +90,7 @@ def digest_of_sources(package: Path = Path(__file__).parents[1]) -> str:
     files = sorted(path for room in ROOMS for path in (package / room).rglob("*"))
     found = hashlib.sha256()
     for path in files:
-        if path.suffix in (".py", ".c"):
+        if path.suffix in (".py", ".c", ".h"):
             content = path.read_bytes()
             found.update(f"{path.relative_to(package)} {len(content)}\n".encode() + content)
     return found.hexdigest()
@@ -127,7 +130,7 @@ def load(content: bytes, folder: Path) -> ctypes.CDLL:
     if sys.platform == "linux" and not is_whole(content):
         raise OSError("no shared library, or only a part of one")
     with building_folder(executable_place(folder)) as place:
-        copy = place / "library.so"
+        copy = place / f"library{SUFFIX}"
         copy.write_bytes(content)
         return ctypes.CDLL(str(copy))
 
@@ -162,7 +165,7 @@ def is_whole(content: bytes) -> bool:
 def _stored(folder: Path, key: str, check: Check) -> ctypes.CDLL | None:
     """The library if its file is what was once published, and computes what it should; else None."""
     try:
-        digest, content = read_file(folder / f"{key}.sha256", DIGEST), read_file(folder / f"{key}.so")
+        digest, content = read_file(folder / f"{key}.sha256", DIGEST), read_file(folder / f"{key}{SUFFIX}")
     except OSError:
         return None
     if digest is None or content is None or digest.strip() != _digest(key, content).encode():
@@ -199,10 +202,9 @@ def _publish(place: Path, target: Path, key: str, content: bytes) -> None:
 
     In between, a reader finds a digest that does not fit.
     """
-    for suffix, data in ((".so", content), (".sha256", _digest(key, content).encode())):
+    for suffix, data in ((SUFFIX, content), (".sha256", _digest(key, content).encode())):
         file = place / f"published{suffix}"
-        with open(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as stream:
-            stream.write(data)
+        write_file(file, data)
         file.replace(f"{target}{suffix}")
 
 

@@ -8,11 +8,8 @@ administrator, and nobody else may write there. What is then read is loaded from
 from __future__ import annotations
 
 import errno
-import fcntl
 import os
-import pwd
 import shutil
-import stat
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -20,6 +17,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import CompilationError, InputError
+from .owners import HAS_OWNERS, WAY_OUT, check_file, check_way, check_writers, find_home
 
 #: a library that is larger than this, bytes, is none of ours
 LARGEST = 500_000_000
@@ -27,21 +25,12 @@ LARGEST = 500_000_000
 BUILDING = "building-"
 #: the file in such a folder that is locked as long as somebody builds there
 LOCK = "lock"
-#: links that may lie one behind another on the way to the folder, as the kernel allows them
-MOST_LINKS = 40
 
-_OTHERS = stat.S_IWGRP | stat.S_IWOTH
-_READ = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
-_LOCK = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
-_KINDS = {
-    stat.S_IFLNK: "a link",
-    stat.S_IFDIR: "a folder",
-    stat.S_IFIFO: "a FIFO",
-    stat.S_IFSOCK: "a socket",
-    stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
-}
-_WAY_OUT = "or name another folder by SYNCTRL_CACHE, or use engine='pinocchio'"
+#: what files are opened with, of what the system has: Windows has others than the rest
+_SAFELY = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_CLOEXEC", "O_BINARY"))
+_READ = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | _SAFELY
+_LOCK = os.O_RDWR | os.O_CREAT | _SAFELY
+_NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _SAFELY
 
 
 def cache_folder() -> Path:
@@ -78,11 +67,11 @@ def open_cache() -> Path:
     """
     folder = cache_folder()
     try:
-        _check_way(folder)
+        check_way(folder)
         check_writers(folder, os.stat(folder))
     except OSError as error:
         raise CompilationError(
-            f"the cache of compiled code, '{folder}', cannot be used: {error}; correct that, {_WAY_OUT}",
+            f"the cache of compiled code, '{folder}', cannot be used: {error}; correct that, {WAY_OUT}",
             file=folder,
             found=error.strerror,
         ) from error
@@ -105,6 +94,16 @@ def read_file(path: Path, most: int = LARGEST) -> bytes | None:
         return None
 
 
+def write_file(path: Path, content: bytes) -> None:
+    """Write a new file of the cache, for this user alone.
+
+    Raises:
+        OSError: it is there, or cannot be written.
+    """
+    with open(os.open(path, _NEW, 0o600), "wb") as file:
+        file.write(content)
+
+
 @contextmanager
 def building_folder(place: Path) -> Iterator[Path]:
     """A folder for something that is being built; removed at the end.
@@ -120,6 +119,7 @@ def building_folder(place: Path) -> Iterator[Path]:
     finally:
         shutil.rmtree(folder, ignore_errors=True)
         os.close(lock)
+        shutil.rmtree(folder, ignore_errors=True)  # Windows removes no file that is open
 
 
 def remove_leftovers(cache: Path) -> None:
@@ -128,7 +128,7 @@ def remove_leftovers(cache: Path) -> None:
         if folder.is_symlink() or not folder.is_dir():
             continue
         with suppress(OSError), open(os.open(folder / LOCK, _LOCK, 0o600), "r+b") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _seize(lock.fileno())
             shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -149,89 +149,8 @@ def executable_place(cache: Path) -> Path:
             file=cache,
             found="noexec",
         )
-    _check_way(other)
+    check_way(other)
     return other
-
-
-# -- who may have written it ------------------------------------------------------------------------------
-
-
-def check_owner(place: Path, found: os.stat_result) -> None:
-    """Refuse what belongs to neither this user nor the administrator."""
-    if found.st_uid not in (os.geteuid(), 0):
-        raise _refusal(place, found, "belongs to another user", "remove it")
-
-
-def check_writers(place: Path, found: os.stat_result) -> None:
-    """Refuse a file or folder that others may write to."""
-    if found.st_mode & _OTHERS:
-        remedy = f"look at what is in it and run: chmod go-w '{place}'"
-        raise _refusal(place, found, "can be written by others", remedy)
-
-
-def check_file(path: Path, found: os.stat_result) -> None:
-    """Refuse what is no plain file of this user, written by nobody else."""
-    if not stat.S_ISREG(found.st_mode):
-        kind = _KINDS.get(stat.S_IFMT(found.st_mode), "something else")
-        raise _refusal(path, found, f"is {kind}, expected a plain file", "remove it")
-    check_owner(path, found)
-    check_writers(path, found)
-
-
-def _refusal(place: Path, found: os.stat_result, fault: str, remedy: str) -> CompilationError:
-    try:
-        owner = f"{found.st_uid} ({pwd.getpwuid(found.st_uid).pw_name})"
-    except KeyError:
-        owner = str(found.st_uid)
-    who = f"owner {owner}, mode {stat.S_IMODE(found.st_mode):04o}"
-    return CompilationError(
-        f"the cache of compiled code: '{place}' {fault} ({who}); "
-        f"code is only run from where nobody else can have put it: {remedy}, {_WAY_OUT}",
-        file=place,
-        found=fault,
-    )
-
-
-def _check_way(folder: Path) -> None:
-    """Refuse a folder that others could exchange for another one, in one of the folders above it."""
-    for place, found in _way(folder):
-        check_owner(place, found)
-        if stat.S_ISDIR(found.st_mode) and not found.st_mode & stat.S_ISVTX:
-            check_writers(place, found)
-
-
-def _way(folder: Path) -> Iterator[tuple[Path, os.stat_result]]:
-    """Every folder and link from the root to a folder; folders that are missing are made, for this user.
-
-    Raises:
-        OSError: one of them is a file, or cannot be made or read.
-    """
-    here, ahead, links = Path(folder.anchor), [*reversed(folder.parts[1:])], 0
-    while ahead:
-        here /= ahead.pop()
-        if here.name == "..":
-            here = here.parent.parent
-            continue
-        found = _made(here)
-        yield here, found
-        if stat.S_ISLNK(found.st_mode):
-            links += 1
-            if links > MOST_LINKS:
-                raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(folder))
-            ahead += reversed(Path(os.readlink(here)).parts)
-            here = here.parent
-        elif not stat.S_ISDIR(found.st_mode):
-            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(here))
-
-
-def _made(place: Path) -> os.stat_result:
-    """What is at a place; a new folder for this user alone, if nothing was."""
-    try:
-        return os.lstat(place)
-    except FileNotFoundError:
-        with suppress(FileExistsError):
-            os.mkdir(place, 0o700)
-    return os.lstat(place)
 
 
 # -- places -----------------------------------------------------------------------------------------------
@@ -239,22 +158,15 @@ def _made(place: Path) -> os.stat_result:
 
 def _usual_folder() -> Path:
     """The folder for users who have not named one."""
-    home = _home()
+    home = find_home()
     if home is None:
-        return _temporary() / f"synctrl-{os.geteuid()}"
+        return _temporary() / (f"synctrl-{os.geteuid()}" if HAS_OWNERS else "synctrl")
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local") / "synctrl"
     if sys.platform == "darwin":
         return home / "Library" / "Caches" / "synctrl"
     named = Path(os.environ.get("XDG_CACHE_HOME", ""))
     return (named if named.is_absolute() else home / ".cache") / "synctrl"
-
-
-def _home() -> Path | None:
-    """The user's home, if there is one; `/` is what users without a home are given."""
-    try:
-        home = Path.home()
-    except RuntimeError:
-        return None
-    return home if home.is_dir() and home != Path(home.anchor) else None
 
 
 def _temporary() -> Path:
@@ -265,7 +177,7 @@ def _temporary() -> Path:
 
 
 def _is_executable(place: Path) -> bool:
-    noexec = os.statvfs(place).f_flag & getattr(os, "ST_NOEXEC", 0)
+    noexec = hasattr(os, "statvfs") and os.statvfs(place).f_flag & getattr(os, "ST_NOEXEC", 0)
     return not noexec and os.access(place, os.W_OK | os.X_OK)
 
 
@@ -281,7 +193,20 @@ def _locked_folder(place: Path) -> tuple[Path, int]:
         except FileNotFoundError:
             continue
         with suppress(OSError):  # file systems without locks keep their leftovers
-            fcntl.flock(lock, fcntl.LOCK_EX)
+            _seize(lock, wait=True)
         if (folder / LOCK).exists():
             return folder, lock
         os.close(lock)
+
+
+def _seize(lock: int, wait: bool = False) -> None:
+    """Lock an open file; the lock ends with it, or with the process.
+
+    Raises:
+        OSError: somebody else has it, or there are no locks; Windows has others.
+    """
+    try:
+        import fcntl
+    except ImportError as error:
+        raise OSError(errno.ENOTSUP, os.strerror(errno.ENOTSUP)) from error
+    fcntl.flock(lock, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))

@@ -1,37 +1,41 @@
-"""The machine's C compiler: found by name, and run within limits of time and of what it may print."""
+"""The machine's C compiler: found by name, asked what it knows, and told to make a library."""
 
 from __future__ import annotations
 
 import os
-import selectors
 import shlex
 import shutil
-import signal
-import subprocess
+import sys
 import threading
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
-from time import monotonic
+from tempfile import TemporaryDirectory
 
-from ..errors import CompilationError, MissingDependencyError
+from ..errors import MissingDependencyError
+from .process import fault, run
 
-#: -O1, because generated code is one long sum of products: -O2 makes it no faster, only longer to compile
-FLAGS = ("-O1", "-fPIC", "-fno-math-errno", "-ffp-contract=off")
+#: for the processor of this machine, which is in the key of the cache, where the compiler knows how
+NATIVE = "-march=native"
+#: code may stand anywhere in memory; for Windows that goes without saying, and clang refuses to be told
+_IN_LIBRARIES = () if sys.platform == "win32" else ("-fPIC",)
+#: products and sums are rounded one by one, so that results do not depend on the compiler
+FLAGS = ("-O2", NATIVE, "-ffp-contract=off", "-fno-math-errno", *_IN_LIBRARIES)
+#: how names of libraries end
+SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+#: what the program of the package ziglang is called with: without checks that end a process, and without the
+#: libraries for them and for arithmetic that processors do not have, which it would have to compile first
+ZIG = ("cc", "-fno-sanitize=undefined", *(() if sys.platform == "win32" else ("--rtlib=none",)))
 #: how long one call of the compiler may take, s; the largest arms take about a minute on a slow machine
 LONGEST = 900.0
 #: how long it may take to say its version, s
 LONGEST_VERSION = 30.0
-#: what one call may print, bytes
-MOST_PRINTED = 1_000_000
-#: how often a running compiler is looked after, s
-GLANCE = 0.05
 
 
 def compiler() -> tuple[str, ...]:
-    """The machine's C compiler: the environment variable CC, or cc, gcc or clang.
+    """The C compiler: the environment variable CC, or cc, gcc or clang, or that of the package ziglang.
 
     Raises:
         MissingDependencyError: there is none, or CC does not name one; the message says why.
@@ -42,8 +46,11 @@ def compiler() -> tuple[str, ...]:
             return command
     if named:
         raise _bad_cc(f"'{named[0]}' {_why_not(named[0])}")
+    if zig := _zig():
+        return zig
     raise MissingDependencyError(
-        "engine='compiled' needs cc, gcc or clang, and found none; install one, or use engine='pinocchio'",
+        "engine='compiled' needs cc, gcc or clang, and found none; install one, for example by "
+        "pip install 'synctrl[compiler]', or use engine='pinocchio'",
         subject="C compiler",
     )
 
@@ -57,6 +64,16 @@ def compiler_version(command: tuple[str, ...]) -> str:
     return _printed_version(command, shutil.which(command[0]))
 
 
+def flags(command: tuple[str, ...]) -> list[str]:
+    """The flags for a compiler, without what it does not know; it is asked once in a process.
+
+    Raises:
+        CompilationError: it cannot be run, or does not come to an end.
+    """
+    native = NATIVE in FLAGS and _knows_native(command, shutil.which(command[0]))
+    return [flag for flag in FLAGS if native or flag != NATIVE]
+
+
 def compile_library(sources: Iterable[str], folder: Path) -> Path:
     """Compile each source as soon as it is there, as many at a time as there are cores, and link them.
 
@@ -66,10 +83,11 @@ def compile_library(sources: Iterable[str], folder: Path) -> Path:
         CompilationError: the compiler refuses, hangs, or does not write what it should.
     """
     command, stop = compiler(), threading.Event()
+    compiling = [*command, *flags(command)]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         try:
             jobs = [
-                pool.submit(_compile, command, source, folder / f"part{k}.c", stop)
+                pool.submit(_compile, compiling, source, folder / f"part{k}.c", stop)
                 for k, source in enumerate(sources)
             ]
             objects = [str(job.result()) for job in jobs]
@@ -77,46 +95,7 @@ def compile_library(sources: Iterable[str], folder: Path) -> Path:
             stop.set()
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    return _make(folder / "library.so", [*command, "-shared", *objects, "-lm"], stop)
-
-
-def run(command: Iterable[str], seconds: float, stop: threading.Event | None = None) -> tuple[int, str]:
-    """Run a program in a process group of its own, and leave none of that group behind.
-
-    Args:
-        command: the program and its arguments.
-        seconds: how long it may take, s.
-        stop: ends it early.
-
-    Returns:
-        Its exit status, and what it printed.
-
-    Raises:
-        CompilationError: it cannot be run, takes longer, prints without end, or was stopped.
-    """
-    command = list(command)
-    try:
-        process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
-    except (OSError, ValueError) as error:
-        raise fault(command[0], "cannot be run", f": {error}") from error
-    with process:
-        try:
-            printed = _follow(process, command[0], seconds, stop or threading.Event())
-        finally:
-            with suppress(ProcessLookupError, PermissionError):
-                os.killpg(process.pid, signal.SIGKILL)  # with the children that it has left
-    return process.returncode, printed.decode(errors="replace").strip()
-
-
-def fault(program: str, found: str, more: str = "") -> CompilationError:
-    """The error about a compiler that does something else than to compile."""
-    return CompilationError(f"'{program}' {found}{more}", subject="C compiler", found=found)
+    return _make(folder / f"library{SUFFIX}", [*command, "-shared", *objects, "-lm"], stop)
 
 
 # -- internals --------------------------------------------------------------------------------------------
@@ -129,6 +108,19 @@ def _named() -> tuple[str, ...]:
         return tuple(shlex.split(text))
     except ValueError as error:
         raise _bad_cc(f"{text!r} cannot be split into words") from error
+
+
+def _zig() -> tuple[str, ...] | None:
+    """The compiler of the package ziglang, if that is installed.
+
+    It is the program itself: `python -m ziglang` would look for a module of this name in the working folder.
+    """
+    found = find_spec("ziglang")
+    for folder in (found and found.submodule_search_locations) or ():
+        program = os.path.join(folder, "zig.exe" if sys.platform == "win32" else "zig")
+        if os.access(program, os.X_OK):
+            return program, *ZIG
+    return None
 
 
 def _bad_cc(found: str) -> MissingDependencyError:
@@ -151,12 +143,26 @@ def _why_not(program: str) -> str:
 
 @cache
 def _printed_version(command: tuple[str, ...], found_at: str | None) -> str:
-    return run([*command, "--version"], LONGEST_VERSION)[1]
+    return _asked([*command, "--version"])[1]
 
 
-def _compile(command: tuple[str, ...], source: str, path: Path, stop: threading.Event) -> Path:
+@cache
+def _knows_native(command: tuple[str, ...], found_at: str | None) -> bool:
+    return _asked([*command, NATIVE, "-E", "-x", "c", os.devnull])[0] == 0
+
+
+def _asked(command: list[str]) -> tuple[int, str]:
+    """What a compiler answers to a question about itself."""
+    try:
+        with TemporaryDirectory(prefix="synctrl-") as place:
+            return run(command, LONGEST_VERSION, Path(place))
+    except OSError as error:
+        raise fault(command[0], "cannot be run", f" without a folder for temporary files: {error}") from error
+
+
+def _compile(command: list[str], source: str, path: Path, stop: threading.Event) -> Path:
     path.write_text(source, encoding="utf-8")
-    return _make(path.with_suffix(".o"), [*command, *FLAGS, "-c", str(path)], stop)
+    return _make(path.with_suffix(".o"), [*command, "-c", str(path)], stop)
 
 
 def _make(target: Path, command: list[str], stop: threading.Event) -> Path:
@@ -165,7 +171,7 @@ def _make(target: Path, command: list[str], stop: threading.Event) -> Path:
     Raises:
         CompilationError: it does not.
     """
-    status, printed = run([*command, "-o", str(target)], LONGEST, stop)
+    status, printed = run([*command, "-o", str(target)], LONGEST, target.parent, stop)
     said = f":\n{printed[:2000]}" if printed else ""
     if status < 0:
         raise fault(command[0], f"was ended by signal {-status}", said)
@@ -175,41 +181,3 @@ def _make(target: Path, command: list[str], stop: threading.Event) -> Path:
         named = f"; is it a compiler? It was named by {'CC' if os.environ.get('CC') else 'PATH'}"
         raise fault(command[0], f"ended without an error, but wrote no '{target.name}'", named + said)
     return target
-
-
-def _follow(process: subprocess.Popen[bytes], name: str, seconds: float, stop: threading.Event) -> bytes:
-    """What a program prints until it ends.
-
-    A child that it leaves behind may hold the pipe open: the end of the program counts, not that of the pipe.
-    """
-    printed, deadline, ended = bytearray(), monotonic() + seconds, False
-    with selectors.DefaultSelector() as pipe:
-        pipe.register(process.stdout, selectors.EVENT_READ)  # type: ignore[arg-type]
-        while not ended:
-            _check_limits(name, len(printed), seconds, deadline, stop)
-            if not pipe.get_map():
-                ended = _ends_soon(process)
-            elif not pipe.select(GLANCE):
-                ended = process.poll() is not None
-            elif chunk := os.read(process.stdout.fileno(), 65536):  # type: ignore[union-attr]
-                printed += chunk
-            else:
-                pipe.unregister(process.stdout)  # type: ignore[arg-type]
-    return bytes(printed)
-
-
-def _check_limits(name: str, printed: int, seconds: float, deadline: float, stop: threading.Event) -> None:
-    """Raise if a running program must be stopped."""
-    way_out = " with the processes that it had started; name another one by CC, or use engine='pinocchio'"
-    if stop.is_set():
-        raise fault(name, "was stopped", ", because something else failed")
-    if printed > MOST_PRINTED:
-        raise fault(name, "printed without end and was stopped", way_out)
-    if monotonic() > deadline:
-        raise fault(name, f"did not end within {seconds:g} s and was stopped", way_out)
-
-
-def _ends_soon(process: subprocess.Popen[bytes]) -> bool:
-    with suppress(subprocess.TimeoutExpired):
-        process.wait(GLANCE)
-    return process.returncode is not None

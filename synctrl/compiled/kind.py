@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from ..assembly.plant import CarryingPlant
 from ..control.controller import Controller
+from ..robots.lumped import Lumping, lumping
 from ..robots.mechanism import Mechanism, mechanism
 from ..robots.parameters import FrictionParameters
 from ..robots.robot import Robot
@@ -23,6 +24,7 @@ from ..tasks.redundancy import Posture
 from ..tasks.spaces import BoundJointSpace, BoundTipSpace, JointSpace, TipSpace
 from .momentum import momentum_function
 from .plugged import Learning, learner, trace_law, trace_learning
+from .weighing import Weighing, weighing_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +41,7 @@ class Kind:
             as it is, if all robots with the mechanism share it, else None.
         gravity: in the world's axes, m/s^2.
         reference_acceleration, k_r_space: options of the controller.
+        weighing: structure of the weights.
         smoothing: velocity at which adapted Coulomb friction reaches tanh(1), or None without it.
         rotors: whether rotors are adapted too.
         made_of: names of the types that the user has plugged in.
@@ -57,6 +60,7 @@ class Kind:
     gravity: tuple[float, ...]
     reference_acceleration: str
     k_r_space: str
+    weighing: Weighing
     smoothing: float | None = None
     rotors: bool = False
     made_of: tuple[str, ...] = ()
@@ -95,6 +99,11 @@ class Kind:
     def learned(self) -> int:
         """Entries of the state of the adaptation, without what an admittance adds."""
         return self.adapted if self.learning is None else self.learning.estimate.numel_in()
+
+    @cached_property
+    def lumping(self) -> Lumping:
+        """How the true inertial parameters are lumped."""
+        return lumping(self.true)
 
     @property
     def damped(self) -> bool:
@@ -137,12 +146,13 @@ class Kind:
             "P": self.adapted,
             "Z": self.learned if self.gives_at is None else self.gives_at + 12,
             "K": self.nv if self.k_r_space == "joint" else self.m,
-            "bodies": 10 * self.nv,
+            "bodies": self.lumping.size,
             "slides": int(self.slides),
             "tip": int(self.tip),
             "spare": int(self.solves),
             "damped": int(self.damped),
             "watches": len(self.watches),
+            "weighs": self.weighing.count(self.m),
             "hand": int(self.holds),
             "gives": int(self.gives_at is not None),
         }
@@ -154,6 +164,7 @@ class Kind:
         matrix = None if self.matrix is None else self.matrix.tolist()
         options: list[Any] = [self.reference_acceleration, self.k_r_space, list(self.gravity)]
         options += [self.smoothing, self.rotors, list(self.made_of), self.holds, self.gives_at]
+        options += [list(self.weighing.parts), self.weighing.full]
         options += [None if part is None else part.serialize() for part in (*(self.learning or ()), self.law)]
         damping = asdict(self.space.damping) if self.damped else None  # type: ignore[union-attr, arg-type]
         space = [list(getattr(self.space, "rows", ())), damping, list(self.watches)]
@@ -262,6 +273,7 @@ def _kind(
         tuple(map(float, cell.robots[i].gravity_vector)),
         controller.reference_acceleration,
         controller.k_r_space,
+        weighing_of(cell),
         getattr(parameters, "smoothing", None),
         getattr(parameters, "armature", False),
         tuple(type(part).__qualname__ for part in (cell.space, parameters, rigid)),

@@ -6,10 +6,14 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..robots.lumped import Body, lumped_bodies, lumping
 from ..robots.mechanism import Mechanism
 from ..robots.parameters import friction_diagonals
 from ..robots.symbolic import Symbols
 from .algebra import array_of, column_of
+
+#: relative size below which a sum of numbers that cancel is zero
+ROUNDING = 1e-15
 
 
 class Model(Protocol):
@@ -45,10 +49,8 @@ def model_torque(
         v, v_ref, a_ref: (nv, 1).
         gravity: in the frame of the first joint's placement, (3, 1).
     """
-    ca = recursion.ca
-    rigid = theta[: kind.rigid_parameters]
-    pi = rigid if kind.matrix is None else ca.mtimes(ca.SX(kind.matrix), rigid)
-    torque = recursion.torque(pi, v, v_ref, a_ref, gravity)
+    bodies = _bodies(kind, theta[: kind.rigid_parameters])
+    torque = recursion.torque(bodies, v, v_ref, a_ref, gravity)
     if kind.smoothing is not None:
         rubbing = array_of(theta[kind.rigid_parameters :], -1, kind.nv)
         v, v_ref, a_ref = (array_of(part, -1) for part in (v, v_ref, a_ref))
@@ -76,3 +78,16 @@ def momentum_function(kind: Model, base_rotation: np.ndarray) -> Any:
     changing = model_torque(kind, recursion, theta, v, v, still, gravity) - ca.jtimes(p, q, v)
     found = [ca.densify(ca.jacobian(part, theta)) for part in (p, changing)]
     return ca.Function("momentum", [q, v], ca.cse(found))
+
+
+def _bodies(kind: Model, rigid: Any) -> list[Body]:
+    """Bodies, lumped, of the adapted parameters of the rigid bodies; a map of these is lumped in numbers."""
+    import casadi as ca
+
+    if kind.matrix is None:
+        return lumped_bodies(kind.fixed, rigid)
+    lumps = lumping(kind.fixed)
+    together = lumps.matrix @ kind.matrix
+    rounding = np.abs(together) <= ROUNDING * (np.abs(lumps.matrix) @ np.abs(kind.matrix))
+    numbers = ca.sparsify(ca.DM(np.where(rounding, 0.0, together)))
+    return lumps.bodies(ca.densify(ca.mtimes(ca.SX(numbers), rigid)))

@@ -3,19 +3,35 @@
  * With the ideal network the memory is the integrals of epsilon. With the others it begins with W, one row per robot,
  * and goes on with parts of which `Exchange` says where they begin; see links.py, receivers.py and delayed.py. What
  * messages say is written into it between two calls. Messages change, and only W and filters flow.
+ *
+ * Where lanes are robots, who is compared with whom may be in other lanes: there one is fetched lane by lane. Networks
+ * other than the ideal one never have robots in lanes.
  */
 
-#include <math.h>
-#include <stddef.h>
+/* A coordinate of the rows of robots, or pairs, that a term speaks of: one row per lane, see `Cell`. */
+static vec fetch(const Cell *c, const vec *rows, const int *places) {
+    const double *numbers = (const double *)rows;
+    return c->scattered ? gather(numbers, places) : load(numbers + places[0]);
+}
 
 /* S times rows of robots: one row per pair. */
-static void compare(const Cell *c, const double *rows, double *epsilon) {
-    for (int pair = 0; pair < c->p; pair++, epsilon += m) {
-        for (int j = 0; j < m; j++) epsilon[j] = 0;
-        for (int t = pair * c->arity; t < (pair + 1) * c->arity; t++) {
-            const double *w = rows + (size_t)c->edge[t] * m;
-            for (int j = 0; j < m; j++) epsilon[j] += c->sign[t] * w[j];
+static void compare(const Cell *c, const vec *rows, vec *epsilon) {
+    for (int pair = 0; pair < c->p; pair++, epsilon += m)
+        for (int j = 0; j < m; j++) {
+            vec sum = splat(0);
+            for (int t = pair * c->arity; t < (pair + 1) * c->arity; t++)
+                sum += c->sign[t] * fetch(c, rows + j, c->edge + t * LANES);
+            epsilon[j] = sum;
         }
+}
+
+/* The share of a robot of rows of pairs: S^T times these. */
+static void share(const Cell *c, int i, const vec *rows, vec *shares) {
+    for (int j = 0; j < m; j++) {
+        vec sum = splat(0);
+        for (int t = c->first[i]; t < c->first[i + 1]; t++)
+            sum += c->incident_sign[t] * fetch(c, rows + j, c->incident + t * LANES);
+        shares[i * m + j] = sum;
     }
 }
 
@@ -23,24 +39,15 @@ static void compare(const Cell *c, const double *rows, double *epsilon) {
 static void distribute(const Cell *c, Quantities *a) {
     a->integral = a->memory;
     for (int i = 0; i < c->n; i++) {
-        double *E = a->E + (size_t)i * m;
-        double *sigma = a->sigma + (size_t)i * m, *sigma_dot = a->sigma_dot + (size_t)i * m;
-        for (int j = 0; j < m; j++) E[j] = sigma[j] = sigma_dot[j] = 0;
-        for (int t = c->first[i]; t < c->first[i + 1]; t++) {
-            size_t pair = (size_t)c->incident[t] * m;
-            double sign = c->incident_sign[t];
-            for (int j = 0; j < m; j++) {
-                E[j] += sign * a->integral[pair + j];
-                sigma[j] += sign * a->epsilon[pair + j];
-                sigma_dot[j] += sign * a->epsilon_dot[pair + j];
-            }
-        }
+        share(c, i, a->integral, a->E);
+        share(c, i, a->epsilon, a->sigma);
+        share(c, i, a->epsilon_dot, a->sigma_dot);
     }
 }
 
 /* What is believed of W, w and w' of who is heard on a link, one row after another. */
 
-static void at_once(const Cell *c, const Quantities *a, int link, double *heard) {
+static void at_once(const Cell *c, const Quantities *a, int link, vec *heard) {
     size_t from = (size_t)c->exchange.sender[link] * m;
     for (int j = 0; j < m; j++) {
         heard[j] = a->memory[from + j];
@@ -50,7 +57,7 @@ static void at_once(const Cell *c, const Quantities *a, int link, double *heard)
 }
 
 /* Of W and its first two derivatives: w = W' + leak W, and so on. */
-static void without_leak(const Quantities *a, double *heard) {
+static void without_leak(const Quantities *a, vec *heard) {
     for (int j = 0; j < m; j++) {
         heard[2 * m + j] += a->leak[j] * heard[m + j];
         heard[m + j] += a->leak[j] * heard[j];
@@ -58,29 +65,29 @@ static void without_leak(const Quantities *a, double *heard) {
 }
 
 /* The last message, extrapolated for a time that is 0 if it is held. */
-static void told(const Cell *c, const Quantities *a, int link, double age, double *heard) {
-    const double *W = a->memory + c->exchange.held + (size_t)link * 3 * m;
+static void told(const Cell *c, const Quantities *a, int link, vec age, vec *heard) {
+    const vec *W = a->memory + c->exchange.held + (size_t)link * 3 * m;
     for (int j = 0; j < m; j++) {
-        double w = W[m + j], w_dot = W[2 * m + j], W_dot = w - a->leak[j] * W[j];
-        heard[j] = W[j] + age * W_dot + 0.5 * age * age * (w_dot - a->leak[j] * W_dot);
+        vec w = W[m + j], w_dot = W[2 * m + j], W_dot = w - a->leak[j] * W[j];
+        heard[j] = W[j] + age * W_dot + splat(0.5) * age * age * (w_dot - a->leak[j] * W_dot);
         heard[m + j] = w + age * w_dot;
         heard[2 * m + j] = w_dot;
     }
 }
 
-static double age(const Cell *c, const Quantities *a, int link, double t) {
-    double found = t - a->memory[c->exchange.stamp + link];
-    return found < 0 ? 0 : found > c->exchange.horizon ? c->exchange.horizon : found;
+static vec age(const Cell *c, const Quantities *a, int link, double t) {
+    vec found = splat(t) - a->memory[c->exchange.stamp + link], none = splat(0), most = splat(c->exchange.horizon);
+    return choose(is_less(found, none), none, choose(is_less(most, found), most, found));
 }
 
 /* F'' of one number of the filters */
-static double accelerate(const Cell *c, const Quantities *a, int number) {
+static vec accelerate(const Cell *c, const Quantities *a, int number) {
     const Exchange *x = &c->exchange;
-    double apart = a->memory[x->held + number] - a->memory[x->F + number];
-    return x->omega * x->omega * apart - 2 * x->omega * a->memory[x->F_dot + number];
+    vec apart = a->memory[x->held + number] - a->memory[x->F + number];
+    return splat(x->omega * x->omega) * apart - splat(2 * x->omega) * a->memory[x->F_dot + number];
 }
 
-static void filtered(const Cell *c, const Quantities *a, int link, double *heard) {
+static void filtered(const Cell *c, const Quantities *a, int link, vec *heard) {
     const Exchange *x = &c->exchange;
     for (int j = 0; j < m; j++) {
         int number = link * m + j;
@@ -92,42 +99,46 @@ static void filtered(const Cell *c, const Quantities *a, int link, double *heard
 }
 
 /* A polynomial through W, W' and W'' at both ends of a step of the grid, and its derivatives, a share u of it on. */
-static void between(const Exchange *x, const double *ends[2], double u, double *heard) {
+static void between(const Exchange *x, const vec *ends[2], double u, vec *heard) {
     for (int j = 0; j < m; j++) {
-        double value = 0, slope = 0, bend = 0; /* Horner's scheme */
+        vec value = splat(0), slope = splat(0), bend = splat(0), on = splat(u); /* Horner's scheme */
         for (int p = 5; p >= 0; p--) {
-            double coefficient = 0;
-            for (int k = 0; k < 6; k++) coefficient += x->hermite[6 * p + k] * ends[k / 3][k % 3 * m + j];
-            bend = bend * u + 2 * slope;
-            slope = slope * u + value;
-            value = value * u + coefficient;
+            vec coefficient = splat(0);
+            for (int k = 0; k < 6; k++) coefficient += splat(x->hermite[6 * p + k]) * ends[k / 3][k % 3 * m + j];
+            bend = bend * on + splat(2) * slope;
+            slope = slope * on + value;
+            value = value * on + coefficient;
         }
         heard[j] = value;
-        heard[m + j] = slope / x->grid;
-        heard[2 * m + j] = bend / (x->grid * x->grid);
+        heard[m + j] = slope / splat(x->grid);
+        heard[2 * m + j] = bend / splat(x->grid * x->grid);
     }
 }
 
 /* What was so a while ago; before the beginning W = t w with the w of then. */
-static void delayed(const Cell *c, const Quantities *a, int link, double t, double *heard) {
+static void delayed(const Cell *c, const Quantities *a, int link, double t, vec *heard) {
     const Exchange *x = &c->exchange;
-    double since = a->memory[x->since], then = t - x->delay[link];
+    double since = lane(a->memory[x->since], 0), then = t - x->delay[link];
     if (t < since + x->delay[link]) {
-        const double *w = a->memory + x->first + (size_t)x->sender[link] * m;
-        for (int j = 0; j < m; j++) { heard[j] = (then - since) * w[j]; heard[m + j] = w[j]; heard[2 * m + j] = 0; }
+        const vec *w = a->memory + x->first + (size_t)x->sender[link] * m;
+        for (int j = 0; j < m; j++) {
+            heard[j] = splat(then - since) * w[j];
+            heard[m + j] = w[j];
+            heard[2 * m + j] = splat(0);
+        }
     } else {
-        const double *kept = a->memory + x->kept + (size_t)x->sender[link] * 3 * m;
+        const vec *kept = a->memory + x->kept + (size_t)x->sender[link] * 3 * m;
         double before = floor(then / x->grid - x->near); /* -1 at the beginning */
         size_t places = x->places, place = before + x->places, one = (size_t)c->n * 3 * m;
-        between(x, (const double *[]){ kept + place % places * one, kept + (place + 1) % places * one },
+        between(x, (const vec *[]){ kept + place % places * one, kept + (place + 1) % places * one },
                 then / x->grid - before, heard);
     }
     without_leak(a, heard);
 }
 
-static void believe(const Cell *c, const Quantities *a, int link, double t, double *heard) {
+static void believe(const Cell *c, const Quantities *a, int link, double t, vec *heard) {
     int hearing = c->exchange.hearing;
-    if (hearing == HOLD) told(c, a, link, 0, heard);
+    if (hearing == HOLD) told(c, a, link, splat(0), heard);
     else if (hearing == EXTRAPOLATE) told(c, a, link, age(c, a, link, t), heard);
     else if (hearing == FILTER) filtered(c, a, link, heard);
     else if (hearing == DELAYED && c->exchange.delay[link] > 0) delayed(c, a, link, t, heard);
@@ -137,17 +148,17 @@ static void believe(const Cell *c, const Quantities *a, int link, double t, doub
 /* E_i = L_ii W_i + sum_j A_ij W_j over the links i <- j, and so on for sigma with w and sigma' with w' */
 static void listen(const Cell *c, Quantities *a, double t) {
     const Exchange *x = &c->exchange;
-    double heard[3 * m];
+    vec heard[3 * m];
     for (int i = 0; i < c->n; i++) {
         size_t row = (size_t)i * m;
-        const double *own[] = { a->memory + row, a->w + row, a->w_dot + row };
-        double *shares[] = { a->E + row, a->sigma + row, a->sigma_dot + row };
+        const vec *own[] = { a->memory + row, a->w + row, a->w_dot + row };
+        vec *shares[] = { a->E + row, a->sigma + row, a->sigma_dot + row };
         for (int k = 0; k < 3; k++)
-            for (int j = 0; j < m; j++) shares[k][j] = x->own[i] * own[k][j];
+            for (int j = 0; j < m; j++) shares[k][j] = splat(x->own[i]) * own[k][j];
         for (int link = x->links[i]; link < x->links[i + 1]; link++) {
             believe(c, a, link, t, heard);
             for (int k = 0; k < 3; k++)
-                for (int j = 0; j < m; j++) shares[k][j] += x->weight[link] * heard[k * m + j];
+                for (int j = 0; j < m; j++) shares[k][j] += splat(x->weight[link]) * heard[k * m + j];
         }
     }
 }
@@ -174,4 +185,3 @@ static void remember(const Cell *c, Quantities *a) {
         a->memory_dot[x->F_dot + number] = accelerate(c, a, number);
     }
 }
-

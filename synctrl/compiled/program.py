@@ -4,177 +4,38 @@ from __future__ import annotations
 
 import ctypes
 import json
-import re
-from collections.abc import Iterator, Mapping, Sequence
-from math import prod
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 
-from ..assembly.plant import CarryingPlant
-from ..control.adaptation.gradient import BoundGradient
-from ..coupling.cell import Reference
+from ..control.network import BoundIdeal
 from ..errors import CompilationError
 from ..simulation.closed_loop import ClosedLoop, State
-from ..simulation.guard import limits_of
-from ..simulation.plant import Plant
-from . import structs
-from .address import Doubles
+from . import processor
+from .arrays import CompiledLoop
 from .build import cached_library, content_key, require_casadi
-from .carrying import carrying_constants, held_constants, object_function
-from .hearing import exchange_of
+from .carrying import object_function
+from .emit import written
+from .header import driver, prelude
 from .kind import Classified, Kind, classify, standing
 from .known import check_known, check_untouched
-from .plugged import learner
-from .quantities import DESIRED, SLIDE, checked, owned_by, shape
+from .lanes import narrowest
 from .specimen import Specimen
-from .structs import header, largest
 from .trace import Trace
 
 #: relative difference between generated code and the reference engine above which the code is refused
 AGREEMENT = 1e-9
 
 
-def generate(kinds: list[Kind]) -> Iterator[str]:
+def generate(kinds: list[Kind], width: int) -> Iterator[str]:
     """C sources one after another: one per function of each kind of robot and of objects, and the driver."""
+    before = prelude(kinds, width)
     for k, kind in enumerate(kinds):
         for function in Trace(kind, f"kind{k}").functions():
-            yield _written(function)
+            yield before + written(function)
     if any(kind.holds for kind in kinds):
-        yield _written(object_function(f"kind{len(kinds)}_object"))
-    parts = (Path(__file__).parent / name for name in ("network.c", "driver.c"))
-    yield header(kinds) + "".join(part.read_text(encoding="utf-8") for part in parts)
-
-
-def _written(function: Any) -> str:
-    """A function in C, without its tests for arguments and results left out: the driver leaves none out."""
-    import casadi as ca
-
-    generator = ca.CodeGenerator(f"{function.name()}.c")
-    generator.add(function)
-    source = generator.dump()
-    source = re.sub(r"arg\[\d+\]\? (arg\[\d+\]\[\d+\]) : 0;", r"\1;", source)
-    return re.sub(r"if \(res\[\d+\]!=0\) res", "res", source)
-
-
-class CompiledLoop:
-    """A closed loop as a loaded library with its arrays.
-
-    Args:
-        loop: controller and plant of a cell of known parts.
-        classified: what kinds of robots there are, and which one each robot of the cell is.
-        library: made for these kinds.
-
-    Attributes:
-        sizes: lengths of rows, see `SIZES`, and the numbers of robots, pairs and objects, n, p and o, and
-            r and h, of what network and plant remember.
-        cell, quantities, work: what the driver is given; see `structs.py`.
-        carried: true inertial parameters with every load, (loads, n, bodies).
-        scratch: sizes of the scratch arrays arg, res, iw and w that the generated functions ask for.
-
-    Raises:
-        CompilationError: an array of another shape than generated code reads.
-    """
-
-    def __init__(self, loop: ClosedLoop, classified: Classified, library: ctypes.CDLL):
-        self.loop, self.library = loop, library
-        cell, objects = loop.cell, int(isinstance(loop.plant, CarryingPlant))
-        self.sizes = {**largest(classified.kinds), "n": cell.n, "p": cell.coupling.pairs, "o": objects}
-        self.sizes |= {"r": loop.controller.network.start().size, "h": loop.plant.hidden0.size}
-        self._keep: list[np.ndarray] = []
-        self.cell = self._cell([*classified.kind_of, len(classified.kinds)])
-        self.quantities = structs.Quantities()
-        arrays = {name: np.zeros(shape(name, self.sizes)) for name in owned_by("work")}
-        self._arrays = {
-            name: checked(name, array, self.sizes)
-            for name, array in {**arrays, **_constants(loop, classified)}.items()
-        }
-        for name, array in self._arrays.items():
-            setattr(self.quantities, name, self.address(array))
-        sizes = (ctypes.c_longlong * 4)()
-        library.work_sizes(sizes)
-        self.scratch = tuple(sizes)
-        self.work = self._work()
-        self.carried = _carried(loop.plant, self.sizes["bodies"])
-
-    def state_dot(self, reference: Reference, y: np.ndarray, disturbance: np.ndarray) -> np.ndarray:
-        """y' at one instant, for comparison with `ClosedLoop.evaluate`."""
-        y, y_dot, first = np.ascontiguousarray(y), np.zeros(self.loop.size), np.zeros(1, dtype=np.intc)
-        desired = dict(zip((*DESIRED, *SLIDE), reference.desired, strict=False))
-        weights = one_after_another(reference.weights)
-        t = np.full(2, float(reference.t))
-        addresses = {"disturbed": first, "loaded": first, "t": t}
-        steps = structs.Steps(**{name: array.ctypes.data for name, array in addresses.items()})
-        self.tell(steps, {**desired, "weights": weights, "disturbance": disturbance, "pi": self.carried})
-        self.call("state_dot", steps, y, y_dot)
-        return y_dot
-
-    def hold(self, hidden: np.ndarray) -> None:
-        """Let those hands hold the object that do so in this state of the plant's own."""
-        for name, array in held_constants(self.loop, hidden).items():
-            self._arrays[name][...] = array
-
-    def tell(self, steps: structs.Steps, arrays: Mapping[str, np.ndarray]) -> None:
-        """Say what is desired and acts in steps, instead of what was said before.
-
-        Args:
-            steps: they keep the arrays.
-            arrays: of quantities that change from step to step, by name; one, or several one after another.
-
-        Raises:
-            CompilationError: an array of another shape than generated code reads.
-        """
-        for name, array in arrays.items():
-            kept = checked(name, array, self.sizes)
-            size = prod(shape(name, self.sizes))
-            setattr(steps, name, structs.Arrays(kept.ctypes.data, size if kept.size > size else 0))
-            steps.kept[name] = kept
-
-    def call(self, function: str, steps: structs.Steps, y: np.ndarray, *others: Any) -> None:
-        """Call a function of the driver with its structures, a state, and further arrays or structures."""
-        given = [ctypes.byref(part) for part in (self.cell, self.quantities, self.work, steps)]
-        rest = [
-            part.ctypes.data_as(ctypes.c_void_p) if isinstance(part, np.ndarray) else ctypes.byref(part)
-            for part in (y, *others)
-        ]
-        called = getattr(self.library, function)
-        called.restype = None
-        called(*given, *rest)
-
-    def address(self, array: np.ndarray) -> int:
-        """Address of an array that lives as long as the loop."""
-        self._keep.append(array)
-        return array.ctypes.data
-
-    # -- internals ----------------------------------------------------------------------------------------
-
-    def _cell(self, kind_of: list[int]) -> structs.Cell:
-        cell, plant = self.loop.cell, self.loop.plant
-        coupling = cell.coupling
-        first, incident, incident_sign = coupling.incidence
-        lists = {"kind": kind_of, "edge": coupling.edges, "first": first, "incident": incident}
-        found = {name: self.address(np.array(part, dtype=np.intc)) for name, part in lists.items()}
-        signs = {"sign": coupling.signs, "incident_sign": incident_sign}
-        found |= {name: self.address(np.array(part, dtype=float)) for name, part in signs.items()}
-        return structs.Cell(
-            n=cell.n,
-            p=coupling.pairs,
-            **{name: self.sizes[name] for name in ("o", "r", "h")},
-            arity=coupling.edges.shape[1],
-            rubs=int(plant.rubs),
-            saturates=int(plant.saturate),
-            exchange=exchange_of(self.loop.controller.network, self.address),
-            **found,
-        )
-
-    def _work(self) -> structs.Work:
-        arg, res, iw, w = self.scratch
-        size, n = self.loop.size, self.sizes["n"]
-        lengths = {"arg": arg, "res": res, "iw": iw, "w": w, "stage": size, "held": size, "side": n}
-        found = {name: self.address(np.zeros(length + 1)) for name, length in lengths.items()}
-        rates = (Doubles * 4)(*(self.address(np.zeros(size)) for _ in range(4)))
-        return structs.Work(k=rates, **found)
+        yield before + written(object_function(f"kind{len(kinds)}_object"))
+    yield driver(kinds, width)
 
 
 class Program(CompiledLoop):
@@ -183,6 +44,7 @@ class Program(CompiledLoop):
     Args:
         loop: controller and plant of a cell.
         libraries: libraries that are loaded already, by what they were made for; this program's is added.
+        widest: most lanes that are worth it on this machine; robots stand in as many of them as are cheapest.
 
     Attributes:
         kinds: number of different robots, each with generated functions of its own.
@@ -193,22 +55,49 @@ class Program(CompiledLoop):
         CompilationError: the code cannot be compiled, or computes something else than the reference engine.
     """
 
-    def __init__(self, loop: ClosedLoop, libraries: dict[str, ctypes.CDLL] | None = None):
+    def __init__(
+        self, loop: ClosedLoop, libraries: dict[str, ctypes.CDLL] | None = None, widest: int | None = None
+    ):
         check_known(loop)
         classified = classify(loop)
         self.kinds = len(classified.kinds)
-        library = _library(loop, classified, {} if libraries is None else libraries)
-        super().__init__(loop, classified, library)
+        width = robots_in_lanes(loop, classified, widest)
+        library = library_for(loop, classified, {} if libraries is None else libraries, width)
+        super().__init__(loop, classified, library, scattered=True)
 
 
-def _library(loop: ClosedLoop, classified: Classified, libraries: dict[str, ctypes.CDLL]) -> ctypes.CDLL:
+def robots_in_lanes(loop: ClosedLoop, classified: Classified, widest: int | None = None) -> int:
+    """In how many lanes the robots of a closed loop stand.
+
+    In more than one only robots of one kind, which hear of each other at once and are not asked about in the
+    middle of a step.
+
+    Args:
+        loop, classified: the loop, and its robots' kinds.
+        widest: most lanes; by default what the machine has.
+    """
+    ideal = isinstance(loop.controller.network, BoundIdeal)
+    alone = len(classified.kinds) > 1 or not ideal or loop.devices.settings
+    return 1 if alone else narrowest(loop.cell.n, processor.widest() if widest is None else widest)
+
+
+def library_for(
+    loop: ClosedLoop, classified: Classified, libraries: dict[str, ctypes.CDLL], width: int
+) -> ctypes.CDLL:
+    """The library of the kinds of a closed loop, for as many lanes; found, or built and compared.
+
+    Raises:
+        see `Program`
+    """
     keys = [kind.key() for kind in classified.kinds]
-    name = json.dumps(keys)
+    name = json.dumps([width, keys])
     if name not in libraries:
         check_untouched(loop)
-        key = content_key(keys, require_casadi())
+        key = content_key(width, keys, require_casadi())
         libraries[name] = cached_library(
-            key, lambda: generate(classified.kinds), lambda library: _compare(library, loop, classified)
+            key,
+            lambda: generate(classified.kinds, width),
+            lambda library: _compare(library, loop, classified),
         )
     return libraries[name]
 
@@ -219,7 +108,7 @@ def _compare(library: ctypes.CDLL, loop: ClosedLoop, classified: Classified) -> 
     Raises:
         CompilationError: they differ.
     """
-    if not (hasattr(library, "work_sizes") and hasattr(library, "state_dot")):
+    if not (hasattr(library, "lanes") and hasattr(library, "state_dot")):
         raise CompilationError("the library was made from other code", subject="generated code")
     specimen = Specimen(loop, classified)
     small = specimen.loop
@@ -253,48 +142,3 @@ def _agree(expected: State, found: State) -> None:
                 subject="generated code",
                 found=float(difference),
             )
-
-
-def one_after_another(weights: Sequence[np.ndarray]) -> np.ndarray:
-    """c, c', c'' and c^-1, (..., n, m, m) each, as rows of numbers, (..., n, 4 m m)."""
-    together = np.stack(weights, axis=-3)
-    return together.reshape(*together.shape[:-3], -1)
-
-
-def _constants(loop: ClosedLoop, classified: Classified) -> dict[str, np.ndarray]:
-    """Arrays of the quantities that do not change in a run, by name; zeros for those that nothing reads."""
-    controller, plant, cell = loop.controller, loop.plant, loop.cell
-    found = {
-        name: np.atleast_2d(getattr(controller, name)) for name in ("Lambda", "beta", "K_eps", "leak", "K_r")
-    }
-    found |= {name: getattr(plant, name) for name in ("viscous", "coulomb", "smoothing")}
-    learns, zeros = learner(controller), np.zeros_like(cell.theta)
-    redundancy = getattr(cell.space, "redundancy", None)
-    W_inv, posture, gain = redundancy.spread(cell.robots) if redundancy else np.zeros((3, cell.n, cell.nv))
-    return {
-        **found,
-        "Gamma": learns.Gamma if isinstance(learns, BoundGradient) else zeros,
-        "base": _placements(classified.bases),
-        "true_base": _placements(classified.true_bases),
-        "W_inv": W_inv,
-        "posture": posture,
-        "gain": gain,
-        "limits": plant.torque_limits,
-        "bounds": np.array([[*limits_of(cell.task).values()]]),
-        **carrying_constants(loop),
-    }
-
-
-def _placements(bases: Sequence[Any]) -> np.ndarray:
-    """Rotation by rows, and translation, (n, 12)."""
-    return np.array([np.append(base.rotation.ravel(), base.translation) for base in bases])
-
-
-def _carried(plant: Plant, bodies: int) -> np.ndarray:
-    """True inertial parameters with every load of the schedule, (windows, n, bodies)."""
-    windows = plant.schedule.robots
-    pi = np.zeros((len(windows), len(windows[0]), bodies))
-    for rows, robots in zip(pi, windows, strict=True):
-        for row, robot in zip(rows, robots, strict=True):
-            row[: 10 * robot.body_count] = robot.inertial_parameters
-    return pi

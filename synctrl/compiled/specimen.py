@@ -67,6 +67,7 @@ class Specimen:
 
     def __init__(self, loop: ClosedLoop, classified: Classified):
         self._rng = np.random.default_rng(0)
+        self._weighing = classified.kinds[0].weighing
         count = len(classified.kinds)
         self.index = [k % count for k in range(max(ROBOTS, count))]
         chosen = [_most_turned(classified, k) for k in range(count)]
@@ -90,7 +91,7 @@ class Specimen:
 
     def _loop(self, whole: ClosedLoop, members: Sequence[Member], robots: Sequence[int]) -> ClosedLoop:
         original, plant, n, m = whole.controller, whole.plant, len(members), whole.cell.m
-        coupling = Coupling.signed_ring(n, lambda t: tuple(self._moving(n, m)))
+        coupling = Coupling.signed_ring(n, lambda t: self._moving(n, m)[:3])
         coupling = coupling.weighted(self._positive(n))
         cell = Cell(members, coupling, self._space(original.cell.space, [x.robot for x in members]))
         gains = self._gains(cell, original.k_r_space)
@@ -174,14 +175,13 @@ class Specimen:
         return desired
 
     def _weights(self) -> Weights:
-        c, c_dot, c_ddot = self._moving(self.loop.cell.n, self.loop.cell.m)
-        return Weights(c, c_dot, c_ddot, np.linalg.inv(c))
+        return self._moving(self.loop.cell.n, self.loop.cell.m)
 
-    def _moving(self, n: int, m: int) -> np.ndarray:
-        """Full weights that have an inverse, and rates of any kind, (3, n, m, m)."""
+    def _moving(self, n: int, m: int) -> Weights:
+        """Weights that have an inverse, and rates of any kind, as far as these kinds of robots know such."""
         weights = 0.3 / m * self._random(3, n, m, m)
         weights[0] += np.eye(m)
-        return weights
+        return self._weighing.like(*weights)
 
     def _joints(self) -> np.ndarray:
         """1 for joints that a robot has, else 0, (n, nv)."""

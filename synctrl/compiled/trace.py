@@ -20,6 +20,7 @@ from ..control.laws import Asked, Errors
 from ..control.laws.protocol import ROWS
 from ..control.laws.sun_mills import BoundSunMills
 from ..coupling.weights import Weights
+from ..robots.articulated import accelerations
 from ..robots.mechanism import Mechanism
 from ..robots.symbolic import Symbols
 from ..tasks.algebra import limited
@@ -32,6 +33,9 @@ from .kind import Kind
 from .momentum import model_torque
 from .plugged import Learning
 from .quantities import DESIRED, FUNCTIONS, HEARD, QUANTITIES, SLIDE, columns
+
+#: joints up to which the mass matrix and a factor of it take fewer operations than articulated bodies
+SHORT = 8
 
 
 class TracedTip:
@@ -91,7 +95,7 @@ class Trace:
         told = (*DESIRED, *SLIDE) if self.kind.slides else DESIRED
         motion, desired = (np.stack([*map(self._row, names)]) for names in (("q", "v"), told))
         task, felt = self._given_way(self.space.measure(motion, desired), desired)
-        w, w_dot = law.compute_weighted_errors(Weights(*self._weights()), task.error)
+        w, w_dot = law.compute_weighted_errors(self._weights(), task.error)
         way = {} if task.inversion is None else task.inversion._asdict()
         return self._function(
             "measure",
@@ -157,7 +161,7 @@ class Trace:
     def _errors(self, task: Measurement) -> Errors:
         """What a law is told of one robot."""
         w, heard = (np.stack([*map(self._row, names)]) for names in (("w", "w_dot"), HEARD))
-        return Errors(None, task.error, task.x_dot, task.rates, w, heard, Weights(*self._weights()))
+        return Errors(None, task.error, task.x_dot, task.rates, w, heard, self._weights())
 
     def _asked(self, errors: Errors) -> Asked:
         """What the law asks of one robot."""
@@ -166,7 +170,7 @@ class Trace:
             Lambda, beta, K_eps, leak = map(self._row, ("Lambda", "beta", "K_eps", "leak"))
             return BoundSunMills(Lambda, beta, K_eps, kind.reference_acceleration, leak).command(errors)
         rows = (column_of(getattr(errors, name)) for name in ROWS)
-        parts = kind.law(*rows, self.given["weights"])
+        parts = kind.law(*rows, column_of(np.stack(self._weights())))
         return Asked(*(array_of(part, -1) for part in parts))
 
     def beside(self, learning: Learning) -> Iterator[Any]:
@@ -223,11 +227,15 @@ class Trace:
     # -- the plant ----------------------------------------------------------------------------------------
 
     def plant(self) -> Any:
-        """v' = M^-1 (tau - C v - g), through a Cholesky factor of M."""
-        pi, gravity = self.given["pi"], self._gravity(self._true_base())
+        """v' = M^-1 (tau - C v - g), through a factor of M, or joint after joint where there are many."""
+        bodies, gravity = self.kind.lumping.bodies(self.given["pi"]), self._gravity(self._true_base())
         recursion = Symbols(self.kind.true, self.q, self.given["sine"], self.given["cosine"])
-        bias = recursion.torque(pi, self.v, self.v, self.ca.SX.zeros(self.kind.nv), gravity)
-        v_dot = solve_positive(recursion.mass_matrix(pi), self.given["moving"] - bias)
+        moving = self.given["moving"]
+        if self.kind.nv > SHORT:
+            v_dot = accelerations(recursion, bodies, recursion.biased(bodies, self.v, gravity), moving)
+        else:
+            bias = recursion.bias(bodies, self.v, gravity)
+            v_dot = solve_positive(recursion.mass_matrix(bodies), moving - bias)
         return self._function("plant", v_dot=array_of(v_dot))
 
     def hand(self) -> Any:
@@ -271,8 +279,8 @@ class Trace:
         """Gravity in the frame of a first joint's placement."""
         return self.ca.mtimes(base[0].T, self.ca.SX(self.ca.DM(self.kind.gravity)))
 
-    def _weights(self) -> np.ndarray:
-        return array_of(self.given["weights"], 4, self.kind.m, self.kind.m)
+    def _weights(self) -> Weights:
+        return self.kind.weighing.weights(self._row("weights"), self.kind.m)
 
     def _row(self, name: str) -> np.ndarray:
         """A quantity as an array of single symbols."""

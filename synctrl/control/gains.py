@@ -46,7 +46,7 @@ class Gains:
     leak: Any = 0.0
 
     def __post_init__(self) -> None:
-        for name, positive in _SIGNS.items():
+        for name, positive in SIGNS.items():
             if name == "Gamma" and self.Gamma is None:
                 continue
             gain = read_gain(name, getattr(self, name))
@@ -110,9 +110,9 @@ class Gains:
         Raises:
             InputError: no gain of that name, or a value that such a gain cannot have.
         """
-        unknown = set(changes) - set(_SIGNS)
+        unknown = set(changes) - set(SIGNS)
         if unknown:
-            known, found = ", ".join(_SIGNS), ", ".join(sorted(unknown))
+            known, found = ", ".join(SIGNS), ", ".join(sorted(unknown))
             raise InputError.expected(f"some of {known}", found, "gains", shown=found)
         return replace(self, **changes)
 
@@ -134,7 +134,7 @@ class Gains:
 
 
 #: which gains must be above zero; the others may be zero
-_SIGNS = {"Lambda": True, "beta": False, "K_r": True, "K_eps": False, "Gamma": False, "leak": False}
+SIGNS = {"Lambda": True, "beta": False, "K_r": True, "K_eps": False, "Gamma": False, "leak": False}
 #: which gains may differ between robots
 _PER_ROBOT = ("K_r", "Gamma")
 

@@ -31,6 +31,7 @@ from .member_checks import (
     with_urdf_friction,
 )
 from .reference import Reference as Reference
+from .together import asked_together
 from .weights import StillWeights, Weights
 
 
@@ -205,8 +206,8 @@ class Cell:
     def reference_table(self, times: np.ndarray) -> Reference:
         """What is desired at all of the times, (T,), with time as the first axis."""
         times = np.asarray(times, dtype=float)
-        motions = np.stack([self.told(i, times) for i in range(self.n)])  # (n, 3 or more, T, m)
-        return Reference(motions.transpose(2, 1, 0, 3), self.weights(times), times)
+        motions = self.told_together(range(self.n), times)
+        return Reference(motions.swapaxes(0, 1), self.weights(times), times)
 
     def motion(self, robot: int, times: np.ndarray) -> Motion:
         """What is desired of one robot at the times, (T,); see `desired_motion`."""
@@ -218,6 +219,10 @@ class Cell:
         name, trajectory = self.names[robot], self.members[robot].trajectory
         further = further_rows(name, robot, self.space, trajectory, times + self.clocks[robot])
         return np.concatenate((self.motion(robot, times), further))
+
+    def told_together(self, robots: Sequence[int], times: np.ndarray) -> np.ndarray:
+        """`told` of some robots at once, (3 or more, T, number of robots, m)."""
+        return asked_together(self, robots, times)
 
     def weights(self, times: np.ndarray) -> Weights:
         """Weights of the coupling at the times, (T,); see `desired_weights`."""

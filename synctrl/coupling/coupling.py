@@ -207,10 +207,15 @@ class Coupling:
         return isinstance(self._source, ConstantWeights)
 
     @property
+    def is_diagonal(self) -> bool:
+        """Whether the source of the weights says that they are diagonals at all times, see `WeightSource`."""
+        return bool(getattr(self._source, "diagonal", False))
+
+    @property
     def incidence(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """S^T as lists: where the rows of each robot begin, (n + 1,); then each row, and its entry of S."""
-        transposed = self._entries().T.tocsr()
-        return transposed.indptr, transposed.indices, transposed.data
+        rows = self._entries().T.tocsr()
+        return rows.indptr, rows.indices, rows.data
 
     @property
     def matrix(self) -> np.ndarray:
@@ -227,8 +232,7 @@ class Coupling:
             CouplingError: the coupling is not made of pairs.
         """
         if not self._in_pairs:
-            many = "compares all robots at once and leaves more than one motion free"
-            raise CouplingError(f"{self!r} {many}").about("edges")
+            raise CouplingError(f"{self!r} compares all at once and leaves many motions free").about("edges")
         w = graphs.carried_motion(self.robots, self.edges, self.signs)
         return w if graphs.fits_all(self.edges, self.signs, w) else None
 
@@ -236,8 +240,7 @@ class Coupling:
         """Weights at some times, (T,), for a task of dimension m: four arrays (T, n, m, m).
 
         Raises:
-            CouplingError: a weight has no inverse, or the weight function returned something else than three
-                finite arrays, one entry per robot.
+            CouplingError: a weight has no inverse, or a function did not return three finite arrays of n.
         """
         return self._source.at(times, m)
 
@@ -245,8 +248,7 @@ class Coupling:
         """Follow the weights through the instants of a run, (T,), before it starts.
 
         Raises:
-            CouplingError: a weight loses its inverse on the way, or c' or c'' is not the derivative it should
-                be; with robot and time.
+            CouplingError: a weight loses its inverse, or c' or c'' is no derivative; with robot and time.
             SimulationError: the weights fail; with the time.
         """
         check_weights(self._source, np.asarray(times, dtype=float), m)

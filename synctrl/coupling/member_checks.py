@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from functools import cache
 from itertools import product
 from typing import Any
 
@@ -192,7 +193,7 @@ def _check_sizes(where: str, parameters: Any, robot: Robot) -> None:
 
 def _check_truth(where: str, parameters: Any, robot: Robot, friction: Friction) -> None:
     """Y theta is the torque of this robot; a kind of its own may leave friction and rotors out."""
-    states = _states(robot)
+    states = _states(robot.nv)
     found = np.array([parameters.regressor(q, v, v, a) @ parameters.theta for q, v, a in states])
     if not np.isfinite(found).all():
         raise InputError("expected a finite regressor, found one that is not", subject=where)
@@ -210,7 +211,7 @@ def _check_map(where: str, parameters: Any, robot: Robot) -> None:
     rigid = parameters.base if isinstance(parameters, FrictionParameters) else parameters
     if not isinstance(rigid, (FullParameters, LinearParameters)) or rigid.robot is robot:
         return
-    for q, v, a in _states(robot):
+    for q, v, a in _states(robot.nv):
         here, there = (made.regressor(q, v, 0.5 * v, a) for made in (robot, rigid.robot))
         if here.shape != there.shape or np.abs(here - there).max() > 1e-9 * np.abs(here).max():
             raise InputError(
@@ -220,9 +221,12 @@ def _check_map(where: str, parameters: Any, robot: Robot) -> None:
             )
 
 
-def _states(robot: Robot) -> np.ndarray:
+@cache
+def _states(nv: int) -> np.ndarray:
     """q, v and a, (STATES, 3, nv): the same ones every time."""
-    return np.random.default_rng(0).uniform(-2, 2, (STATES, 3, robot.nv))
+    states = np.random.default_rng(0).uniform(-2, 2, (STATES, 3, nv))
+    states.flags.writeable = False
+    return states
 
 
 def _torques(robot: Robot, friction: Friction, states: np.ndarray) -> Iterator[np.ndarray]:
@@ -231,8 +235,8 @@ def _torques(robot: Robot, friction: Friction, states: np.ndarray) -> Iterator[n
     rotors = robot.armature * a
     rigid = np.array([robot.inverse_dynamics(*state) for state in states]) - rotors
     coulomb = friction.coulomb * np.tanh(v / friction.smoothing)
-    parts = friction.viscous * v, coulomb, rotors
-    for shares in product((0, 1), repeat=3):
+    parts = [part for part in (friction.viscous * v, coulomb, rotors) if part.any()]
+    for shares in product((0, 1), repeat=len(parts)):
         yield rigid + sum(s * part for s, part in zip(shares, parts, strict=True))
 
 

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from itertools import pairwise
 
 import numpy as np
 
 from ..checks import finite_array
-from ..errors import InputError, SimulationError, TrajectoryError, UnreachableError
+from ..errors import InputError, SimulationError, SynctrlError, TrajectoryError, UnreachableError
+from ..robots.forest import alike
+from ..robots.mechanism import mechanism
 from ..robots.robot import Robot
 from ..tasks.derivatives import Misfit, difference, find_misfit_in_motion, spread_windows
+from ..tasks.following import can_be_followed, follow
 from ..tasks.inverse_kinematics import RESTARTS as RESTARTS
 from ..tasks.inverse_kinematics import TOLERANCE as TOLERANCE
 from ..tasks.inverse_kinematics import find_anywhere
 from ..tasks.inverse_kinematics import inverse_kinematics as inverse_kinematics
 from ..tasks.inverse_kinematics import reach as reach
+from ..tasks.together import EXACT
 from ..tasks.trajectories import MOTION_PARTS, Motion
 from .cell import Cell
+from .together import LENGTH
 
 SAMPLES = 60
 
@@ -35,9 +41,33 @@ def check_reachable(cell: Cell, times: np.ndarray) -> None:
     if not hasattr(cell.space, "miss"):
         return
     times = np.unique(times[np.linspace(0, len(times) - 1, SAMPLES).astype(int)])
-    for i in range(cell.n):
+    for i in _in_doubt(cell, times):
         with suppress(SimulationError):  # a motion that fails ends the run, which hands over what it has
             _follow(cell, i, times)
+
+
+def _in_doubt(cell: Cell, times: np.ndarray) -> Iterator[int]:
+    """Robots of which it is not seen at once, for many of them together, that they can follow their paths."""
+    for first in range(0, cell.n, LENGTH):
+        robots = range(first, min(first + LENGTH, cell.n))
+        yield from robots if not can_be_followed(cell.space) else _among(cell, robots, times)
+
+
+def _among(cell: Cell, robots: Sequence[int], times: np.ndarray) -> list[int]:
+    """`_in_doubt` among some robots."""
+    try:
+        targets = cell.told_together(robots, times)[0]
+        stand = [mechanism(cell.robots[i]) for i in robots]
+    except SynctrlError:  # a motion that fails, or a robot without a mechanism: one after another will tell
+        return [*robots]
+    doubt = []
+    for rows in alike(fixed.name for fixed, _ in stand).values():
+        fixed, bases = stand[rows[0]][0], [stand[k][1] for k in rows]
+        places = np.array([base.rotation for base in bases]), np.array([base.translation for base in bases])
+        q0 = cell.q0[robots[0] :][rows, : len(fixed.joints)]
+        seen = follow(cell.space, fixed, places, q0, targets[:, rows])
+        doubt += [robots[k] for k, well in zip(rows, seen, strict=True) if not well]
+    return sorted(doubt)
 
 
 def _follow(cell: Cell, i: int, times: np.ndarray) -> None:
@@ -67,7 +97,8 @@ def check_motions(cell: Cell, times: np.ndarray) -> None:
 
     In `PoseSpace` the velocity is the angular velocity w of R' = [w] R: a space says by its `displacement`
     which way leads from one position to another, if its velocities are no derivatives of its coordinates.
-    Coordinates of one unit side by side are taken together.
+    Coordinates of one unit side by side are taken together. Motions that fit by the formulas that they are,
+    see `EXACT`, are not looked at.
 
     Args:
         cell: the robots and what is desired of them.
@@ -79,9 +110,14 @@ def check_motions(cell: Cell, times: np.ndarray) -> None:
     """
     start, stop = float(times[0]), float(times[-1])
     count = int(np.clip(1000 // cell.n, 4, 24))
-    for robot in range(cell.n):
+    for robot in (i for i in range(cell.n) if not _fits_by_itself(cell, i)):
         with suppress(SimulationError):  # a motion that fails ends the run, which hands over what it has
             _check_motion(cell, robot, start, stop, count)
+
+
+def _fits_by_itself(cell: Cell, robot: int) -> bool:
+    """Whether velocity and acceleration are derivatives by the package's own formula for them."""
+    return not hasattr(cell.space, "displacement") and type(cell.members[robot].trajectory) in EXACT
 
 
 def _check_motion(cell: Cell, robot: int, start: float, stop: float, count: int) -> None:

@@ -43,7 +43,11 @@ class StillWeights(Weights):
 
 
 class WeightSource(Protocol):
-    """Where the weights of n robots come from."""
+    """Where the weights of n robots come from.
+
+    One whose `diagonal` is True says that nothing but zeros stands beside the diagonals, at any time; without
+    it that is not known.
+    """
 
     robots: int
 
@@ -143,6 +147,11 @@ class SmoothWeights:
     def __init__(self, c: SmoothFunction, factor: float = 1.0):
         self._c, self._factor = c, factor
         self.robots = c.shape[0]
+
+    @property
+    def diagonal(self) -> bool:
+        """Whether all polynomials beside the diagonals are zero."""
+        return self._c.is_diagonal
 
     @classmethod
     def from_function(cls, c: Callable[[float], ArrayLike], duration: float, m: int) -> SmoothWeights:

@@ -8,6 +8,7 @@ for, their ranges, speeds and torques, is here too.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,11 @@ class Mechanism:
     tip_translation: np.ndarray
     tip_rotation: np.ndarray
 
+    @cached_property
+    def name(self) -> str:
+        """A text that is equal for equal mechanisms."""
+        return repr(self.key())
+
     def key(self) -> list[Any]:
         """Plain data that is equal for equal mechanisms."""
         joints = [
@@ -55,16 +61,22 @@ class Mechanism:
 def mechanism(robot: Robot) -> tuple[Mechanism, pin.SE3]:
     """A robot's mechanism, and the placement of its first joint in the world.
 
+    Robots that were placed from one robot have one mechanism in common.
+
     Raises:
         RobotError: several joints on the base, or a tip on the base.
     """
-    if "mechanism" not in robot.kept:
-        robot.kept["mechanism"] = _mechanism(robot)
-    found: tuple[Mechanism, pin.SE3] = robot.kept["mechanism"]
-    return found
+    if "mechanism" not in robot.alike:
+        robot.alike["mechanism"] = _mechanism(robot)
+    fixed, first = robot.alike["mechanism"]
+    if "base" not in robot.kept:
+        base = robot.model.jointPlacements[first]
+        robot.kept["base"] = pin.SE3(_snap(base.rotation), base.translation)
+    return fixed, robot.kept["base"]
 
 
-def _mechanism(robot: Robot) -> tuple[Mechanism, pin.SE3]:
+def _mechanism(robot: Robot) -> tuple[Mechanism, int]:
+    """What does not depend on where a robot stands, and which joint is on its base."""
     model = robot.model
     tip = model.frames[robot.tip_id]
     roots = [j for j in range(1, model.njoints) if model.parents[j] == 0]
@@ -76,11 +88,9 @@ def _mechanism(robot: Robot) -> tuple[Mechanism, pin.SE3]:
             found=(len(roots), robot.tip),
         )
     joints = tuple(_joint(model, j, first=j == roots[0]) for j in range(1, model.njoints))
-    fixed = Mechanism(
-        joints, tip.parentJoint - 1, _snap(tip.placement.translation), _snap(tip.placement.rotation)
-    )
-    base = model.jointPlacements[roots[0]]
-    return fixed, pin.SE3(_snap(base.rotation), base.translation)
+    placement = tip.placement
+    fixed = Mechanism(joints, tip.parentJoint - 1, _snap(placement.translation), _snap(placement.rotation))
+    return fixed, roots[0]
 
 
 def _joint(model: pin.Model, j: int, first: bool) -> MechanismJoint:
@@ -125,7 +135,14 @@ class JointLimits:
 
 
 def joint_limits(robot: Robot) -> JointLimits:
-    """The limits that a robot's description states."""
+    """The limits that a robot's description states; robots that were placed from one have them in common."""
+    if "limits" not in robot.alike:
+        robot.alike["limits"] = _joint_limits(robot)
+    found: JointLimits = robot.alike["limits"]
+    return found
+
+
+def _joint_limits(robot: Robot) -> JointLimits:
     model = robot.model
     lower, upper = np.full((2, robot.nv), [[-np.inf], [np.inf]])
     for joint in model.joints[1:]:
@@ -133,7 +150,10 @@ def joint_limits(robot: Robot) -> JointLimits:
             lower[joint.idx_v] = model.lowerPositionLimit[joint.idx_q]
             upper[joint.idx_v] = model.upperPositionLimit[joint.idx_q]
     limits = (lower, upper, np.array(model.velocityLimit), np.array(model.effortLimit))
-    return JointLimits(*(np.where(np.abs(x) < UNLIMITED, x, np.copysign(np.inf, x)) for x in limits))
+    found = [np.where(np.abs(x) < UNLIMITED, x, np.copysign(np.inf, x)) for x in limits]
+    for array in found:
+        array.flags.writeable = False
+    return JointLimits(*found)
 
 
 __getattr__ = names_elsewhere(__name__, ".mechanism", Joint="MechanismJoint")

@@ -76,6 +76,12 @@ def check_inertia(robot: str, joint: str, row: np.ndarray) -> None:
         raise RobotError.expected(positive, lowest, body, shown=f"a smallest eigenvalue of {shown}")
 
 
+def as_stored(rows: np.ndarray) -> np.ndarray:
+    """Inertial parameters of bodies, (k, 10), as a model gives them back, which has them about the centre."""
+    bodies = (pin.Inertia.FromDynamicParameters(row) for row in np.array(rows))
+    return np.array([body.toDynamicParameters() for body in bodies])
+
+
 # -- units of joints ---------------------------------------------------------------------------------------
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, Self
 
 import numpy as np
@@ -29,7 +29,7 @@ class Robot:
     that turn without end, which Pinocchio stores as cosine and sine. Everything Cartesian is in world axes.
 
     The model is never changed after construction, and every thread that uses a Robot has scratch memory of
-    its own: threads may share one.
+    its own: threads may share one. A robot and those that were placed from it have that memory in common.
 
     Args:
         model: rigid-body model, with a fixed base.
@@ -61,6 +61,7 @@ class Robot:
         self.document = document
         self.report = report
         self.kept: dict[str, Any] = {}  #: what was computed from it once, by name: a robot does not change
+        self.alike: dict[str, Any] = {}  #: the same of what it has in common with those placed elsewhere
         check_joints(self.name, model)
         check_numbering(self.name, model)
         self.tip, self.tip_id = tip, frame_id(self.name, model, tip)
@@ -68,10 +69,7 @@ class Robot:
         self.joint_names: tuple[str, ...] = tuple(model.names)[1:]
         self.joint_units: tuple[str, ...] = joint_units(model)
         self.body_count: int = model.njoints - 1
-        self._data = PerThread(model.createData)
-        self._weightless = pin.Model(model)
-        self._weightless.gravity.setZero()
-        self._weightless_data = PerThread(self._weightless.createData)
+        self._data, self._weightless_data = PerThread(model.createData), PerThread(model.createData)
         self._neutral = pin.neutral(model)
         self._plain_q = model.nq == model.nv
         self._zero = np.zeros(model.nv)
@@ -97,7 +95,9 @@ class Robot:
                 frame.placement = base * frame.placement
         document = None if self.document is None else self.document.placed(Pose(tuple(shift), tuple(angles)))
         visual = _moved(self.visual, base)
-        return self._with(model, visual=visual, name=name or self.name, document=document)
+        robot = self._with(model, visual=visual, name=name or self.name, document=document)
+        robot.alike, robot._data, robot._weightless_data = self.alike, self._data, self._weightless_data
+        return robot
 
     def with_tip(self, tip: str) -> Self:
         """This robot controlled at another frame."""
@@ -139,9 +139,14 @@ class Robot:
 
     def weightless(self) -> Self:
         """This robot where there is no gravity."""
+        return self._with(self._weightless)
+
+    @cached_property
+    def _weightless(self) -> pin.Model:
+        """The model where there is no gravity."""
         model = pin.Model(self.model)
         model.gravity.setZero()
-        return self._with(model)
+        return model
 
     # -- what it is ---------------------------------------------------------------------------------------
 
@@ -252,7 +257,8 @@ class Robot:
     def tip_kinematics(self, q: np.ndarray, v: np.ndarray) -> tuple[pin.SE3, np.ndarray, np.ndarray]:
         """Pose of the tip, its Jacobian, (6, nv), and the Jacobian's derivative, (6, nv), from one pass.
 
-        q and v are (nv,), and not checked. The pose is scratch memory, valid until this thread's next call.
+        q and v are (nv,), and not checked. The pose is scratch memory, valid until this thread's next call
+        of this robot or of one that was placed from it.
         """
         model, data, tip = self.model, self._data.own, self.tip_id
         pin.computeJointJacobiansTimeVariation(model, data, self._stored(q), v)

@@ -41,7 +41,9 @@ def _write(robot: Robot) -> dict[str, str]:
     if len(text) > LONGEST or unprintable(text.replace("\n", " ")):
         return {}
     found = {"urdf": text, "tip": robot.tip}
-    if document.file is not None and not _stock(document.file):
+    if "file" not in robot.alike:
+        robot.alike["file"] = document.file is not None and not _stock(document.file)
+    if document.file is not None and robot.alike["file"]:
         found["file"] = str(document.file.absolute())
     return {key: word for key, word in found.items() if key == "urdf" or _short(word)}
 

@@ -15,7 +15,7 @@ from ..coupling.cell import Cell, Reference
 from ..errors import GainWarning, InputError, NonFiniteError, warn
 from .clock import before
 from .devices import Devices
-from .plant import Plant
+from .plant import MOVING, Plant
 
 
 class State:
@@ -119,9 +119,13 @@ class ClosedLoop:
     def check_plant(self) -> None:
         """Refuse a plant whose rates do not fit its state; one that fails ends the run later.
 
+        The package's own are not asked: they fit, and what moves them takes memory that not every run needs.
+
         Raises:
             InputError: of another shape, or not as many.
         """
+        if not _moves_otherwise(self.plant):
+            return
         q, hidden = self.cell.q0, self.plant.hidden0
         try:
             rates = self.plant.move(q, self.cell.v0, np.zeros(q.shape), hidden)
@@ -273,6 +277,13 @@ class ClosedLoop:
         names = " or ".join(dict.fromkeys(kind.__qualname__ for kind in self._foreign))
         text = f"{names} gives {what}, from a state that is finite; expected finite numbers"
         return NonFiniteError(text, robot=robot, cause="part").about(names, found=found)
+
+
+def _moves_otherwise(plant: Plant) -> bool:
+    """Whether somebody else says how a plant moves, by its class or by itself."""
+    kinds = (vars(kind) for kind in type(plant).__mro__ if not _is_ours(kind) and kind is not object)
+    own = set(vars(plant)) - {"_dynamics"}  # which is kept there once it is made
+    return bool(MOVING.intersection(own) or any(MOVING.intersection(names) for names in kinds))
 
 
 def _is_ours(kind: type) -> bool:

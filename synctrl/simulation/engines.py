@@ -66,7 +66,7 @@ class Run(NamedTuple):
         """
         cell = self.loop.cell
         with before_the_start(self):
-            self.loop.plant.prepare()
+            self.loop.plant.check_robots()
             self.loop.check_plant()
             check_motions(cell, np.array([0.0, self.clock.end]))
             check_reachable(cell, self.clock.spread(SAMPLES))

@@ -5,7 +5,8 @@ Of each of these a result has a list in plain data: which robot, which joint, wh
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 APPLIED = "applied_torque"
 #: adaptations that keep estimates within bounds, and need no advice
 BOUNDED = "Ball", "Box"
+#: bytes of an array that are looked at at a time
+PART = 4_000_000
 #: growth of the estimates that is worth a word, as a share of what they were
 GROWN = 0.01
 
@@ -57,20 +60,49 @@ def limit_report(
         `reached`: what was farthest outside; `unit`: that of both. A torque is what the controller commands:
         with saturation the plant got the limit instead.
     """
+    least, most, speed, torque = limits_of_all(cell)
+    watched = (
+        ("position", "rad", q, least, most),
+        ("velocity", "rad/s", v, -speed, speed),
+        ("torque", "N·m", tau, -torque, torque),
+    )
     found = []
+    for kind, turning, values, lower, upper in watched:
+        left = _ever(values, partial(_leaves, lower, upper))
+        for i, joint in np.argwhere(left).tolist():
+            unit = unit_for(turning, cell.robots[i].joint_units[joint])
+            about = {"robot": i, "joint": joint, "kind": kind, "unit": unit}
+            for entry in _outside(t, values[:, i, joint], lower[i, joint], upper[i, joint]):
+                found.append({**about, **entry})
+    return sorted(found, key=lambda entry: (entry["start"], entry["robot"], entry["joint"], entry["kind"]))
+
+
+def limits_of_all(cell: Cell) -> np.ndarray:
+    """Lower and upper limits of positions, and those of speeds and torques, (4, n, nv); infinite for none."""
+    found = np.full((4, cell.n, cell.nv), np.inf)
+    found[0] = -np.inf
     for i, robot in enumerate(cell.robots):
         limits = joint_limits(robot)
-        watched = (
-            ("position", "rad", q, limits.lower, limits.upper),
-            ("velocity", "rad/s", v, -limits.velocity, limits.velocity),
-            ("torque", "N·m", tau, -limits.torque, limits.torque),
-        )
-        for kind, turning, values, lower, upper in watched:
-            for joint, unit in enumerate(robot.joint_units):
-                about = {"robot": i, "joint": joint, "kind": kind, "unit": unit_for(turning, unit)}
-                for entry in _outside(t, values[:, i, joint], lower[joint], upper[joint]):
-                    found.append({**about, **entry})
-    return sorted(found, key=lambda entry: (entry["start"], entry["robot"], entry["joint"], entry["kind"]))
+        found[:, i, : robot.nv] = limits.lower, limits.upper, limits.velocity, limits.torque
+    return found
+
+
+def _leaves(lower: np.ndarray, upper: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return (values < lower) | (values > upper)
+
+
+def _ever(values: np.ndarray, test: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Where a test, (k, ...) -> (k, ...), holds at any instant of an array over time, (...)."""
+    found = np.zeros(values.shape[1:], dtype=bool)
+    for rows in in_parts(values):
+        found |= test(rows).any(axis=0)
+    return found
+
+
+def in_parts(values: np.ndarray) -> Iterator[np.ndarray]:
+    """An array over time, some instants at a time: what is made of them takes little memory."""
+    length = max(1, PART // max(1, values[:1].nbytes))
+    return (values[first : first + length] for first in range(0, len(values), length))
 
 
 def _outside(t: np.ndarray, values: np.ndarray, lower: float, upper: float) -> Iterator[dict[str, float]]:
@@ -103,8 +135,8 @@ def saturation_report(plant: Plant, arrays: Mapping[str, np.ndarray]) -> list[di
     """
     if not plant.saturate or not len(arrays["tau"]):
         return []
-    size, estimates, limits = np.abs(arrays["tau"]), np.abs(arrays["theta_hat"]), plant.torque_limits
-    share = (size > limits).mean(axis=0)
+    tau, estimates, limits = arrays["tau"], arrays["theta_hat"], plant.torque_limits
+    share = sum((np.abs(rows) > limits).sum(axis=0) for rows in in_parts(tau)) / len(tau)
     return [
         {
             "robot": int(i),
@@ -112,8 +144,8 @@ def saturation_report(plant: Plant, arrays: Mapping[str, np.ndarray]) -> list[di
             "limit": float(limits[i, joint]),
             "unit": unit_for("N·m", plant.cell.robots[i].joint_units[joint]),
             "share": float(share[i, joint]),
-            "largest": float(size[:, i, joint].max()),
-            "theta_hat": [float(part.max()) for part in (estimates[0, i], estimates[:, i])],
+            "largest": float(np.abs(tau[:, i, joint]).max()),
+            "theta_hat": [float(np.abs(part).max()) for part in (estimates[0, i], estimates[:, i])],
         }
         for i, joint in np.argwhere(share > 0)
     ]
@@ -239,7 +271,8 @@ class DampingLog:
             One entry per interval: `robot`, counted from 0; `start`, `stop`, s: first and last instant;
             `largest_damping`: of lambda; `largest_velocity_lost`: of |xref' - J v_ref|, task unit per s.
         """
-        logged = zip(*(array[: len(t)].T for array in self.arrays.values()), strict=True)
+        logged = [array[: len(t)] for array in self.arrays.values()]
+        damped = np.flatnonzero(_ever(logged[0], lambda rows: rows > 0)).tolist()
         found = [
             {
                 "robot": robot,
@@ -248,7 +281,8 @@ class DampingLog:
                 "largest_damping": float(damping[first : last + 1].max()),
                 "largest_velocity_lost": float(lost[first : last + 1].max()),
             }
-            for robot, (damping, lost) in enumerate(logged)
+            for robot in damped
+            for damping, lost in [[array[:, robot] for array in logged]]
             for first, last in spans(damping > 0)
         ]
         return sorted(found, key=lambda entry: (entry["start"], entry["robot"]))

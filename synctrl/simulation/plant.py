@@ -47,6 +47,8 @@ def _by_part(parts: Any, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.nd
     return v_dot
 
 
+#: what of a plant says how it moves
+MOVING = frozenset({"move", "friction", "_dynamics"})
 #: libraries that can compute the plant
 PHYSICS: dict[str, Callable[[Sequence[Robot]], Dynamics]] = {
     "pinocchio": pinocchio_dynamics,
@@ -150,6 +152,15 @@ class Plant:
     def prepare(self) -> Dynamics:
         """What moves the robots now, made if it was not: a library that refuses one of them says so here."""
         return self._dynamics
+
+    def check_robots(self) -> None:
+        """Ask a library that may refuse a robot, before a run; the one that made their models refuses none.
+
+        Raises:
+            MissingDependencyError, InputError: it is not there, or refuses a robot.
+        """
+        if self.physics != "pinocchio":
+            self.prepare()
 
     def move(
         self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, hidden: np.ndarray

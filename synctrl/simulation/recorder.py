@@ -8,6 +8,7 @@ give is checked here before it gets into a `Result`.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -106,7 +107,7 @@ class Recorder:
         """
         loop, logged = self._loop, self.logged()
         lengths = {"time": self.count, **sizes(loop)}
-        taken = {*info, *describe_run(loop), *LAYOUT, *_STATE_AXES, *OF_EVERY_RUN}
+        taken = {*info, *self._described, *LAYOUT, *_STATE_AXES, *OF_EVERY_RUN}
         told = {name: array for name, (array, _, _) in self._learned(logged).items()}
         network, plant = loop.controller.network, loop.plant
         heard = network.account(logged) if hasattr(network, "account") else {}
@@ -124,7 +125,7 @@ class Recorder:
         arrays = {name: _taken(array, self.count) for name, array in self._arrays.items()}
         states = {name: arrays.pop(name) for name in own_states(self._loop)}
         read = {name: arrays.pop(name) for name in self._devices.readings}
-        described = {"status": printable(status), **describe_run(self._loop), **info}
+        described = {"status": printable(status), **self._described, **info}
         described["damping"] = self._damping.report(arrays["t"])
         seen = (arrays[name] for name in ("t", "q", "v", "tau"))
         described["limits"] = limit_report(self._loop.cell, *seen)
@@ -137,6 +138,10 @@ class Recorder:
         outputs = {name: array for name, (array, _, _) in found.items()}
         described["outputs"] = {n: {"unit": unit, "axes": list(axes)} for n, (_, unit, axes) in found.items()}
         return Result(**arrays, info=described, outputs=outputs, experiment=experiment)
+
+    @cached_property
+    def _described(self) -> dict[str, Any]:
+        return describe_run(self._loop)
 
     def _learned(self, logged: Mapping[str, np.ndarray]) -> dict[str, Output]:
         """What the adaptation says of its states in a log."""

@@ -6,7 +6,10 @@ import ast
 import contextlib
 import logging
 import sys
+import threading
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 from pathlib import Path
 from traceback import walk_stack
@@ -15,7 +18,8 @@ from typing import Any
 
 from ..checks import instance
 from ..errors import InputError, MissingDependencyError, SweepError
-from .worker import Job, Outcome, Runner, Task, run_batch
+from .tasks import Job, Outcome, Task
+from .worker import Runner, run_batch, runner_of
 
 GUARD = 'if __name__ == "__main__":'
 
@@ -31,17 +35,24 @@ class WorkerDied(SweepError):
 @contextlib.contextmanager
 def serial(runner: Runner, *_: Any) -> Iterator[Crew]:
     """One run after another, in this process."""
-    yield lambda batches: ([runner.outcome(task) for task in batch] for batch in batches)
+    yield lambda batches: ([*runner.outcomes(batch)] for batch in batches)
 
 
 @contextlib.contextmanager
 def joblib(runner: Runner, workers: int, *_: Any) -> Iterator[Crew]:
-    """Worker processes of this machine."""
+    """Workers of this machine: processes, or threads for runs that are made side by side.
+
+    Those leave the interpreter for the library, which serves as many processors as there are threads.
+    """
     _need("joblib")
+    payload = pickled(runner.job)
+    yield _processes(payload, workers) if runner.lanes == 1 else _threads(runner, payload, workers)
+
+
+def _processes(payload: bytes, workers: int) -> Crew:
+    """Processes, which start at the first batch."""
     from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
-
-    payload = pickled(runner.job)
 
     def crew(batches: Iterable[Batch]) -> Iterator[list[Outcome]]:
         parallel = Parallel(n_jobs=workers, backend="loky", return_as="generator_unordered", batch_size=1)
@@ -51,7 +62,31 @@ def joblib(runner: Runner, workers: int, *_: Any) -> Iterator[Crew]:
         except TerminatedWorkerError as error:
             raise _died(error) from error
 
-    yield crew
+    return crew
+
+
+def _threads(runner: Runner, payload: bytes, workers: int) -> Crew:
+    """Threads of this process, each with a runner of its own, of which one is there already."""
+    own, spare = threading.local(), iter([runner])
+
+    def run(batch: Batch) -> list[Outcome]:
+        if not hasattr(own, "runner"):
+            own.runner = next(spare, None) or runner_of(payload)
+        return [*own.runner.outcomes(batch)]
+
+    def crew(batches: Iterable[Batch]) -> Iterator[list[Outcome]]:
+        waiting = iter(batches)
+        with ThreadPoolExecutor(workers) as pool:
+            running = deque(pool.submit(run, batch) for batch in islice(waiting, 2 * workers))
+            try:
+                while running:
+                    yield running.popleft().result()
+                    running.extend(pool.submit(run, batch) for batch in islice(waiting, 1))
+            finally:
+                for each in running:
+                    each.cancel()
+
+    return crew
 
 
 @contextlib.contextmanager

@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from ..analysis.metrics import ERRORS, Band, checked_band
-from ..checks import count, instance, positive_number
+from ..checks import choice, count, instance, positive_number
 from ..errors import InputError, ResultError
 from ..files import read_regular
 from ..simulation.description import describe_run
 from ..simulation.schedules import DisturbanceSchedule
 from .distributions import Values, described
 from .factors import Setup
+from .further import FURTHER
 from .measures import MEASURES, TRUST
 from .rows import Draws, Format, Generations, columns
 
@@ -94,19 +95,31 @@ def row_format(about: Mapping[str, Any]) -> Format:
         InputError: a part that is missing or wrong, or parts that contradict each other.
     """
     factors = _described_factors(about.get("factors"))
-    measures = FORMATS[about["format"]]
+    measures = measures_of(about)
     expected = columns(factors, measures)
     if about.get("columns") != expected:
         raise InputError.expected(str(expected), about.get("columns"), "columns")
     duration = positive_number("duration", about.get("duration"))
     if "search" in about:
-        instance("search", about["search"], Mapping, "a description of the search")
         population = count("population", about["search"].get("population"))
         return Format(expected, Generations(factors, population), duration, measures)
     draws = Draws(factors, count("samples", about.get("samples")), count("seed", about.get("seed"), least=0))
     if about.get("runs") != draws.count:
         raise InputError.expected(f"{draws.count}, as the factors say", about.get("runs"), "runs")
     return Format(expected, draws, duration, measures)
+
+
+def measures_of(about: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of the measures in the rows of a sweep or a search, by its description.
+
+    Raises:
+        InputError: further measures that are none.
+    """
+    search = about.get("search", {})
+    instance("search", search, Mapping, "a description of the search")
+    further = search.get("further", [])
+    instance("further", further, list, "a list of further measures")
+    return (*FORMATS[about["format"]], *(choice("further", name, tuple(FURTHER)) for name in further))
 
 
 def checked_bands(bands: Any) -> dict[str, Band]:

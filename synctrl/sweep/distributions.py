@@ -78,7 +78,7 @@ class LogUniform(_Interval):
         super().__post_init__()
 
     def at(self, share: float) -> float:
-        return float(np.clip(self.low * (self.high / self.low) ** share, self.low, self.high))
+        return min(max(self.low * (self.high / self.low) ** share, self.low), self.high)
 
 
 @dataclass(frozen=True)

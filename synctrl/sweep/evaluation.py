@@ -10,14 +10,17 @@ from typing import Any
 from ..checks import choice, count
 from .backends import BACKENDS, WorkerDied
 from .journal import Journal, kept_file
-from .measures import Doubt
+from .measures import Doubt, worst_first
 from .rows import Row
-from .worker import Job, Outcome, Runner, Task
+from .tasks import Job, Outcome, Task
+from .worker import Runner
 
 #: how long a batch should take, s: what it costs to send one is then far below a hundredth of it
 BATCH_TIME = 1.0
 #: batches per worker at least, so that all of them have something to do until the end
 SHARES = 4
+#: of how many runs at most whose step was too long one that does is looked for
+LOOKED_INTO = 16
 #: how often the rest is begun again after a worker has died without a single run being finished in between
 RETRIES = 2
 
@@ -35,7 +38,6 @@ class Evaluation:
 
     Attributes:
         rows: of all runs that are made, by number of the run.
-        doubts: what is to be doubted of those that were made here, to their end, by number of the run.
     """
 
     def __init__(
@@ -53,7 +55,7 @@ class Evaluation:
             count("batch", batch)
         self._runner, self._journal = Runner(job), journal  # whatever has to be compiled is compiled here
         self.rows: dict[int, Row] = {} if journal is None else journal.rows
-        self.doubts: dict[int, Doubt] = {}
+        self._doubts: dict[int, Doubt] = {}
 
     @contextlib.contextmanager
     def open(self) -> Iterator[None]:
@@ -71,7 +73,8 @@ class Evaluation:
         """
         todo = [task for task in tasks if not self._has(task)]
         if todo and self._batch is None:
-            yield self._first(todo.pop(0), len(todo))
+            first, todo = todo[: self._runner.lanes], todo[self._runner.lanes :]
+            yield self._first(first, len(todo))
         attempts = RETRIES
         while todo:
             try:
@@ -87,21 +90,36 @@ class Evaluation:
                     raise
                 todo = left
 
-    def _first(self, task: Task, left: int) -> list[Row]:
-        """Make one run here, to see how long it takes."""
+    @property
+    def doubts(self) -> dict[int, Doubt]:
+        """What is to be doubted of runs that were made here, to their end, by number of the run.
+
+        The worst of those with too long a step are made again, to find out which step would do.
+        """
+        count = len(self._runner.job.factors)
+        for run in worst_first(self._doubts)[:LOOKED_INTO]:
+            again = self._runner.outcome(Task(run, tuple(self.rows[run][1 : 1 + count])))
+            if again.doubt is not None:
+                self._doubts[run] = again.doubt
+        return self._doubts
+
+    def _first(self, tasks: Sequence[Task], left: int) -> list[Row]:
+        """Make some runs here, to see how long one takes."""
+        self._runner.prepare(tasks[0])
         start = perf_counter()
-        outcome = self._runner.outcome(task)
-        took = perf_counter() - start
+        outcomes = [*self._runner.outcomes(tasks)]
+        took = (perf_counter() - start) / len(tasks)
         share = -(-left // (SHARES * self.workers))
-        self._batch = max(1, min(int(BATCH_TIME / took), share))
-        return self._write([outcome])
+        size = max(1, min(int(BATCH_TIME / took), share))
+        self._batch = max(size - size % self._runner.lanes, min(size, self._runner.lanes))
+        return self._write(outcomes)
 
     def _has(self, task: Task) -> bool:
         return task.run in self.rows if self._journal is None else self._journal.has(*task)
 
     def _write(self, outcomes: Sequence[Outcome]) -> list[Row]:
         rows = [outcome.row for outcome in outcomes]
-        self.doubts.update({each.row[0]: each.doubt for each in outcomes if each.doubt is not None})
+        self._doubts.update({each.row[0]: each.doubt for each in outcomes if each.doubt is not None})
         if self._journal is None:
             self.rows.update({row[0]: row for row in rows})
             return rows

@@ -13,7 +13,8 @@ from ..control.gains import Gains
 from ..errors import InputError
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from . import variations
+from . import column_changes, variations
+from .columns import ColumnChange, apart
 from .distributions import Choice, Grid, Value, Values, is_part
 
 Change = Callable[[Experiment, Any], Experiment]
@@ -50,6 +51,8 @@ class Factor:
         values: a distribution or a `Grid`.
         change: a function of an experiment and a value that returns the changed experiment. It must be pure:
             leave the experiment it is given as it is, and depend on nothing else.
+        columns: the same for many runs at once, as a change of columns of quantities, see `columns.py`; None
+            if there is none, so that every run is made by itself.
 
     Raises:
         InputError: a name that is no word, values that are neither, or no function.
@@ -58,6 +61,7 @@ class Factor:
     name: str
     values: Values
     change: Change
+    columns: ColumnChange | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():
@@ -105,13 +109,15 @@ class _PeriodFactor(Factor):
 def gain(name: str, values: Values) -> Factor:
     """One number for all entries of the gain Lambda, beta, K_r, K_eps or Gamma, in its unit."""
     choice("gain", name, GAINS)
-    return Factor(name, values, partial(variations.with_gain, gain=name))
+    columns = apart if name == "leak" else partial(column_changes.of_gain, gain=name)
+    return Factor(name, values, partial(variations.with_gain, gain=name), columns)
 
 
 def gain_scale(name: str, values: Values) -> Factor:
     """Factor by which all entries of a gain are multiplied."""
     choice("gain", name, GAINS)
-    return Factor(f"{name}_scale", values, partial(variations.with_scaled_gain, gain=name))
+    columns = apart if name == "leak" else partial(column_changes.of_scaled_gain, gain=name)
+    return Factor(f"{name}_scale", values, partial(variations.with_scaled_gain, gain=name), columns)
 
 
 def adaptation(values: Grid | Choice) -> Factor:
@@ -136,51 +142,53 @@ def true_parameters(values: Values, robot: int | None = None, body: int | None =
         values: factors above 0.
         robot, body: which ones, counted from 0; by default all.
     """
-    return indexed("true_parameters", values, variations.with_scaled_bodies, robot=robot, body=body)
+    changes = variations.with_scaled_bodies, column_changes.of_scaled_bodies
+    return indexed("true_parameters", values, *changes, robot=robot, body=body)
 
 
 def initial_estimates(values: Values, robot: int | None = None) -> Factor:
     """Factor by which the initial estimates theta_hat(0) are multiplied."""
-    return indexed("initial_estimates", values, variations.with_scaled_estimates, robot=robot)
+    changes = variations.with_scaled_estimates, column_changes.of_scaled_estimates
+    return indexed("initial_estimates", values, *changes, robot=robot)
 
 
 def model_error(values: Values, robot: int | None = None) -> Factor:
     """Relative error of the initial estimates: theta_hat(0) = (1 + value) theta; -1 is to know nothing."""
-    return indexed("model_error", values, variations.with_model_error, robot=robot)
+    changes = variations.with_model_error, column_changes.of_model_error
+    return indexed("model_error", values, *changes, robot=robot)
 
 
 def initial_positions(values: Values, robot: int | None = None, joint: int | None = None) -> Factor:
     """Angle (or length) that is added to initial joint positions, rad (or m)."""
-    change = partial(variations.with_moved_start, quantity="q0")
-    return indexed("initial_positions", values, change, robot=robot, joint=joint)
+    return _moved("initial_positions", values, "q0", robot, joint)
 
 
 def initial_velocities(values: Values, robot: int | None = None, joint: int | None = None) -> Factor:
     """Velocity that is added to initial joint velocities, rad/s (or m/s)."""
-    change = partial(variations.with_moved_start, quantity="v0")
-    return indexed("initial_velocities", values, change, robot=robot, joint=joint)
+    return _moved("initial_velocities", values, "v0", robot, joint)
 
 
 def disturbance_scale(values: Values, disturbance: int = 0) -> Factor:
     """Factor by which the torque of one of the experiment's disturbances is multiplied."""
     change = partial(variations.with_scaled_disturbance, disturbance=disturbance)
-    return Factor(_name("disturbance_scale", disturbance=disturbance or None), values, change)
+    columns = partial(column_changes.of_scaled_disturbance, disturbance=disturbance)
+    return Factor(_name("disturbance_scale", disturbance=disturbance or None), values, change, columns)
 
 
 def disturbance_start(values: Values, disturbance: int = 0) -> Factor:
     """Instant at which one of the experiment's disturbances starts; it lasts as long as before, s."""
     change = partial(variations.with_disturbance_from, disturbance=disturbance)
-    return Factor(_name("disturbance_start", disturbance=disturbance or None), values, change)
+    return Factor(_name("disturbance_start", disturbance=disturbance or None), values, change, apart)
 
 
 def weights(values: Values, robot: int | None = None) -> Factor:
     """Factor by which the coupling's weights c_i are multiplied."""
-    return indexed("weights", values, variations.with_scaled_weights, robot=robot)
+    return indexed("weights", values, variations.with_scaled_weights, apart, robot=robot)
 
 
 def control_period(values: Values) -> Factor:
     """Period of sampled control, multiples of the step, s."""
-    return _PeriodFactor("control_period", values, _keep)
+    return _PeriodFactor("control_period", values, _keep, apart)
 
 
 def _part(name: str, values: Grid | Choice) -> Factor:
@@ -193,16 +201,27 @@ def _part(name: str, values: Grid | Choice) -> Factor:
     for value in values.meant.values():
         if not is_part(value):
             raise InputError.expected("parts with bind and as_dict", value, name)
-    return Factor(name, values, partial(variations.with_part, part=name, meant=values.meant))
+    return Factor(name, values, partial(variations.with_part, part=name, meant=values.meant), apart)
+
+
+def _moved(name: str, values: Values, quantity: str, robot: int | None, joint: int | None) -> Factor:
+    """A factor that moves the start of joints."""
+    change = partial(variations.with_moved_start, quantity=quantity)
+    columns = partial(column_changes.of_moved_start, quantity=quantity)
+    return indexed(name, values, change, columns, robot=robot, joint=joint)
 
 
 def _keep(experiment: Experiment, value: Value) -> Experiment:
     return experiment
 
 
-def indexed(name: str, values: Values, change: Change, **indices: int | None) -> Factor:
+def indexed(
+    name: str, values: Values, change: Change, columns: ColumnChange | None = None, **indices: int | None
+) -> Factor:
     """A factor that concerns what has these indices, counted from 0; None stands for all of it."""
-    return Factor(_name(name, **indices), values, partial(change, **indices))
+    if columns is not None and columns is not apart:
+        columns = partial(columns, **indices)
+    return Factor(_name(name, **indices), values, partial(change, **indices), columns)
 
 
 def _name(name: str, **indices: int | None) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from sys import float_info
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -24,20 +26,23 @@ class Measure(NamedTuple):
     unit: str
 
 
-#: how the values of all robots (or pairs) and axes become one: in words, and as a function of them
+#: how the values of all robots (or pairs) and axes become one: in words, and of many runs, (runs, values)
 _OVER_ALL: Mapping[str, tuple[str, Callable[[np.ndarray], Any]]] = MappingProxyType(
     {
-        "peak": ("the largest over all {rows} and axes", np.max),
+        "peak": ("the largest over all {rows} and axes", partial(np.max, axis=1)),
         "rms": (
             "the root of the mean of the squares over all {rows} and axes",
-            lambda x: np.sqrt(np.mean(x**2)),
+            lambda x: np.sqrt(np.mean(x**2, axis=1)),
         ),
-        "ise": ("the sum over all {rows} and axes", np.sum),
-        "final": ("the largest over all {rows} and axes, without its sign", lambda x: np.abs(x).max()),
+        "ise": ("the sum over all {rows} and axes", partial(np.sum, axis=1)),
+        "final": (
+            "the largest over all {rows} and axes, without its sign",
+            lambda x: np.abs(x).max(axis=1),
+        ),
         "settling_time": (
             "the latest over all {rows} and axes; empty if one has not settled; the band is "
             f"{SETTLING_FRACTION:.0%} of the largest error of the run of the base experiment",
-            np.max,
+            partial(np.max, axis=1),
         ),
     }
 )
@@ -90,12 +95,38 @@ def measures(result: Result, bands: Mapping[str, Band]) -> list[float | None]:
     with np.errstate(over="ignore", invalid="ignore"):
         computed: Metrics = metrics(result, bands)
         values: list[Any] = [
-            over_all(getattr(getattr(computed, kind), name))
+            over_all(getattr(getattr(computed, kind), name).reshape(1, -1))[0]
             for kind in ERRORS
             for name, (_, over_all) in _OVER_ALL.items()
         ]
     values += [computed.peak_torque.max(), cut_off(result), (result.info["step_error"] or {}).get("estimate")]
     return [finite_or_none(value) for value in values]
+
+
+def measures_of_all(measured: Any, span: float) -> list[list[float | None]]:
+    """The measures of runs that were taken while they went, a row for each, as `measures` has them.
+
+    Args:
+        measured: `Measured` of the compiled engine.
+        span: how long the runs were, s.
+    """
+    found: list[np.ndarray] = []
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        for kind in ERRORS:
+            error = getattr(measured, kind)
+            taken = {**error._asdict(), "rms": np.sqrt(error.ise / span)}
+            for name, (_, over_all) in _OVER_ALL.items():
+                found.append(over_all(taken[name].reshape(len(error.ise), -1)))
+        torque, cut = (part.reshape(len(part), -1) for part in (measured.peak_torque, measured.cut))
+        largest, speed = measured.step_error[:, :2].T
+        estimate = np.minimum(largest / speed, float_info.max)
+        estimate[~((largest > 0) & (speed > 0))] = np.nan
+        table = np.stack([*found, torque.max(axis=1), cut.max(axis=1) / measured.instants, estimate], axis=1)
+    gaps = ~np.isfinite(table)
+    rows: list[list[float | None]] = table.tolist()
+    for run, column in np.argwhere(gaps).tolist():
+        rows[run][column] = None
+    return rows
 
 
 def cut_off(result: Result) -> float:
@@ -108,7 +139,7 @@ class Doubt(NamedTuple):
 
     Attributes:
         estimate: error of its worst step, as a share of its largest velocity; None if its step will do.
-        advised: a step that does, s, or None.
+        advised: a step that does, s; None if its step will do, or if nobody has looked for one.
         share: of the instants at which the torque of a joint was cut off, the largest; 0 if none was.
     """
 
@@ -122,6 +153,22 @@ def doubt_of(result: Result) -> Doubt:
     step = result.info["step_error"] or {}
     advised = step.get("advised_step")
     return Doubt(None if advised is None else step["estimate"], advised, cut_off(result))
+
+
+def doubt_of_row(row: Sequence[Any]) -> Doubt:
+    """What is to be doubted of a run, by its measures alone: they do not say which step would do."""
+    share, estimate = row[-2:]
+    return Doubt(None if estimate is None or estimate <= LIMIT else estimate, None, share)
+
+
+def worst_first(doubts: Mapping[int, Doubt]) -> list[int]:
+    """Runs with too long a step in which nobody has looked for one that does, the worst first."""
+    errors = {
+        run: doubt.estimate
+        for run, doubt in doubts.items()
+        if doubt.estimate is not None and doubt.advised is None
+    }
+    return sorted(errors, key=lambda run: (-errors[run], run))
 
 
 def warn_of(doubts: Mapping[int, Doubt], what: str, dt: float) -> None:

@@ -19,10 +19,12 @@ from .description import checked_bands, describe_base
 from .distributions import Value
 from .evaluation import Evaluation, Evaluator, progress_bar
 from .factors import Factor, Setup
+from .further import FURTHER
 from .journal import Journal
 from .measures import MEASURES, definitions, warn_of
 from .rows import Draws, columns
-from .worker import Job, Prepared, Runner, Task
+from .tasks import Job, Task
+from .worker import Prepared, Runner
 
 
 class StudyOptions(TypedDict, total=False):
@@ -87,6 +89,7 @@ class Study:
         """Everything that a row depends on, as plain data, and what its entries mean."""
         setup = self.base
         measured = definitions(setup.experiment.cell)
+        measured |= {name: FURTHER[name].measure for name in job.further}
         return {
             "factors": [factor.describe() for factor in self.factors],
             "seed": self.seed,
@@ -98,7 +101,7 @@ class Study:
             "base": describe_base(setup),
             "settling_bands": {kind: np.asarray(band).tolist() for kind, band in job.bands.items()},
             "columns": job.columns,
-            "measures": {name: measured[name]._asdict() for name in MEASURES},
+            "measures": {name: measured[name]._asdict() for name in (*MEASURES, *job.further)},
             "versions": versions(),
         }
 
@@ -185,7 +188,8 @@ class Sweep:
     def run_one(self, run: int) -> dict[str, Any]:
         """A run's row of the table, made again."""
         job = self.study.job()
-        return dict(zip(job.columns, Runner(job).outcome(self._task(run)).row, strict=True))
+        (outcome,) = Runner(job).outcomes([self._task(run)])
+        return dict(zip(job.columns, outcome.row, strict=True))
 
     # -- all runs -----------------------------------------------------------------------------------------
 

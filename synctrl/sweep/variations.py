@@ -53,7 +53,7 @@ def with_scaled_bodies(
 
     def change(i: int, member: Member) -> Member:
         pi = member.robot.inertial_parameters.reshape(-1, 10)
-        pi[_index("body", body, len(pi))] *= value
+        pi[slice_of("body", body, len(pi))] *= value
         scaled = member.robot.with_parameters(pi.ravel())
         parameters = same_parameters(experiment.cell.parameters[i], scaled)
         return replace(member, robot=scaled, parameters=parameters)
@@ -79,7 +79,7 @@ def with_moved_start(
 
     def change(i: int, member: Member) -> Member:
         start = getattr(cell, quantity)[i, : member.robot.nv].copy()
-        start[_index("joint", joint, len(start))] += value
+        start[slice_of("joint", joint, len(start))] += value
         return replace(member, **{quantity: start})
 
     return _with_members(experiment, change, robot)
@@ -101,9 +101,9 @@ def with_scaled_weights(experiment: Experiment, value: float, robot: int | None 
     """Weights c_i of the coupling times a number."""
     cell = experiment.cell
     scale = np.ones((cell.n, 1, 1))
-    scale[_index("robot", robot, cell.n)] = value
+    scale[slice_of("robot", robot, cell.n)] = value
     coupling = scaled_coupling(cell.coupling, cell.m, scale)
-    return replace(experiment, cell=Cell(cell.members, coupling, cell.space, cell.name))
+    return replace(experiment, cell=Cell(cell.members, coupling, cell.space, cell.name, cell.clocks))
 
 
 def with_setting(experiment: Experiment, value: Value, setting: str) -> Experiment:
@@ -132,7 +132,7 @@ def with_clock(experiment: Experiment, value: float, robot: int | None = None) -
     """Clocks of one robot or of all that are ahead, s."""
     network, n = _network(experiment), experiment.cell.n
     offset = network.clocks(n)
-    offset[_index("robot", robot, n)] = value
+    offset[slice_of("robot", robot, n)] = value
     return replace(experiment, network=network.replace(offset=offset))
 
 
@@ -158,7 +158,7 @@ def same_parameters(parameters: Parameters, robot: Robot) -> Parameters:
         rigid = same_parameters(parameters.base, robot)
         return FrictionParameters(robot, parameters.friction, rigid, parameters.armature)
     if isinstance(parameters, LinearParameters) and type(parameters) in (LinearParameters, BaseParameters):
-        theta = _fit(parameters.matrix, robot)
+        theta = fitted(parameters.matrix, states_of(robot), robot.inertial_parameters)
         return LinearParameters(robot, parameters.matrix, theta, parameters.names)
     raise InputError(
         f"expected full, linear or friction parameters, found {type(parameters).__name__} "
@@ -168,12 +168,31 @@ def same_parameters(parameters: Parameters, robot: Robot) -> Parameters:
     )
 
 
-def _fit(matrix: np.ndarray, robot: Robot) -> np.ndarray:
-    """theta for which Y B theta is the robot's torque, by least squares over random states."""
+def fitted(matrix: np.ndarray, Y: np.ndarray, pi: np.ndarray) -> np.ndarray:
+    """theta for which Y B theta is Y pi, by least squares.
+
+    Args:
+        matrix: B, (10 bodies, P).
+        Y: regressors at many states, one below the other, see `states_of`.
+        pi: inertial parameters, (10 bodies,).
+    """
+    return np.linalg.lstsq(Y @ matrix, Y @ pi, rcond=None)[0]
+
+
+def states_of(robot: Robot) -> np.ndarray:
+    """Regressors of a robot at random states, one below the other, which do not depend on its inertia."""
     rng = np.random.default_rng(0)
     states = rng.uniform(-2, 2, (20, 3, robot.nv))
-    Y = np.concatenate([robot.regressor(q, v, v, a) for q, v, a in states])
-    return np.linalg.lstsq(Y @ matrix, Y @ robot.inertial_parameters, rcond=None)[0]
+    return np.concatenate([robot.regressor(q, v, v, a) for q, v, a in states])
+
+
+def robots_of(cell: Cell, robot: int | None) -> list[int]:
+    """One of the robots of a cell, counted from 0, or all of them.
+
+    Raises:
+        InputError: it has no such robot.
+    """
+    return [*range(cell.n)[slice_of("robot", robot, cell.n)]]
 
 
 def _network(experiment: Experiment) -> Network:
@@ -195,9 +214,9 @@ def _with_members(
 ) -> Experiment:
     cell = experiment.cell
     members = list(cell.members)
-    for i in np.arange(cell.n)[_index("robot", robot, cell.n)]:
-        members[i] = change(int(i), members[i])
-    return replace(experiment, cell=Cell(members, cell.coupling, cell.space, cell.name))
+    for i in robots_of(cell, robot):
+        members[i] = change(i, members[i])
+    return replace(experiment, cell=Cell(members, cell.coupling, cell.space, cell.name, cell.clocks))
 
 
 def _with_estimates(
@@ -216,13 +235,17 @@ def _with_disturbance(
     experiment: Experiment, disturbance: int, change: Callable[[Disturbance], Disturbance]
 ) -> Experiment:
     disturbances = list(experiment.disturbances)
-    here = _index("disturbance", disturbance, len(disturbances))
+    here = slice_of("disturbance", disturbance, len(disturbances))
     disturbances[here] = [change(d) for d in disturbances[here]]
     return replace(experiment, disturbances=disturbances)
 
 
-def _index(what: str, given: int | None, count: int) -> slice:
-    """One of so many, or all of them."""
+def slice_of(what: str, given: int | None, count: int) -> slice:
+    """One of so many, counted from 0, or all of them.
+
+    Raises:
+        InputError: there are not so many.
+    """
     if given is None:
         return slice(None)
     k = index(what, given, count)

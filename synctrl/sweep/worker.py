@@ -1,12 +1,12 @@
-"""One process's share of a sweep: single runs, each of which ends as a row; what they share is made once."""
+"""One process's share of a sweep: runs side by side or alone, each of which ends as a row."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
-from typing import Any, NamedTuple
+from functools import lru_cache, partial
+from typing import Any
 
 from ..analysis.metrics import Band
 from ..checks import choice
@@ -14,62 +14,13 @@ from ..errors import SimulationError, SweepError, SynctrlError
 from ..simulation.engines import Run, find_engine
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .distributions import Value
-from .factors import Factor, Setup
-from .measures import MEASURES, Doubt, doubt_of, measures
-from .rows import COMPLETED, REFUSED, STOPPED, Row, columns
-
-
-class Task(NamedTuple):
-    """A run to be made: its number, and the values of its factors."""
-
-    run: int
-    values: tuple[Value, ...]
-
-
-class Outcome(NamedTuple):
-    """A run that was made.
-
-    Attributes:
-        row: its row.
-        kept: its decimated result, if it is to be kept.
-        doubt: why its measures are to be doubted; None if it did not go to its end.
-    """
-
-    row: Row
-    kept: Result | None = None
-    doubt: Doubt | None = None
-
-
-class Job(NamedTuple):
-    """What all runs of a sweep share.
-
-    Attributes:
-        base: what is varied.
-        factors: how.
-        bands: settling bands by kind of error.
-        keep_every: which of the logged instants are kept, or None for no trajectories.
-    """
-
-    base: Setup
-    factors: tuple[Factor, ...]
-    bands: Mapping[str, Band]
-    keep_every: int | None = None
-
-    def __repr__(self) -> str:
-        return f"Job: {self.base!r}, {len(self.factors)} factors"
-
-    @property
-    def columns(self) -> list[str]:
-        """Names of the entries of a row."""
-        return columns(factor.name for factor in self.factors)
-
-    def setup(self, values: Sequence[Value]) -> Setup:
-        """The base with all factors applied, in their order."""
-        setup = self.base
-        for factor, value in zip(self.factors, values, strict=True):
-            setup = factor.apply(setup, value)
-        return setup
+from .blocks import LANES, Blocks
+from .factors import Setup
+from .further import further_values
+from .measures import MEASURES, doubt_of, measures
+from .rows import COMPLETED, REFUSED, STOPPED
+from .tasks import Job, Outcome
+from .tasks import Task as Task
 
 
 class Prepared:
@@ -106,11 +57,12 @@ class Prepared:
         run.check_step()
         run.check()
         self._known = list(_paths(experiment))
-        self._engine = find_engine(engine)
+        self._engine, self._libraries = find_engine(engine), dict[str, Any]()
         if engine == "compiled":
-            from ..compiled.engine import Compiled, Tables
+            from ..compiled.engine import Compiled
+            from ..compiled.tables import Tables
 
-            self._engine = Compiled({}, Tables())
+            self._engine = Compiled(self._libraries, Tables())
             self._engine.load(run)
 
     def simulate(self, experiment: Experiment, control_period: float | None = None) -> Result:
@@ -122,12 +74,26 @@ class Prepared:
         Raises:
             see `Experiment.simulate`
         """
+        return self._engine.run(self._looked_at(experiment, control_period), None)
+
+    def batch(self, setup: Setup, bands: Mapping[str, Band]) -> tuple[Run, Any]:
+        """A variation as the base of many, and what makes runs side by side that differ from it in numbers.
+
+        Raises:
+            see `Experiment.simulate`
+        """
+        from ..compiled.batch import Batch
+
+        run = self._looked_at(setup.experiment, setup.control_period)
+        return run, Batch(run, bands, self._libraries)
+
+    def _looked_at(self, experiment: Experiment, control_period: float | None) -> Run:
+        """A run that can begin."""
         run = self._plan(experiment, control_period)
         run.check_step()
-        paths = list(_paths(experiment))
-        if not _same(paths, self._known):
+        if not _same(list(_paths(experiment)), self._known):
             run.check()
-        return self._engine.run(run, None)
+        return run
 
     def _plan(self, experiment: Experiment, control_period: float | None) -> Run:
         return experiment.plan(self.duration, self.dt, control_period, log_dt=self.log_dt)
@@ -135,6 +101,10 @@ class Prepared:
 
 class Runner:
     """Makes the runs of a job in this process.
+
+    Attributes:
+        job: the job.
+        lanes: how many runs it makes side by side; 1 if it makes them one by one.
 
     Raises:
         MissingDependencyError, CompilationError: the engine cannot be had, and why.
@@ -144,9 +114,24 @@ class Runner:
     def __init__(self, job: Job):
         self.job = job
         self._prepared = Prepared(*job.base[:4])
+        self._blocks = Blocks(job, partial(self._prepared.batch, bands=job.bands))
+        self.lanes = LANES if self._blocks.possible else 1
+
+    def outcomes(self, tasks: Sequence[Task]) -> Iterator[Outcome]:
+        """Make runs, side by side where that can be. One that stops or is refused is a row too.
+
+        Raises:
+            SweepError: a function of the user failed.
+        """
+        found = self._blocks.outcomes(tasks)
+        return (found[task.run] if task.run in found else self.outcome(task) for task in tasks)
+
+    def prepare(self, task: Task) -> None:
+        """Have ready what runs like this one share."""
+        self._blocks.outcomes([task])
 
     def outcome(self, task: Task) -> Outcome:
-        """Make a run. One that stops or is refused is a row too, with its cause.
+        """Make a run by itself.
 
         Raises:
             SweepError: a function of the user failed.
@@ -177,10 +162,11 @@ class Runner:
         if error is not None:  # halves of surrogate pairs, which a name may have, become question marks
             cause = f"{type(error).__name__}: {error}".encode(errors="replace").decode()
         time = error.time if isinstance(error, SimulationError) else None
-        values: list[Any] = [None] * len(MEASURES)
+        values: list[Any] = [None] * (len(MEASURES) + len(self.job.further))
         doubt = None
         if status == COMPLETED and result is not None:
             values, doubt = measures(result, self.job.bands), doubt_of(result)
+            values += further_values(self.job.further, self.job.setup(task.values))
         row = [task.run, *task.values, status, cause, None if time is None else float(time), *values]
         return Outcome(row, self._keep(task, result), doubt)
 
@@ -193,16 +179,20 @@ class Runner:
 
 def run_batch(payload: bytes, tasks: Sequence[Task]) -> list[Outcome]:
     """Make some runs of a pickled job; what a worker process is asked to do."""
-    runner = _runner(payload, threading.get_ident())
-    return [runner.outcome(task) for task in tasks]
+    return [*_runner(payload, threading.get_ident()).outcomes(tasks)]
+
+
+def runner_of(payload: bytes) -> Runner:
+    """The runner of a pickled job."""
+    import pickle
+
+    return Runner(pickle.loads(payload))
 
 
 @lru_cache(maxsize=8)
 def _runner(payload: bytes, thread: int) -> Runner:
     """The runner of a job, made once per thread: a user's functions need not be safe to share."""
-    import pickle
-
-    return Runner(pickle.loads(payload))
+    return runner_of(payload)
 
 
 def _paths(experiment: Experiment) -> Iterator[Any]:

@@ -86,6 +86,12 @@ class SmoothFunction:
         change = np.max([np.abs(part).max(axis=(0, 2, 3)) for part in (value - value[0], *rest)], axis=0)
         return value[0] if (change <= 1e-14 * np.abs(value[0]).max(axis=(1, 2))).all() else None
 
+    @property
+    def is_diagonal(self) -> bool:
+        """Whether every row is a diagonal, (m, m), at all times."""
+        beside = ~np.eye(self.shape[-1], dtype=bool)
+        return not any(piece.series[..., beside].any() for piece in self._pieces)
+
     def at(self, times: np.ndarray) -> np.ndarray:
         """The function and its first and second derivative at times inside the run, (3, T, n, m, m)."""
         where = self.pieces_at(times)

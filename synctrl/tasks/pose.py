@@ -87,8 +87,13 @@ class PoseSpace(TipSpace):
 
     def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         pose, J, _ = robot.tip_kinematics(q, np.zeros(robot.nv))
-        _, e, J, _ = compare(target, pose.translation, pose.rotation, J)
-        return e, J
+        return self.missed(target, pose.translation, pose.rotation, J)
+
+    def missed(
+        self, target: np.ndarray, position: np.ndarray, R: np.ndarray, J: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """`miss` of tips that are at a position, (..., 3), turned by R, with a Jacobian, (..., 6, nv)."""
+        return compare(target, position, R, J)[1:3]
 
     def displacement(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
         """From one pose to another, (..., 6): a translation and, in world axes, a rotation vector."""

@@ -288,7 +288,13 @@ class CartesianSpace(TipSpace):
 
     def miss(self, robot: Robot, target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         pose, J, _ = robot.tip_kinematics(q, np.zeros(robot.nv))
-        return target - pose.translation[self.rows], J[self.rows]
+        return self.missed(target, pose.translation, pose.rotation, J)
+
+    def missed(
+        self, target: np.ndarray, position: np.ndarray, R: np.ndarray, J: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """`miss` of tips that are at a position, (..., 3), turned by R, with a Jacobian, (..., 6, nv)."""
+        return target - position[..., self.rows], J[..., self.rows, :]
 
     def __repr__(self) -> str:
         return f"CartesianSpace('{self.axes}')"

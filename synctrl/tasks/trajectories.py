@@ -47,17 +47,19 @@ class Trajectory(Protocol):
 
 
 class _PointToPoint:
-    """A straight line from `start` to `end`, travelled as a fraction of time."""
+    """A straight line from `start` to `end`: `progress` is how much of it is behind, and its derivatives."""
 
     breaks: tuple[float, ...] = ()
+    progress: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 
     def __init__(self, start: ArrayLike, end: ArrayLike):
         self.start = finite_array("start", start, (None,))
         self.end = finite_array("end", end, self.start.shape)
         self.dimension = self.start.size
 
-    def _along(self, s: np.ndarray, s_dot: np.ndarray, s_ddot: np.ndarray) -> Motion:
+    def __call__(self, t: ArrayLike) -> Motion:
         way = self.end - self.start
+        s, s_dot, s_ddot = self.progress(np.asarray(t, dtype=float))
         return Motion(self.start + _times(s, way), _times(s_dot, way), _times(s_ddot, way))
 
 
@@ -67,9 +69,9 @@ class Hold(_PointToPoint):
     def __init__(self, position: ArrayLike):
         super().__init__(position, position)
 
-    def __call__(self, t: ArrayLike) -> Motion:
-        still = np.zeros_like(np.asarray(t, dtype=float))
-        return self._along(still, still, still)
+    def progress(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        still = np.zeros_like(t)
+        return still, still, still
 
 
 class Cubic(_PointToPoint):
@@ -88,13 +90,12 @@ class Cubic(_PointToPoint):
         self.duration = positive_number("duration", duration)
         self.breaks = (0.0, self.duration)
 
-    def __call__(self, t: ArrayLike) -> Motion:
+    def progress(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         T = self.duration
-        t = np.asarray(t, dtype=float)
         moving = (t >= 0) & (t < T)
         a = np.clip(t / T, 0.0, 1.0)
         s = a * a * (3 - 2 * a)
-        return self._along(s, moving * 6 * a * (1 - a) / T, moving * (6 - 12 * a) / T**2)
+        return s, moving * 6 * a * (1 - a) / T, moving * (6 - 12 * a) / T**2
 
 
 class ExponentialApproach(_PointToPoint):
@@ -109,10 +110,10 @@ class ExponentialApproach(_PointToPoint):
         super().__init__(start, end)
         self.rate = positive_number("rate", rate)
 
-    def __call__(self, t: ArrayLike) -> Motion:
+    def progress(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         k = self.rate
-        left = np.exp(-k * np.asarray(t, dtype=float))
-        return self._along(1 - left, k * left, -k * k * left)
+        left = np.exp(-k * t)
+        return 1 - left, k * left, -k * k * left
 
 
 class Circle:

@@ -1,0 +1,295 @@
+"""Runs of one experiment side by side: a run per lane, with measures taken on the way instead of a log.
+
+All runs share robots, coupling, desired motion, instants and what happens at them; what differs is numbers:
+gains, parameters, the start. Such numbers are given as columns, an array per quantity with a row per run. A
+run that ends before its time leaves the others alone. What is measured of a run does not depend on who is
+beside it, nor on how many lanes there are.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterable, Mapping
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from ..simulation.engines import Run
+from . import processor, structs
+from .arrays import CompiledLoop
+from .kind import classify
+from .known import check_known
+from .lanes import room, state_parts
+from .program import library_for
+from .quantities import QUANTITIES, shape
+from .report import Ending, Worst
+from .stepper import Pace, Stepper
+from .structs import Mark
+from .tables import Tables
+
+
+class MeasuredErrors(NamedTuple):
+    """Measures of one kind of error, (runs, rows, m) each; see `analysis.metrics.ErrorMetrics`."""
+
+    peak: np.ndarray
+    ise: np.ndarray
+    settling_time: np.ndarray
+    final: np.ndarray
+
+
+class Measured(NamedTuple):
+    """What was measured of runs; of one that ended early only how it ended means anything.
+
+    Attributes:
+        tracking_error, sync_error: of the errors; NaN, as torque and cut, in a run that ended early.
+        peak_torque: largest torque that was asked for, (runs, n, nv), N·m or N.
+        cut: at how many instants it was larger than the limit, (runs, n, nv).
+        step_error: error of the worst step and the largest velocity, in rad/s, and the end of that step, s,
+            (runs, 3); see `StepError`.
+        joint: in a row of all robots' joints, at which it was, (runs,); -1 if no step was looked at.
+        status: 0 of a run that went to its end, else what the guard found, see `stepper.found_check`,
+            (runs,).
+        stop_time: when it ended, s, (runs,).
+        robot, value: at which robot, and the number that was too large, (runs,).
+        instants: how many instants were looked at in a run that went to its end.
+    """
+
+    tracking_error: MeasuredErrors
+    sync_error: MeasuredErrors
+    peak_torque: np.ndarray
+    cut: np.ndarray
+    step_error: np.ndarray
+    joint: np.ndarray
+    status: np.ndarray
+    stop_time: np.ndarray
+    robot: np.ndarray
+    value: np.ndarray
+    instants: int
+
+
+class Batch:
+    """Makes runs that differ from a planned one in numbers alone.
+
+    Args:
+        run: the planned one.
+        bands: settling bands by kind of error, one for all coordinates or (m,).
+        libraries: libraries that are loaded already, by what they were made for.
+        width: number of lanes; by default as many as the machine has.
+
+    Raises:
+        InputError: the closed loop cannot be generated, or Python has to be asked in the middle of a run: of
+            messages, sensors, actuators or events.
+        MissingDependencyError, CompilationError: see `Program`.
+    """
+
+    def __init__(
+        self,
+        run: Run,
+        bands: Mapping[str, float | np.ndarray],
+        libraries: dict[str, ctypes.CDLL] | None = None,
+        width: int | None = None,
+    ):
+        check_known(run.loop)
+        _check_alone(run)
+        classified, known = classify(run.loop), {} if libraries is None else libraries
+        library = library_for(run.loop, classified, known, processor.widest() if width is None else width)
+        self._run, self._program = run, CompiledLoop(run.loop, classified, library)
+        self._side = _Side(self._program, run, bands)
+
+    def measure(self, columns: Mapping[str, np.ndarray], count: int) -> Measured:
+        """Make some runs.
+
+        Args:
+            columns: what differs from the planned run, by names of quantities: constants of the cell, "q",
+                "v", "z" and "memory" at the start, (count, rows, columns); "disturbance", (count, windows,
+                rows, columns); and "pi", true inertial parameters, (count, windows, n, 10 bodies).
+            count: number of runs.
+
+        Raises:
+            InputError: something that no run has a column for, or an array of another shape.
+        """
+        arrays = {name: self._checked(name, array, count) for name, array in columns.items()}
+        width, parts = self._program.lanes.width, list[Measured]()
+        for first in range(0, count, width):
+            chosen = np.minimum(np.arange(first, first + width), count - 1)
+            self._side.begin()
+            for name, array in arrays.items():
+                self._side.put(name, np.moveaxis(array[chosen], 0, -1))
+            parts.append(self._side.made())
+        return _joined(parts, count)
+
+    # -- internals ----------------------------------------------------------------------------------------
+
+    def _checked(self, name: str, array: np.ndarray, count: int) -> np.ndarray:
+        """A column of the right shape."""
+        if name not in QUANTITIES or QUANTITIES[name].owner not in ("cell", "state", "load", "disturbance"):
+            raise InputError.expected("a quantity that runs have from their start", name, "columns")
+        expected: tuple[int, ...] = shape(name, self._program.sizes)
+        if name == "pi":
+            expected = self._program.parameters.shape
+        elif name == "disturbance":
+            expected = (len(self._run.schedule.torques), *expected)
+        found = np.asarray(array, dtype=float)
+        if found.shape != (count, *expected):
+            raise InputError.expected(f"shape {(count, *expected)}", found.shape, f"columns, {name}")
+        return self._program.lumped(found) if name == "pi" else found
+
+
+class _Side(Stepper):
+    """Runs in the lanes of the library, from their start to their end; then others, with the same memory."""
+
+    def __init__(self, program: CompiledLoop, run: Run, bands: Mapping):
+        super().__init__(program, run)
+        self._tables, self._pace = Tables(), Pace()
+        self._y, self._ending = program.packed_state(run.loop.initial_state()), Ending(program.lanes.width)
+        self._worst, self._logged = Worst(program, run.loop.cell.v0), list[np.ndarray]()
+        self._stop = np.zeros(program.lanes.width)
+        self._tally, self._kept = _tally(program, bands)
+        self.steps.tally = ctypes.addressof(self._tally)
+        self._start = self._y.copy(), {name: array.copy() for name, array in self._kept.items()}
+
+    def begin(self) -> None:
+        """Go back to the start, with the numbers of the planned run."""
+        self.program.reset()
+        self.say_what_acts()
+        self._y[...], kept = self._start
+        for name, array in kept.items():
+            self._kept[name][...] = array
+        self._ending.begin()
+        self._worst.begin()
+        self._stop[:], self._tally.rows, self._logged = 0, 0, []
+
+    def put(self, name: str, array: np.ndarray) -> None:
+        """Let runs have their own values of a quantity, (..., rows, columns, lanes)."""
+        owner = QUANTITIES[name].owner
+        if owner == "cell":
+            self.program.put(name, array)
+        elif owner == "state":
+            self._place(name)[...] = array.reshape(-1, array.shape[-1])
+            if name == "v":
+                self._worst.speed[:] = np.abs(array).max(axis=(0, 1), initial=0.0)
+        else:
+            self.program.tell_apart(self.steps, name, array)
+
+    def made(self) -> Measured:
+        """Make the runs."""
+        for block in self._tables.blocks(self.program, self.run.clock):
+            self.look_at(block)
+            for first, last in self._pace.parts(len(block.steps.starts)):
+                start = perf_counter()
+                self.call(first, last)
+                self._pace.learn(last - first, perf_counter() - start)
+            if self._ending.all:
+                return self._measured()
+        self.look_at_end()
+        self.call(0, 1)
+        return self._measured()
+
+    # -- internals ----------------------------------------------------------------------------------------
+
+    def _made(self, times: np.ndarray, marks: np.ndarray) -> None:
+        if self._ending.all:
+            return
+        before = self._ending.found[0] != 0
+        self.program.call("advance", self.steps, self._y, structs.Log(), self._ending.fresh())
+        status, at, *_ = self._ending.found
+        new = (status != 0) & ~before
+        self._stop[new] = times[at[new]]
+        self._logged.append(times[:-1][marks & Mark.LOGGED > 0])
+
+    def _place(self, name: str) -> np.ndarray:
+        """The part of the state that is a quantity, (numbers, lanes)."""
+        begin, y = 0, self._y.reshape(-1, self.program.lanes.width)
+        for part, rows, length in state_parts(self.program.sizes, len(y)):
+            if part == name:
+                return y[begin : begin + rows * length]
+            begin += rows * length
+        raise InputError.expected("a part of the state", name, "columns")
+
+    def _measured(self) -> Measured:
+        t, (status, _, robot, value) = np.concatenate(self._logged), self._ending.found
+        for array in self._kept.values():
+            array[..., status != 0] = np.nan  # of a run that ended early nothing is known
+        worst = self._worst
+        return Measured(
+            tracking_error=self._errors("tracking", t),
+            sync_error=self._errors("sync", t),
+            peak_torque=self._runs("torque torque"),
+            cut=self._runs("torque cut"),
+            step_error=np.stack((worst.largest, worst.speed, worst.time), axis=1),
+            joint=worst.joint(np.arange(len(status))),
+            status=status.copy(),
+            stop_time=self._stop.copy(),
+            robot=robot.copy(),
+            value=value.copy(),
+            instants=self._tally.rows,
+        )
+
+    def _errors(self, kind: str, t: np.ndarray) -> MeasuredErrors:
+        peak, ise, final, outside = (
+            self._runs(f"{kind} {name}") for name in ("peak", "ise", "final", "outside")
+        )
+        settled = np.append(t, (np.inf, np.nan))[np.nan_to_num(outside, nan=len(t)).astype(int) + 1]
+        return MeasuredErrors(peak, ise, settled, final)
+
+    def _runs(self, name: str) -> np.ndarray:
+        """An array of the tally with the runs first."""
+        return np.moveaxis(self._kept[name], -1, 0).copy()
+
+
+def _check_alone(run: Run) -> None:
+    """Refuse a run in which Python is asked between two steps."""
+    loop = run.loop
+    asked = {
+        "messages between robots": len(loop.messages.between(0.0, run.clock.end)) > 0,
+        "sensors or actuators": bool(loop.devices.settings),
+        "a plant with events": len(loop.events) > 0,
+    }
+    for what in (what for what, found in asked.items() if found):
+        raise InputError(
+            f"runs side by side do not have {what}; make them one by one", subject="batch", found=what
+        )
+
+
+def _tally(program: CompiledLoop, bands: Mapping) -> tuple[structs.Tally, dict[str, np.ndarray]]:
+    """What the library counts up, and the arrays by name."""
+    sizes, width = program.sizes, program.lanes.width
+    rows = {"tracking": ("n", "m"), "sync": ("p", "m"), "torque": ("n", "nv")}
+    kept = {
+        f"{kind} {name}": room(sizes[count], sizes[length], width)
+        for kind, (count, length) in rows.items()
+        for name in (("torque", "cut") if kind == "torque" else ("peak", "ise", "final", "outside", "square"))
+    }
+    for kind in ("tracking", "sync"):
+        band = room(sizes["m"], width)
+        band[...] = np.broadcast_to(np.asarray(bands[f"{kind}_error"], dtype=float), (sizes["m"],))[:, None]
+        kept[f"{kind} band"] = band
+        kept[f"{kind} outside"][...] = -1
+    errors = [
+        structs.Errors(**{name: kept[f"{kind} {name}"].ctypes.data for name, *_ in structs.Errors._fields_})
+        for kind in ("tracking", "sync")
+    ]
+    torque = {name: kept[f"torque {name}"].ctypes.data for name in ("torque", "cut")}
+    return structs.Tally(*errors, **torque), kept
+
+
+def _joined(parts: Iterable[Measured], count: int) -> Measured:
+    """Measures of all runs, without the lanes that were too many."""
+    listed = list(parts)
+
+    def one(arrays: Iterable[np.ndarray]) -> np.ndarray:
+        return np.concatenate(list(arrays))[:count]
+
+    def errors(kind: str) -> MeasuredErrors:
+        of_kind = [getattr(part, kind) for part in listed]
+        return MeasuredErrors(*(one(arrays) for arrays in zip(*of_kind, strict=True)))
+
+    names = [name for name in Measured._fields if name not in ("tracking_error", "sync_error", "instants")]
+    return Measured(
+        tracking_error=errors("tracking_error"),
+        sync_error=errors("sync_error"),
+        **{name: one(getattr(part, name) for part in listed) for name in names},
+        instants=max(part.instants for part in listed),
+    )
