@@ -126,7 +126,7 @@ def page_of(
     found, tasks = zip(*(done[f"task {k}"] for k in range(len(TASKS))), strict=True)
     checked = [*claims, *own, *chain.from_iterable(found)]
     sections = [
-        introduction(checked),
+        introduction(checked, every),
         *(done[name] for name in (*SCENES, "full", "friction")),
         *tasks,
         margins_told(done["margins"], done["map"]),

@@ -14,7 +14,7 @@ from synctrl.experiments.planar_four import GAINS
 from synctrl.paper import claims, claims_of_cells
 from synctrl.paper.claims import OURS_OF_THE_PAPER, Claim, tally
 from synctrl.paper.offsets import CAUSES, offsets_are_due_to_friction_and_gravity
-from synctrl.paper.paper_sections import introduction
+from synctrl.paper.paper_sections import introduction, made_by
 from synctrl.paper.report import Verdicts
 
 
@@ -168,10 +168,19 @@ def test_the_papers_claims_are_counted_apart_from_ours():
     built = replace(papers[0], by_construction="it is so by definition")
     ours = [Claim("so", OURS_OF_THE_PAPER, holds, (), "") for holds in (True, False, False, False)]
     assert tally([*papers, *ours]) == "2 of 3 of the paper's claims hold; 1 of 4 of ours."
-    words = introduction([*papers, built, *ours]).blocks[-1].paragraph
+    words = introduction([*papers, built, *ours], {}).blocks[-1].paragraph
     assert words.startswith(
         "3 of 4 of the paper's claims hold, of which 1 could hardly have failed; 1 of 4 of ours."
     )
+
+
+def test_the_page_says_which_engine_made_which_runs(planar):
+    run = planar["synchronized"]
+    run = replace(run, info={**run.info, "engine": "pinocchio"})
+    compiled = replace(run, info={**run.info, "engine": "compiled"})
+    assert made_by({"one": run, "two": run}).startswith("All runs are made by the reference engine.")
+    assert "generated C: all but one run, which" in made_by({"one_run": run, "two": compiled})
+    assert "generated C: all. " in made_by({"two": compiled})
 
 
 def test_what_could_hardly_have_failed_is_named_and_is_about_robots_that_nothing_connects(planar):

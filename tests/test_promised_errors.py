@@ -72,7 +72,7 @@ def test_errors_that_were_promised_are_blocks_of_a_page(made, run, tmp_path) -> 
     blocks = promised_errors(run, made, tmp_path / "modal")
     text = write_page(tmp_path / "page.html", "page", [Section("promises", tuple(blocks))]).read_text("utf-8")
     assert text.count("<tr><th scope='row'>") == 2 + 2
-    assert (tmp_path / "modal.png").is_file()
+    assert (tmp_path / "modal.svg").is_file()
 
 
 def test_the_a460_at_rest_falls_in_the_end_at_the_rate_of_theorem_c() -> None:

@@ -21,7 +21,7 @@ the formula does not explain is the power called "other", and is rounding when t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -133,17 +133,19 @@ def lyapunov(result: Result | Replay, experiment: Experiment | None = None) -> L
     """
     run = replay(result, experiment)
     proof = proof_along(run)
-    x, power = run.rows, _power(run, proof)
+    x, summands = run.rows, _summands(run, proof)
+    rates = (*map(_sum, summands), x.storage_rate, *x.stored_rate.T)
+    power = _power(run, proof, rates)
     energy = {"kinetic": 0.5 * _sum(x.s_q * np.matvec(x.M, x.s_q)), "parameter": x.storage}
     energy |= {name: _sum(term) for name, term in proof.energies.items()}
     energy |= dict(zip(run.stored, x.stored.T, strict=True))
     V, V_dot = (np.sum(list(terms.values()), axis=0) for terms in (energy, power))
-    missed, bound = drift(run, _rates(run, proof), V, V_dot)
+    missed, bound = drift(run, rates, V, V_dot)
     return Lyapunov(
         run.result.t,
         {name: term[run.logged] for name, term in energy.items()},
         {name: term[run.logged] for name, term in power.items()},
-        operations(run.loop) * EPS * _magnitude(run, proof)[run.logged],
+        operations(run.loop) * EPS * _magnitude(run, summands)[run.logged],
         missed,
         bound + operations(run.loop) * EPS * float(np.max(V)),
         dict(zip(power, supplied(run, np.stack([*power.values()], axis=1)).tolist(), strict=True)),
@@ -200,20 +202,15 @@ def damping(run: Replay) -> np.ndarray:
     return np.asarray(s * controller.K_r * s)
 
 
-def _rates(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
-    """Time derivatives of the terms of V by the chain rule, (R,) each."""
-    return (*map(_sum, _summands(run, proof)), run.rows.storage_rate, *run.rows.stored_rate.T)
-
-
 def _summands(run: Replay, proof: Proof) -> tuple[np.ndarray, ...]:
-    """The same but for the adaptation's, before they are added up over robots and axes."""
+    """Time derivatives of the terms of V but for the adaptation's, joint by joint or axis by axis."""
     x = run.rows
     s_q_dot = x.a_ref + x.gap + reference_gap(run) - x.v_dot
     return x.s_q * (np.matvec(x.M, s_q_dot) + x.C_s), *proof.rates.values()
 
 
-def _power(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
-    """Terms of V', one value per row; "other" is what the chain rule has beyond those with a name."""
+def _power(run: Replay, proof: Proof, rates: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
+    """Terms of V', one value per row; "other" is what `rates` have beyond those with a name."""
     x, controller = run.rows, run.loop.controller
     s, moved = np.matvec(x.c_inv, x.r), np.matvec(x.J, x.s_q)
     in_task = controller.k_r_space == "task"
@@ -234,9 +231,9 @@ def _power(run: Replay, proof: Proof) -> dict[str, np.ndarray]:
     if not hasattr(controller.law, "proof"):
         power["law"] = -pushed
     elif not is_ideal(controller.network):
-        rates, powers = (sum(map(_sum, terms.values())) for terms in (proof.rates, proof.powers))
-        power["network"] = rates - powers - pushed + _sum(x.s_q * np.matvec(x.M, x.gap))
-    power["other"] = np.sum(_rates(run, proof), axis=0) - np.sum(list(power.values()), axis=0)
+        changes, powers = (sum(map(_sum, terms.values())) for terms in (proof.rates, proof.powers))
+        power["network"] = changes - powers - pushed + _sum(x.s_q * np.matvec(x.M, x.gap))
+    power["other"] = np.sum(rates, axis=0) - np.sum(list(power.values()), axis=0)
     return power
 
 
@@ -248,7 +245,7 @@ def reference_gap(run: Replay) -> np.ndarray:
     return -np.matvec(x.J_inv, np.matvec(x.c_inv, np.matvec(x.c_dot, np.matvec(x.c_inv, x.r))))
 
 
-def _magnitude(run: Replay, proof: Proof) -> np.ndarray:
+def _magnitude(run: Replay, summands: Sequence[np.ndarray]) -> np.ndarray:
     """Sum of the magnitudes of all that is added up to V', from which its rounding follows, (R,)."""
     x, controller = run.rows, run.loop.controller
     condition = np.linalg.norm(x.J, axis=(-2, -1)) * np.linalg.norm(x.J_inv, axis=(-2, -1))
@@ -259,7 +256,7 @@ def _magnitude(run: Replay, proof: Proof) -> np.ndarray:
     coupling = command * np.abs(np.vecmat(x.force, x.c_inv))
     per_robot = condition * (kinetic.sum(axis=-1) + coupling.sum(axis=-1))
     learned = _sum(np.abs(x.s_q) * x.Y_size) + np.abs(x.stored_rate).sum(-1) + np.abs(x.chained).sum(-1)
-    return per_robot.sum(axis=-1) + learned + sum(_sum(np.abs(summand)) for summand in _summands(run, proof))
+    return per_robot.sum(axis=-1) + learned + sum(_sum(np.abs(summand)) for summand in summands)
 
 
 def _sum(term: np.ndarray) -> np.ndarray:

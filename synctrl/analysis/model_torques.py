@@ -33,6 +33,9 @@ class Robots:
         self._forests = forests(robots)
 
     def dynamics(self, q: np.ndarray, v: np.ndarray, s_q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        if len(self._forests) == 1:
+            forest = self._forests[0][1]
+            return forest.mass_matrices(q), forest.coriolis_torque(q, v, s_q)
         M, C_s = np.zeros((*q.shape, q.shape[1])), np.zeros(q.shape)
         for rows, forest in self._forests:
             k = forest.nv
@@ -45,6 +48,16 @@ class Robots:
         for rows, forest in self._forests:
             k = forest.nv
             found[rows, :k] = forest.torque(*(x[rows, :k] for x in (q, v, v_ref, a_ref)))
+        return found
+
+    def accelerations(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
+        """v', (n, nv), under joint torques; valid until the next call."""
+        if len(self._forests) == 1:
+            return self._forests[0][1].acceleration(q, v, tau)
+        found = np.zeros(q.shape)
+        for rows, forest in self._forests:
+            k = forest.nv
+            found[rows, :k] = forest.acceleration(*(x[rows, :k] for x in (q, v, tau)))
         return found
 
 

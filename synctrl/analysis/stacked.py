@@ -30,13 +30,15 @@ from ..robots.parameters import FrictionParameters, FullParameters, LinearParame
 from ..robots.regressors import make_regressors
 from ..robots.robot import Robot
 from ..simulation.closed_loop import ClosedLoop
-from ..simulation.plant import Plant, pinocchio_dynamics
+from ..simulation.plant import Plant
 from ..tasks.measurement import Poses, Positions, Tips
 from ..tasks.pose import PoseSpace
 from ..tasks.spaces import BoundSpace, CartesianSpace, JointSpace
 from .model_torques import Robots
 from .moment import Look
 
+#: joints that Pinocchio is asked for together, where no regressors are; more take longer to put side by side
+JOINTS = 48
 #: numbers in the regressors of the instants that are looked at together
 ENTRIES = 2**20
 _SPACES = JointSpace, CartesianSpace, PoseSpace
@@ -73,15 +75,16 @@ class Stack:
 
     def __init__(self, loop: ClosedLoop):
         cell = loop.cell
-        self.loop, self.copies = loop, max(1, SMALL // sum(robot.nv for robot in cell.robots))
+        joints = sum(robot.nv for robot in cell.robots)
+        self.loop, self.copies, few = loop, max(1, JOINTS // joints), max(1, SMALL // joints)
         self.instants = max(1, ENTRIES // (cell.n * cell.nv * cell.theta.shape[1]))
         self._controller = copy(loop.controller)
         bound: Any = SimpleNamespace(task=self._space(), robots=cell.robots, parameters=cell.parameters)
         self._controller.cell = bound
-        compute = make_regressors(cell.parameters * self.copies, [r.nv for r in cell.robots] * self.copies)
-        vars(self._controller)["_compute_regressors"] = self._over_time(compute)
+        compute = make_regressors(cell.parameters * few, [robot.nv for robot in cell.robots] * few)
+        vars(self._controller)["_compute_regressors"] = over_time(compute, few)
         self._bodies = Robots(cell.robots * self.copies)
-        self._dynamics: dict[tuple[Robot, ...], Callable[..., np.ndarray]] = {}
+        self._dynamics = {cell.robots: over_time(self._bodies.accelerations, self.copies)}
 
     def look(
         self, loop: ClosedLoop, times: np.ndarray, motion: np.ndarray, z: np.ndarray, memory: np.ndarray,
@@ -113,7 +116,7 @@ class Stack:
 
     def torque(self, q: np.ndarray, v: np.ndarray, v_ref: np.ndarray, a_ref: np.ndarray) -> np.ndarray:
         """M a_ref + C v_ref + g, (T, n, nv)."""
-        return self._over_time(self._bodies.torque)(q, v, v_ref, a_ref)
+        return over_time(self._bodies.torque, self.copies)(q, v, v_ref, a_ref)
 
     # -- internals ----------------------------------------------------------------------------------------
 
@@ -137,12 +140,8 @@ class Stack:
     def _accelerations(self, plant: Plant, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
         robots = tuple(plant.robots)
         if robots not in self._dynamics:
-            self._dynamics[robots] = self._over_time(pinocchio_dynamics(robots * self.copies))
+            self._dynamics[robots] = over_time(Robots(robots * self.copies).accelerations, self.copies)
         return self._dynamics[robots](q, v, tau - plant.friction(v) if plant.rubs else tau)
-
-    def _over_time(self, function: Callable[..., np.ndarray]) -> Callable[..., np.ndarray]:
-        """A function of rows of robots that stand there so many times, as one of all instants."""
-        return lambda *arrays: in_blocks(lambda *rows: (function(*rows),), self.copies, *arrays)[0]
 
 
 class _Tips:
@@ -198,3 +197,8 @@ def in_blocks(
         for place, value in zip(found, values, strict=True):
             place[k] = value
     return [x.reshape(-1, n, *x.shape[2:])[:T] for x in found]
+
+
+def over_time(function: Callable[..., np.ndarray], copies: int) -> Callable[..., np.ndarray]:
+    """A function of some instants at a time that gives one array, as one of any number of instants."""
+    return lambda *arrays: in_blocks(lambda *rows: (function(*rows),), copies, *arrays)[0]

@@ -53,7 +53,7 @@ def bodies_section(found: Mapping[str, Consistency], drawn: str, stem: Path) -> 
     Args:
         found: by name of the run.
         drawn: name of the run whose eigenvalues are drawn.
-        stem: the figure is written to `<stem>.svg` and `<stem>.png`.
+        stem: the figure is written to `<stem>.svg`.
     """
     bodies = max(values.shape[1] for each in found.values() for values in each.smallest)
     rows = [row for name, each in found.items() for row in _rows(name, each, bodies)]

@@ -180,7 +180,7 @@ def _share(sizes: Sizes, whole: Sizes) -> str:
 
 
 def fair_section(laws: Comparison, parts: Comparison, stem: Path) -> Section:
-    """Other laws, and the parts of the paper's; the figure is written to `<stem>.svg` and `<stem>.png`."""
+    """Other laws, and the parts of the paper's; the figure is written to `<stem>.svg`."""
     shown = comparison_section(laws, stem, _FAIRNESS)
     apart = (Text(_PARTS), rows_table(parts), Points(parts.sentences))
     return Section(f"Fair comparisons: {laws.title}, {laws.duration:g} s", (*shown.blocks, *apart))

@@ -15,7 +15,7 @@ from .report import Block, Points, Section, Table, Text, as_picture, number
 
 
 def comparison_section(comparison: Comparison, stem: Path, note: str = "") -> Section:
-    """A comparison of laws; its figure is written to `<stem>.svg` and `<stem>.png`."""
+    """A comparison of laws; its figure is written to `<stem>.svg`."""
     caption = (
         "Synchronization error against tracking error. The mark is the rule, the number the law, the colour "
         "the peak torque."

@@ -61,7 +61,7 @@ def after_the_motion(run: Result) -> tuple[np.ndarray, np.ndarray]:
 
 
 def offsets_picture(runs: Mapping[str, Result], stem: Path) -> Picture:
-    """What is left over time, for each cause; written to `<stem>.svg` and `<stem>.png`."""
+    """What is left over time, for each cause; written to `<stem>.svg`."""
     unit, factor = display(runs["left_both"].unit("tracking_error"))
     with style():
         figure, ((panel,),) = new_figure(3.2, width=8.4)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..analysis.metrics import Metrics, metrics, row_names, settling_bands, squared
 from ..show.layout import cell_layout
-from ..show.plots import common_limits, joint_trajectories, sync_errors, tracking_errors
+from ..show.plots import common_limits, joint_trajectories, save, sync_errors, tracking_errors
 from ..show.style import display
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
@@ -29,7 +29,6 @@ from .report import (
     Table,
     Text,
     Verdicts,
-    as_picture,
     number,
 )
 from .wrists import about_wrists
@@ -60,12 +59,21 @@ LAW = (
 )
 
 
-def introduction(claims: Sequence[Claim]) -> Section:
-    """What this page is, the law, and how many of the claims hold."""
+def introduction(claims: Sequence[Claim], runs: Mapping[str, Result]) -> Section:
+    """What this page is, the law, what made the runs, and how many of the claims hold."""
     failed = [claim.text for claim in claims if not claim.holds]
     verdict = " ".join([tally(claims), *(f"Does not hold: “{text}”" for text in failed)])
-    words = (_ABOUT, Formulas(LAW), _SYMBOLS, _COMPUTED, Text(verdict))
+    words = (_ABOUT, Formulas(LAW), _SYMBOLS, _COMPUTED, Text(made_by(runs)), Text(verdict))
     return Section("What is shown here", words)
+
+
+def made_by(runs: Mapping[str, Result]) -> str:
+    """Which engine made which runs, in words."""
+    reference = [name.replace("_", " ") for name, run in runs.items() if run.info["engine"] == "pinocchio"]
+    if len(reference) == len(runs):
+        return f"All runs are made by the reference engine. {_GONE_THROUGH}"
+    those = f"all but {', '.join(reference)}, which the reference engine made" if reference else "all"
+    return f"{_COMPILED} {those}. {_GONE_THROUGH}"
 
 
 _ABOUT = Text(
@@ -82,6 +90,13 @@ _COMPUTED = Text(
     "Every number on this page was computed when the page was made. The metrics and claims are in "
     "metrics.json as well, in SI units, and the runs themselves in the folder runs. A claim of the paper "
     "that does not hold here says so."
+)
+
+_COMPILED = (
+    "Runs are made by the compiled engine, which is the closed loop of the reference engine as generated C:"
+)
+_GONE_THROUGH = (
+    "Certificates do not use it: they go through every run again by Pinocchio, which so judges the C as well."
 )
 
 
@@ -210,7 +225,8 @@ def _compared(folder: Path, first: int, runs: Mapping[str, Result], drawings: Dr
 
 
 def _numbered(folder: Path, k: int, figure: Figure, caption: str) -> Picture:
-    return as_picture(figure, folder / f"figure_{k:02d}", f"Figure {k}. {caption}")
+    _, svg = save(figure, folder / f"figure_{k:02d}")
+    return Picture(svg, f"Figure {k}. {caption}")
 
 
 # -- tables -----------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ EVERY = 4
 
 
 def promised_errors(run: Result, experiment: Experiment, stem: Path) -> list[Block]:
-    """What Theorem B and the tube bound in a run; the figure is written to `<stem>.svg` and `<stem>.png`.
+    """What Theorem B and the tube bound in a run; the figure is written to `<stem>.svg`.
 
     Args:
         run: of the paper's law.

@@ -23,7 +23,7 @@ FACTORS = np.geomspace(0.1, 100.0, 13)
 
 
 def promised_rates(a460: Mapping[str, Result], planar: Mapping[str, Result], stem: Path) -> list[Block]:
-    """What Theorem C says of both cells; the figure is written to `<stem>.svg` and `<stem>.png`.
+    """What Theorem C says of both cells; the figure is written to `<stem>.svg`.
 
     Args:
         a460: runs `left_gravity`, without friction, and `left_both`, with it.

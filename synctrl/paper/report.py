@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..files import reported, write_whole
 from ..renamed import names_elsewhere
 from ..show.panels import ten_to
-from ..show.plots import save, style
+from ..show.plots import save_svg, style
 from ..show.style import display
 from .claims import Claim, Finding
 
@@ -92,9 +92,8 @@ class Picture:
 
 
 def as_picture(figure: Figure, stem: Path, caption: str) -> Picture:
-    """A figure, which is written to `<stem>.svg` and `<stem>.png`, as a picture of the page."""
-    _, svg = save(figure, stem)
-    return Picture(svg, caption)
+    """A figure, which is written to `<stem>.svg`, as a picture of the page."""
+    return Picture(save_svg(figure, stem), caption)
 
 
 @dataclass(frozen=True)

@@ -188,34 +188,30 @@ STIFF = GAINS.replace(Lambda=110.0)
 PEAKS = 1.0
 #: long enough to see what is left of errors after the motion, s
 LONG = 12.0
-_left = partial(PlannedRun, duration=LONG, log_dt=1e-2, engine="compiled")
+_run = partial(PlannedRun, engine="compiled")
+_left = partial(_run, duration=LONG, log_dt=1e-2)
 
 PLANNED: Mapping[str, PlannedRun] = {
-    "a460_pair_synchronized": PlannedRun(a460_pair),
-    "a460_pair_independent": PlannedRun(partial(a460_pair, synchronized=False)),
-    "a460_pair_frictionless": PlannedRun(partial(a460_pair, friction=False), 8.0),
-    "a460_pair_friction_unknown": PlannedRun(a460_pair, 6.0),
-    "a460_pair_friction_adapted": PlannedRun(partial(a460_pair, adapt_friction=True), 6.0),
+    "a460_pair_synchronized": _run(a460_pair),
+    "a460_pair_independent": _run(partial(a460_pair, synchronized=False)),
+    "a460_pair_frictionless": _run(partial(a460_pair, friction=False), 8.0),
+    "a460_pair_friction_unknown": _run(a460_pair, 6.0),
+    "a460_pair_friction_adapted": _run(partial(a460_pair, adapt_friction=True), 6.0),
     "a460_pair_left_both": _left(a460_pair),
     "a460_pair_left_friction": _left(partial(a460_pair, gravity=False)),
     "a460_pair_left_gravity": _left(partial(a460_pair, friction=False)),
     "a460_pair_left_neither": _left(partial(a460_pair, friction=False, gravity=False)),
+    # wrists that PID controllers hold are a plant that is not compiled
     "a460_pair_full": PlannedRun(a460_full_pair),
     "a460_pair_full_alone": PlannedRun(partial(a460_full_pair, synchronized=False)),
-    "planar_four_synchronized": PlannedRun(planar_four),
-    "planar_four_independent": PlannedRun(partial(planar_four, synchronized=False)),
+    "planar_four_synchronized": _run(planar_four),
+    "planar_four_independent": _run(partial(planar_four, synchronized=False)),
     # its balance of V, with an edge of the push, asks for a shorter step than the others
-    "planar_four_synchronized_disturbed": PlannedRun(partial(planar_four, disturbance="torque"), dt=5e-4),
-    "planar_four_independent_disturbed": PlannedRun(
-        partial(planar_four, synchronized=False, disturbance="torque")
-    ),
-    "planar_four_without_k_eps": PlannedRun(
-        partial(planar_four, gains=GAINS.replace(K_eps=0.0)), engine="compiled"
-    ),
-    "planar_four_without_adaptation": PlannedRun(
-        partial(planar_four, gains=GAINS.replace(Gamma=0.0)), engine="compiled"
-    ),
-    "planar_four_stiff": PlannedRun(partial(planar_four, synchronized=False, gains=STIFF), PEAKS),
+    "planar_four_synchronized_disturbed": _run(partial(planar_four, disturbance="torque"), dt=5e-4),
+    "planar_four_independent_disturbed": _run(partial(planar_four, synchronized=False, disturbance="torque")),
+    "planar_four_without_k_eps": _run(partial(planar_four, gains=GAINS.replace(K_eps=0.0))),
+    "planar_four_without_adaptation": _run(partial(planar_four, gains=GAINS.replace(Gamma=0.0))),
+    "planar_four_stiff": _run(partial(planar_four, synchronized=False, gains=STIFF), PEAKS),
 }
 
 #: cells in which MuJoCo judges the plants, none of which has friction

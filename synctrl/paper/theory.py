@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..analysis.certify import Certificate, certify
 from ..show.lyapunov_plots import growth_mark, lyapunov_figure
-from ..show.plots import save
+from ..show.plots import save_svg
 from ..simulation.result import Result
 from .report import Picture, Section, SideBySide, Table, Text, number
 from .reproduction import PLANNED
@@ -63,8 +63,7 @@ def draw_certificate(name: str, certificate: Certificate, folder: Path) -> Path:
     figure = lyapunov_figure(certificate.lyapunov)
     if certificate.growth is not None:
         growth_mark(figure, certificate.growth)
-    _, svg = save(figure, _stem(name, folder))
-    return svg
+    return save_svg(figure, _stem(name, folder))
 
 
 _INTRODUCTION = (

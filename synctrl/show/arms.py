@@ -12,6 +12,7 @@ from ..robots.model import SLIDES, subspace
 from ..robots.robot import Robot
 from ..simulation.result import Result
 from ..tasks.rotations import from_quaternion
+from .meshes import MeshLibrary
 from .nodes import towards
 from .scene import Scene
 from .style import ColorLike, read_color, robot_color
@@ -35,6 +36,7 @@ def arms_scene(
     fps: float,
     caption: str = "",
     colors: Sequence[str] | None = None,
+    meshes: MeshLibrary | None = None,
 ) -> Scene:
     """A scene with the arms of a run; those without shapes as balls and capsules in the colour of the robot.
 
@@ -45,9 +47,10 @@ def arms_scene(
         fps: frames per second.
         caption: a line below the title.
         colors: one for each arm; by default those of its parts.
+        meshes: the mesh files that were read for other scenes.
     """
     title = str(result.info["title"])
-    scene = Scene(fps=fps, title=title[:1].upper() + title[1:], caption=caption)
+    scene = Scene(fps=fps, title=title[:1].upper() + title[1:], caption=caption, meshes=meshes)
     for i, robot in enumerate(robots):
         q = np.array([robot.configuration(row) for row in result.q[frames, i, : robot.nv]])
         visual = robot.visual if has_shapes(robot) else skeleton(robot, robot_color(i))

@@ -15,6 +15,7 @@ from ..simulation.result import Result
 from ..simulation.simulate import Experiment
 from . import arms, carried_scene
 from .legends import pair_colors, pair_symbols
+from .meshes import MeshLibrary
 from .runs import check_run, frame_indices, shown_experiment
 from .scene import Scene
 from .style import DESIRED, read_color, robot_color
@@ -41,6 +42,7 @@ def scene_of(
     bead_error: float | None = None,
     fps: float = FPS,
     package_dirs: Iterable[str | Path] = (),
+    meshes: MeshLibrary | None = None,
 ) -> Scene:
     """The scene of a run: `scene_of(result).write("cell.html")`, or the scene itself in a notebook.
 
@@ -58,19 +60,18 @@ def scene_of(
         bead_error: error of adhesive that is fully red, m; by default the largest of the run.
         fps: frames per second.
         package_dirs: where else than in installed packages meshes of loaded results may be looked for.
+        meshes: mesh files that were read for other scenes.
 
     Raises:
         InputError: nothing to show, or a robot that cannot be made again, by name.
     """
     check_run(result, "x", "x_desired", "sync_error", "q", "disturbance")
-    robots = _robots(result, experiment, package_dirs)
-    frames = frame_indices(result, fps)
-    scene = arms.arms_scene(result, robots, frames, fps)
-    scale = _scale(robots)
-    said = _add_marks(scene, result, robots, frames, limit, scale)
-    said += carried_scene.add_carried(scene, result, robots, frames, force, bead_error, scale)
+    robots, frames = _robots(result, experiment, package_dirs), frame_indices(result, fps)
+    scene, scale = arms.arms_scene(result, robots, frames, fps, meshes=meshes), _scale(robots)
+    marks = _add_marks(scene, result, robots, frames, limit, scale)
+    carried = carried_scene.add_carried(scene, result, robots, frames, force, bead_error, scale)
     arms.add_disturbances(scene, result, robots, frames)
-    scene.caption = " ".join(filter(None, said))
+    scene.caption = " ".join(filter(None, [*marks, *carried]))
     return scene
 
 

@@ -36,6 +36,7 @@ TITLE_SIZE, LABEL_SIZE = 10, 9
 _SIZES: Any = {"axes.titlesize": TITLE_SIZE, "axes.labelsize": LABEL_SIZE, "legend.fontsize": legends.SIZE}
 #: the next levels take twice the time and more for files that are a few kB smaller
 _PNG = {"compress_level": 2}
+_SVG: Any = {"Date": None, "Creator": None}
 
 
 #: held while a thread draws
@@ -85,17 +86,32 @@ def save(figure: Figure, stem: str | Path) -> tuple[Path, Path]:
         ResultError: a file cannot be written.
     """
     png, svg = Path(f"{stem}.png"), Path(f"{stem}.svg")
+    with _writing(figure, stem), whole_file(svg) as vectors, whole_file(png) as pixels:
+        figure.savefig(vectors, format="svg", metadata=_SVG)
+        figure.savefig(pixels, format="png", metadata={"Software": None}, pil_kwargs=_PNG)
+    return png, svg
+
+
+def save_svg(figure: Figure, stem: str | Path) -> Path:
+    """Write a figure as `<stem>.svg` alone, for a page; otherwise as `save`."""
+    svg = Path(f"{stem}.svg")
+    with _writing(figure, stem), whole_file(svg) as vectors:
+        figure.savefig(vectors, format="svg", metadata=_SVG)
+    return svg
+
+
+@contextmanager
+def _writing(figure: Figure, stem: str | Path) -> Iterator[None]:
+    """Arrange a figure once for all of its files, and name them if they cannot be written."""
     try:
-        with style(), whole_file(svg) as vectors, whole_file(png) as pixels:
+        with style():
             if engine := figure.get_layout_engine():
                 engine.execute(figure)
-                figure.set_layout_engine("none")  # it is arranged now, for both files
-            figure.savefig(vectors, format="svg", metadata={"Date": None, "Creator": None})
-            figure.savefig(pixels, format="png", metadata={"Software": None}, pil_kwargs=_PNG)
+                figure.set_layout_engine("none")
+            yield
     except OSError as error:
         reason = error.strerror or str(error)
         raise ResultError(f"cannot write the figure '{stem}': {reason}", file=stem, found=reason) from error
-    return png, svg
 
 
 # -- figures of the paper ---------------------------------------------------------------------------------

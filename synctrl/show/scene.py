@@ -38,12 +38,15 @@ class Scene(Recording, Shown):
         fps: frames per second, at which all samples are taken and played.
         title: heading of the page.
         caption: a line below it.
+        meshes: the mesh files that were read for other scenes; by default none.
 
     Raises:
         InputError: from every method, for a wrong shape, a number that is not finite, or a name given twice.
     """
 
-    def __init__(self, *, fps: float = 30, title: str = "", caption: str = ""):
+    def __init__(
+        self, *, fps: float = 30, title: str = "", caption: str = "", meshes: MeshLibrary | None = None
+    ):
         self.fps = positive_number("fps", fps)
         for what, text in (("title", title), ("caption", caption)):
             instance(what, text, str, "text")
@@ -52,7 +55,7 @@ class Scene(Recording, Shown):
         self._legend: list[tuple[str, str]] = []
         self._remarks: list[str] = []
         self._camera: tuple[np.ndarray, np.ndarray] | None = None
-        self._meshes = MeshLibrary()
+        self._meshes = MeshLibrary() if meshes is None else meshes
 
     # -- what is in it ------------------------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ..simulation.result import Result
 from .carried_scene import largest_bead_error, largest_force
 from .cell_scene import FPS, scene_of
 from .html import page
+from .meshes import MeshLibrary
 from .scene import Scene
 from .shown import Shown
 
@@ -60,9 +62,10 @@ def side_by_side(runs: Mapping[str, Result], *, fps: float = FPS) -> SideBySide:
         instance(f"runs, {name}", run, Result, "a Result")
     limit = max((float(np.linalg.norm(run.sync_error, axis=2).max()) for run in runs.values()), default=0.0)
     force, bead = largest_force(*runs.values()), largest_bead_error(*runs.values())
-    scenes = []
+    alike: Any = {"limit": limit or None, "force": force or None, "bead_error": bead or None}
+    scenes, meshes = [], MeshLibrary()
     for name, run in runs.items():
-        scene = scene_of(run, limit=limit or None, force=force or None, bead_error=bead or None, fps=fps)
+        scene = scene_of(run, **alike, fps=fps, meshes=meshes)
         scene.title = label("name", name)
         scenes.append(scene)
     return SideBySide(", ".join(runs), *scenes)
