@@ -89,7 +89,7 @@ class Compiled:
 class _Steps(Stepper):
     """Steps of one run, with what its recorder keeps and what its agenda and its devices do.
 
-    Where robots stand in lanes the state is there from one call of the library to the next, and the recorder's
+    Where robots stand in lanes the state stays there from one call of the library to the next; the recorder's
     follows when it is asked for.
     """
 

@@ -30,7 +30,7 @@ class DesiredStretch(NamedTuple):
         desired: by the names of quantities, at the k starts and the last end, at the k middles, and at
             whatever ends have rows of their own.
         ends: in which row is what is desired at the end of each step, (k,): that of the next start, unless
-            something jumps there.
+            a desired motion jumps there.
     """
 
     steps: Stretch
@@ -41,11 +41,12 @@ class DesiredStretch(NamedTuple):
 def blocks(program: CompiledLoop, clock: Clock) -> Iterator[DesiredStretch]:
     """The steps of a run, in blocks that fit into memory; all before an instant whose references fail."""
     cell = program.loop.cell
+    breaks = np.array(cell.breaks)
 
     def make(first: int, last: int) -> DesiredStretch:
         stretch = clock.stretch(first, last)
         try:
-            return desired_in(cell, stretch, np.isin(stretch.times[1:], clock.jumps))
+            return desired_in(cell, stretch, np.isin(stretch.times[1:], breaks))
         except Exception:  # of the instant after the last step nothing need be known
             return desired_in(cell, stretch, np.ones(last - first, dtype=bool))
 
@@ -103,8 +104,8 @@ def desired_in(cell: Cell, steps: Stretch, jumps: np.ndarray) -> DesiredStretch:
     Args:
         cell: who desires.
         steps: k of them.
-        jumps: at which ends something may jump, (k,), so that what was before is asked for; if at the last
-            one, nothing is asked at the instant itself.
+        jumps: at which ends a desired motion may jump, (k,), so that what was before is asked for; if at the
+            last one, nothing is asked at the instant itself.
     """
     starts, middles, before = steps.stages
     own = np.flatnonzero(jumps)
