@@ -9,7 +9,7 @@ static void know(const Cell *c, Quantities *a) {
 }
 
 /* Rows of robots or pairs out of their lanes, one after another. */
-static void take_out(const Cell *c, const vec *rows, int count, int length, double *numbers) {
+INSIDE void take_out(const Cell *c, const vec *rows, int count, int length, double *numbers) {
     if (!c->scattered) { for (int j = 0; j < count * length; j++) numbers[j] = lane(rows[j], 0); return; }
     for (int i = 0; i < count; i += LANES, rows += length) {
         const double *from = (const double *)rows;
