@@ -43,8 +43,8 @@ class Batch:
         own: further measures: functions of an `Instant` that give one number, and can be traced.
 
     Raises:
-        InputError: a measure that cannot be traced; the closed loop cannot be generated, or Python has to be asked in the middle of a run: of
-            messages, sensors, actuators or events.
+        InputError: a measure that cannot be traced; the closed loop cannot be generated, or Python has to be
+            asked in the middle of a run: of messages, sensors, actuators or events.
         MissingDependencyError, CompilationError: see `Program`.
     """
 

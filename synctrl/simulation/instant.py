@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 class Instant(NamedTuple):
     """One instant of a run, by the names that a `Result` has for them.
 
-    The entries are numbers, or symbols where the measure is compiled: what is written with arithmetic and with
-    numpy's functions, and asks nothing of the numbers, works for both.
+    The entries are numbers, or symbols where the measure is compiled: what is written with arithmetic and
+    with numpy's functions, and asks nothing of the numbers, works for both.
 
     Attributes:
         x, x_desired, tracking_error, coupled_error: of the task, (n, m).
