@@ -1,4 +1,4 @@
-"""Measures of a user's own: one number of an instant each, traced, compiled and counted up beside the others."""
+"""Measures of a user's own: numbers of an instant, traced, compiled and counted up beside the others."""
 
 from __future__ import annotations
 
