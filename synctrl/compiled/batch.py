@@ -167,9 +167,10 @@ class _Side(Stepper):
         """See `Stepper`; of a block that is kept for all runs once."""
         if not self._tables.keeps(self.program, self.run.clock):
             return super()._read(block)
-        if id(block) not in self._known:
-            self._known[id(block)] = super()._read(block)
-        return self._known[id(block)]
+        first = block.steps.first  # a block that was made anew, after runs that ended early, is the same one
+        if first not in self._known:
+            self._known[first] = super()._read(block)
+        return self._known[first]
 
     def _made(self, times: np.ndarray, marks: np.ndarray) -> None:
         if self._ending.all:
