@@ -16,10 +16,10 @@ goes through these modules:
    driver; `hearing`: what these are told of the network;
 6. `build`, with `compiler`, `process` and `processor`, `cache` and `owners`: from C to a library that is
    loaded;
-7. `program`: library and arrays together (`arrays`), as they stand in `lanes`. Once in every process, before it
-   is used, the library is compared with the reference engine, on the small closed loop of `specimen`;
-8. `engine` again: takes the run through time, block after block of what is desired (`tables`), some steps with
-   every call of `advance` in `driver.c` (`stepper`), which says how it ended (`report`). What is on its
+7. `program`: library and arrays together (`arrays`), as they stand in `lanes`. Once in every process, before
+   it is used, the library is compared with the reference engine, on the small closed loop of `specimen`;
+8. `engine` again: takes the run through time, block after block of what is desired (`tables`), some steps
+   with every call of `advance` in `driver.c` (`stepper`), which says how it ended (`report`). What is on its
    `agenda`, hands that close or open and messages of the network, comes between two calls.
 
 `batch` makes many runs side by side instead, with measures (`measured`, and `own` ones) in place of a log.
