@@ -26,6 +26,9 @@ from .lanes import Lanes, aligned, compared, room, state_parts
 from .plugged import learner
 from .quantities import DESIRED, SLIDE, checked, owned_by, shape
 
+#: dimensions of arrays one after another that do not stand in lanes
+PLAIN = 3
+
 
 class CompiledLoop:
     """A closed loop as a loaded library with its arrays.
@@ -146,20 +149,29 @@ class CompiledLoop:
 
         Args:
             steps: they keep the arrays.
-            arrays: of quantities that change from step to step, by name; one, or several one after another.
+            arrays: of quantities that change from step to step, by name; one, or several one after another,
+                as they are or `ready`.
 
         Raises:
             CompilationError: an array of another shape than generated code reads.
         """
-        for name, array in arrays.items():
-            size, found = prod(shape(name, self._rows)), checked(name, array, self.sizes)
-            several, spread = found.size > prod(shape(name, self.sizes)), None
-            if several and self.lanes.width > 1 and not self.lanes.scattered:
+        for name, found in self.ready(arrays).items():
+            size, spread = prod(shape(name, self._rows)), None
+            if found.ndim == PLAIN:
                 spread = steps.kept.setdefault(f"spread {name}", room(size, self.lanes.width)).ctypes.data
-            else:
-                found = self._packed(name, found)
-            setattr(steps, name, structs.Arrays(found.ctypes.data, size if several else 0, spread))
+            stride = size if len(found) > 1 else 0
+            setattr(steps, name, structs.Arrays(found.ctypes.data, stride, spread))
             steps.kept[name] = found
+
+    def ready(self, arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Arrays as `tell` hands them on: in lanes, (k, rows, columns, lanes), or plain, (k, rows, columns).
+
+        Plain ones are the same for all runs, and are spread over their lanes one after another.
+
+        Raises:
+            CompilationError: an array of another shape than generated code reads.
+        """
+        return {name: self._ready(name, array) for name, array in arrays.items()}
 
     def call(self, function: str, steps: structs.Steps, y: np.ndarray, *others: Any) -> None:
         """Call a function of the driver with its structures, a state, and further arrays or structures."""
@@ -183,6 +195,15 @@ class CompiledLoop:
     def _rows(self) -> dict[str, int]:
         """Sizes, with numbers of rows as the code has them."""
         return self.lanes.sizes(self.sizes)
+
+    def _ready(self, name: str, array: np.ndarray) -> np.ndarray:
+        """See `ready`."""
+        if array.ndim > PLAIN:
+            return array
+        found = checked(name, array, self.sizes)
+        found = found if found.ndim == PLAIN else found[None]
+        shared = self.lanes.width > 1 and not self.lanes.scattered
+        return found if shared and len(found) > 1 else self._packed(name, found)
 
     def _packed(self, name: str, array: np.ndarray) -> np.ndarray:
         return self.lanes.packed(name, array, self.sizes)

@@ -28,7 +28,7 @@ class DesiredStretch(NamedTuple):
     Attributes:
         steps: the k steps.
         desired: by the names of quantities, at the k starts and the last end, at the k middles, and at
-            whatever ends have rows of their own.
+            whatever ends have rows of their own; as they come, or `CompiledLoop.ready`.
         ends: in which row is what is desired at the end of each step, (k,): that of the next start, unless
             a desired motion jumps there.
     """
@@ -46,9 +46,10 @@ def blocks(program: CompiledLoop, clock: Clock) -> Iterator[DesiredStretch]:
     def make(first: int, last: int) -> DesiredStretch:
         stretch = clock.stretch(first, last)
         try:
-            return desired_in(cell, stretch, np.isin(stretch.times[1:], breaks))
+            block = desired_in(cell, stretch, np.isin(stretch.times[1:], breaks))
         except Exception:  # of the instant after the last step nothing need be known
-            return desired_in(cell, stretch, np.ones(last - first, dtype=bool))
+            block = desired_in(cell, stretch, np.ones(last - first, dtype=bool))
+        return block._replace(desired=program.ready(block.desired))
 
     length = min(BLOCK_STEPS, max(1, BLOCK_BYTES // _step_bytes(cell)))
     for first, last in clock.stretches(length):
@@ -82,7 +83,7 @@ class Tables:
         parts = [cell.coupling, type(cell.space), *(member.trajectory for member in cell.members)]
         known, instants, kept = self._kept
         same = len(parts) == len(known) and all(map(operator.is_, parts, known))
-        asked = clock, clock.every, tuple(cell.clocks.tolist())
+        asked = clock, clock.every, tuple(cell.clocks.tolist()), program.lanes
         if same and instants == asked:
             return kept
         return self._keep(parts, asked, blocks(program, clock))
