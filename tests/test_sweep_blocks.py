@@ -106,6 +106,7 @@ SWEEPS = {
         ),
         8,
     ),
+    "groups of one": (lambda: sweep([weights(Uniform(1, 2)), gain("beta", Uniform(1, 2))], 3), 0),
     "laws": (
         lambda: sweep(
             [law(Grid([SunMills(), SunMills(reference_acceleration="paper")])), gain("beta", Uniform(1, 2))],

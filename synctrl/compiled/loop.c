@@ -24,7 +24,7 @@ static void place(const Cell *c, Quantities *a, const vec *y, vec *y_dot) {
 }
 
 /* A row of arrays; what all lanes share is spread over them. */
-static vec *at_row(const Arrays *x, long row) {
+INSIDE vec *at_row(const Arrays *x, long row) {
     if (!x->spread) return x->values + row * x->stride;
     const double *shared = (const double *)x->values + row * x->stride;
     for (long j = 0; j < x->stride; j++) x->spread[j] = splat(shared[j]);

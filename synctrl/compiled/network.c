@@ -9,7 +9,7 @@
  */
 
 /* A coordinate of the rows of robots, or pairs, that a term speaks of: one row per lane, see `Cell`. */
-static vec fetch(const Cell *c, const vec *rows, const int *places) {
+INSIDE vec fetch(const Cell *c, const vec *rows, const int *places) {
     const double *numbers = (const double *)rows;
     return c->scattered ? gather(numbers, places) : load(numbers + places[0]);
 }

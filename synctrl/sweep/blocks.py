@@ -64,6 +64,8 @@ class Blocks:
             groups.setdefault(tuple(task.values[k] for k in self._apart), []).append(task)
         found: dict[int, Outcome] = {}
         for shared, group in groups.items():
+            if self._apart and len(group) == 1:  # a base run of its own costs more than the run
+                continue
             try:
                 found |= self._group(shared, group)
             except SynctrlError:  # made one by one, each of them says why
