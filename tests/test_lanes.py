@@ -266,9 +266,7 @@ def test_a_robot_that_meets_a_singular_configuration_is_named(which):
         robot = load_robot("planar2r")
         q0 = np.array([0.3, 1e-2 if i in which else 1.2])
         v0 = np.array([0.0, -3.0 if i in which else 0.0])
-        return Member(
-            robot, Hold(robot.tip_position(q0)[:2]), q0, v0, theta_hat0=0.5 * robot.inertial_parameters
-        )
+        return Member(robot, Hold(robot.tip_position(q0)[:2]), q0, v0, theta_hat0=robot.inertial_parameters)
 
     gentle = Gains(Lambda=0.1, beta=0.1, K_r=0.1, K_eps=0.1, Gamma=1e-3)
     experiment = each(arms(5, gains=gentle), change)

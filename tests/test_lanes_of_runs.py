@@ -25,6 +25,7 @@ __all__ = ["cache"]  # the same code in the same cache
 BANDS = {"tracking_error": 1e-3, "sync_error": 5e-4}
 #: runs in a test: no multiple of a number of lanes above 1
 COUNT = 5
+GAINS = "Lambda", "beta", "K_eps", "K_r", "Gamma"
 
 
 class Told(NamedTuple):
@@ -50,16 +51,16 @@ class Told(NamedTuple):
         return {name: array[k] for name, array in self.columns.items()}, len(range(COUNT)[k])
 
     def experiment_of(self, k: int) -> Experiment:
-        """The experiment of a run that has its own Gamma, q or v."""
-        experiment, cell = self.experiment, self.experiment.cell
-        starts = [
-            self.columns[name][k] if name in self.columns else getattr(cell, f"{name}0") for name in "qv"
+        """The experiment of one of them, which has its own gains, q, v or z."""
+        cell, own = self.experiment.cell, {name: column[k] for name, column in self.columns.items()}
+        gains = {name: array[0] if len(array) == 1 else array for name, array in own.items() if name in GAINS}
+        starts = {"q": cell.q0, "v": cell.v0, "z": cell.theta_hat0, **own}
+        members = [
+            replace(member, q0=q, v0=v, theta_hat0=z)
+            for member, q, v, z in zip(cell.members, *(starts[name] for name in "qvz"), strict=True)
         ]
-        members = [replace(member, q0=q, v0=v) for member, q, v in zip(cell.members, *starts, strict=True)]
-        gains = experiment.gains
-        if "Gamma" in self.columns:
-            gains = gains.replace(Gamma=self.columns["Gamma"][k])
-        return replace(experiment, cell=Cell(members, cell.coupling, cell.space), gains=gains)
+        changed = Cell(members, cell.coupling, cell.space)
+        return replace(self.experiment, cell=changed, gains=self.experiment.gains.replace(**gains))
 
 
 def told(make: Callable[[], Experiment], *names: str, **options) -> Told:
@@ -84,12 +85,15 @@ def told(make: Callable[[], Experiment], *names: str, **options) -> Told:
         column = np.repeat(planned[name][None], COUNT, axis=0)
         column[1:] *= rng.uniform(0.9, 1.1, (COUNT - 1, *(1,) * planned[name].ndim))
         columns[name] = column
+    if "v" in names:
+        columns["v"][1:] += rng.uniform(-3, 3, columns["v"][1:].shape)
     return Told(experiment, {"duration": 0.012, **options}, columns)
 
 
 RUNS: dict[str, Callable[[], Told]] = {
     "gains": partial(told, partial(arms, 3), "Lambda", "beta", "K_eps", "K_r", "Gamma"),
     "starts": partial(told, partial(arms, 3), "q", "v", "z"),
+    "starts, sampled": partial(told, partial(arms, 3), "q", "v", "z", control_period=3e-3),
     "loads and pushes": partial(told, loaded, "pi", "disturbance"),
     "loads and pushes, sampled": partial(told, loaded, "pi", "disturbance", control_period=2e-3, log_dt=4e-3),
     "nothing": partial(told, loaded),
@@ -141,6 +145,18 @@ def measures_of(run: Outcome) -> dict[str, np.ndarray]:
         parts = "peak", "ise", "settling_time", "final"
         found |= {f"{kind} {part}": getattr(metrics, part) for part in parts}
     return {**found, "peak_torque": np.abs(run.arrays["tau"]).max(axis=0)}
+
+
+@pytest.mark.parametrize("k", [1, 4])
+@pytest.mark.parametrize("name", ["gains", "starts", "starts, sampled"])
+def test_a_column_is_what_an_experiment_of_its_own_would_have(name, k):
+    those = RUNS[name]()
+    logged = in_lanes(those.experiment_of(k), 4, **those.options)
+    found = numbers(those.batch(4).measure(those.columns, COUNT))
+    for part, expected in measures_of(logged).items():
+        np.testing.assert_array_equal(found[part][k], expected, err_msg=part)
+    error, speed, time = found["step_error"][k]
+    assert (error / speed, time) == (logged.info["step_error"]["estimate"], logged.info["step_error"]["time"])
 
 
 @pytest.mark.parametrize("width", [1, 4])
