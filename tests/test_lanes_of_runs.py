@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from refusals import refused
 from side_by_side import WIDTHS, Outcome, in_lanes
 from test_lanes import arms, cache, cut, damped, learning, loaded, moving, rubbing
 
@@ -18,6 +19,7 @@ from synctrl.compiled.batch import Batch, Measured
 from synctrl.compiled.stepper import found_check
 from synctrl.control.adaptation import Natural
 from synctrl.errors import InputError, NonFiniteError, SingularJacobianError
+from synctrl.experiments import planar_four
 
 pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
 
@@ -256,3 +258,38 @@ def test_what_runs_have_no_column_for_is_refused():
     for name in ("tau", "nonsense", "desired"):
         with pytest.raises(InputError):
             batch.measure({name: np.zeros((1, 2, 2))}, 1)
+
+
+# -- what is refused --------------------------------------------------------------------------------------
+
+
+def test_no_run_and_columns_that_code_would_not_read_are_refused_by_name():
+    batch = Batch(planar_four().plan(0.01, 1e-3), {"tracking_error": 0.01, "sync_error": 0.01})
+    with refused(InputError, "count", found=0):
+        batch.measure({}, 0)
+    for name in ("base", "true_base", "viscous", "coulomb", "smoothing", "tau"):
+        with refused(InputError, "columns", found=name):
+            batch.measure({name: np.zeros((1, 1))}, 1)
+
+
+def test_own_measures_have_the_same_bits_in_any_number_of_lanes():
+    own = [lambda at: np.sum(at.v * at.v), lambda at: np.sum(at.tau * at.v), lambda at: at.x[0, 0]]
+    bands, Lambda = {"tracking_error": 0.01, "sync_error": 0.01}, np.linspace(5.0, 9.0, 5)
+    columns = {"Lambda": np.repeat(Lambda[:, None, None], 2, axis=2)}
+    found = [
+        Batch(planar_four().plan(0.05, 1e-3), bands, {}, width, own).measure(columns, 5).own
+        for width in (1, 2, 4, 8)
+    ]
+    assert found[0].shape == (5, 3, 3)
+    assert len(np.unique(found[0][:, 0, 1])) == 5
+    for other in found[1:]:
+        np.testing.assert_array_equal(other, found[0])
+
+
+@pytest.mark.parametrize(
+    "value", [lambda at: 1.0 if at.v[0, 0] > 0 else 0.0, lambda at: at.v, lambda at: at.speed]
+)
+def test_own_measures_that_cannot_be_traced_are_refused_by_number(value):
+    bands = {"tracking_error": 0.01, "sync_error": 0.01}
+    with refused(InputError, "own measure 1"):
+        Batch(planar_four().plan(0.01, 1e-3), bands, own=[lambda at: at.x[0, 0], value])

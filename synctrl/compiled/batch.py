@@ -14,6 +14,7 @@ from time import perf_counter
 
 import numpy as np
 
+from ..checks import count as at_least_one
 from ..errors import InputError
 from ..simulation.engines import Run
 from . import processor, structs
@@ -30,6 +31,9 @@ from .report import Ending, Worst
 from .stepper import Pace, Stepper, Told
 from .structs import Mark
 from .tables import DesiredStretch, Tables
+
+#: where robots stand is a part of the code where all of a kind are turned alike
+PLACES = "base", "true_base"
 
 
 class Batch:
@@ -79,7 +83,8 @@ class Batch:
         Raises:
             InputError: something that no run has a column for, or an array of another shape.
         """
-        arrays = {name: self._checked(name, array, count) for name, array in columns.items()}
+        runs = at_least_one("count", count)
+        arrays = {name: self._checked(name, array, runs) for name, array in columns.items()}
         width, parts = self._program.lanes.width, list[Seen]()
         for first in range(0, count, width):
             chosen = np.minimum(np.arange(first, first + width), count - 1)
@@ -95,6 +100,9 @@ class Batch:
         """A column of the right shape."""
         if name not in QUANTITIES or QUANTITIES[name].owner not in ("cell", "state", "load", "disturbance"):
             raise InputError.expected("a quantity that runs have from their start", name, "columns")
+        rubbing = () if self._run.loop.plant.rubs else ("viscous", "coulomb", "smoothing")
+        if name in (*PLACES, *rubbing):
+            raise InputError.expected("a quantity that code made for the planned run reads", name, "columns")
         expected: tuple[int, ...] = shape(name, self._program.sizes)
         if name == "pi":
             expected = self._program.parameters.shape
