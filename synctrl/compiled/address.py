@@ -16,6 +16,7 @@ def _address(written: str) -> type[Address]:
 
 
 Doubles, Ints, Chars = map(_address, ("double *", "int *", "char *"))
+Anything = _address("void *")
 #: numbers of all lanes
 Vectors = _address("vec *")
 #: a function in Python that the driver calls: time, the middle of the step, whether a sample falls on it -> 0

@@ -122,11 +122,11 @@ class CompiledLoop:
             self._arrays[name][...] = self._packed(name, array)
 
     def reset(self) -> None:
-        """Give all runs the constants of the loop again, after `put`."""
+        """Give all runs the constants of the loop again, after `put`, and nothing that was computed."""
         for name in self._own:
             self._arrays[name][...] = self._packed(name, self.constants[name])
         self._own.clear()
-        for part in self._scratch:
+        for part in (*self._scratch, *map(self._arrays.__getitem__, owned_by("work"))):
             part[...] = 0
 
     def put(self, name: str, array: np.ndarray) -> None:

@@ -9,7 +9,7 @@ beside it, nor on how many lanes there are.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from time import perf_counter
 
 import numpy as np
@@ -23,6 +23,7 @@ from .known import check_known
 from .lanes import room, state_parts
 from .measured import Measured as Measured
 from .measured import Seen, joined
+from .own import Value, own_library
 from .program import library_for
 from .quantities import QUANTITIES, shape
 from .report import Ending, Worst
@@ -39,10 +40,11 @@ class Batch:
         bands: settling bands by kind of error, one for all coordinates or (m,).
         libraries: libraries that are loaded already, by what they were made for.
         width: number of lanes; by default as many as the machine has.
+        own: further measures: functions of an `Instant` that give one number, and can be traced.
 
     Raises:
-        InputError: the closed loop cannot be generated, or Python has to be asked in the middle of a run: of
-            messages, sensors, actuators or events.
+        InputError: a measure that cannot be traced; the closed loop cannot be generated, or Python has to be
+            asked in the middle of a run: of messages, sensors, actuators or events.
         MissingDependencyError, CompilationError: see `Program`.
     """
 
@@ -52,13 +54,18 @@ class Batch:
         bands: Mapping[str, float | np.ndarray],
         libraries: dict[str, ctypes.CDLL] | None = None,
         width: int | None = None,
+        own: Sequence[Value] = (),
     ):
         check_known(run.loop)
         _check_alone(run)
         classified, known = classify(run.loop), {} if libraries is None else libraries
-        library = library_for(run.loop, classified, known, processor.widest() if width is None else width)
+        lanes = processor.widest() if width is None else width
+        library = library_for(run.loop, classified, known, lanes)
         self._run, self._program = run, CompiledLoop(run.loop, classified, library)
-        self._side = _Side(self._program, run, bands)
+        self._side = _Side(self._program, run, bands, len(own))
+        if own:
+            self._own = own_library(own, classified.kinds, self._program.sizes, lanes)
+            self._side.count_up(self._own)
 
     def measure(self, columns: Mapping[str, np.ndarray], count: int) -> Measured:
         """Make some runs.
@@ -102,16 +109,20 @@ class Batch:
 class _Side(Stepper):
     """Runs in the lanes of the library, from their start to their end; then others, with the same memory."""
 
-    def __init__(self, program: CompiledLoop, run: Run, bands: Mapping):
+    def __init__(self, program: CompiledLoop, run: Run, bands: Mapping, own: int):
         super().__init__(program, run)
         self._tables, self._pace = Tables(), Pace()
         self._y, self._ending = program.packed_state(run.loop.initial_state()), Ending(program.lanes.width)
         self._worst, self._logged = Worst(program, run.loop.cell.v0), list[np.ndarray]()
         self._stop = np.zeros(program.lanes.width)
-        self._tally, self._kept = _tally(program, bands)
+        self._tally, self._kept = _tally(program, bands, own)
         self.steps.tally = ctypes.addressof(self._tally)
         self._known: dict[int, Told] = {}
         self._start = self._y.copy(), {name: array.copy() for name, array in self._kept.items()}
+
+    def count_up(self, library: ctypes.CDLL) -> None:
+        """Have the measures of a library counted up too."""
+        self._tally.own = ctypes.cast(library.own, ctypes.c_void_p).value
 
     def begin(self) -> None:
         """Go back to the start, with the numbers of the planned run."""
@@ -156,9 +167,10 @@ class _Side(Stepper):
         """See `Stepper`; of a block that is kept for all runs once."""
         if not self._tables.keeps(self.program, self.run.clock):
             return super()._read(block)
-        if id(block) not in self._known:
-            self._known[id(block)] = super()._read(block)
-        return self._known[id(block)]
+        first = block.steps.first  # a block that was made anew, after runs that ended early, is the same one
+        if first not in self._known:
+            self._known[first] = super()._read(block)
+        return self._known[first]
 
     def _made(self, times: np.ndarray, marks: np.ndarray) -> None:
         if self._ending.all:
@@ -205,7 +217,7 @@ def _check_alone(run: Run) -> None:
         )
 
 
-def _tally(program: CompiledLoop, bands: Mapping) -> tuple[structs.Tally, dict[str, np.ndarray]]:
+def _tally(program: CompiledLoop, bands: Mapping, own: int) -> tuple[structs.Tally, dict[str, np.ndarray]]:
     """What the library counts up, and the arrays by name."""
     sizes, width = program.sizes, program.lanes.width
     rows = {"tracking": ("n", "m"), "sync": ("p", "m"), "torque": ("n", "nv")}
@@ -224,4 +236,8 @@ def _tally(program: CompiledLoop, bands: Mapping) -> tuple[structs.Tally, dict[s
         for kind in ("tracking", "sync")
     ]
     torque = {name: kept[f"torque {name}"].ctypes.data for name in ("torque", "cut")}
-    return structs.Tally(*errors, **torque), kept
+    names = "now", "before", "largest", "integral"
+    kept |= {f"own {name}": room(own, width) for name in names}
+    kept["own largest"][...] = -np.inf
+    numbers = {name: kept[f"own {name}"].ctypes.data for name in names}
+    return structs.Tally(*errors, **torque, **numbers, count=own), kept

@@ -83,6 +83,20 @@ def written(function: Any) -> str:
     return f"{declared_function(function.name())} {{\n{body}}}\n"
 
 
+def written_own(function: Any) -> str:
+    """A function of the quantities of all robots in C, which writes its numbers where it is told.
+
+    Args:
+        function: a CasADi function of SX whose arguments are quantities, all of their rows, with one result.
+
+    Raises:
+        CompilationError: see `written`.
+    """
+    rows = [f"const vec *const in{k} = a->{function.name_in(k)};" for k in range(function.n_in())]
+    body = "".join(f"    {line}\n" for line in (*rows, *_instructions(function)))
+    return f"void {function.name()}(const Quantities *a, vec *restrict out0) {{\n{body}}}\n"
+
+
 # -- internals --------------------------------------------------------------------------------------------
 
 

@@ -24,9 +24,12 @@ class Measured(NamedTuple):
         tracking_error, sync_error: of the errors; NaN, as torque and cut, in a run that ended early.
         peak_torque: largest torque that was asked for, (runs, n, nv), N·m or N.
         cut: at how many instants it was larger than the limit, (runs, n, nv).
+        own: of every further measure the largest number, the integral over time and the last number,
+            (runs, measures, 3); NaN in a run that ended early.
         step_error: error of the worst step and the largest velocity, in rad/s, and the end of that step, s,
-            (runs, 3); see `StepError`.
-        joint: in a row of all robots' joints, at which it was, (runs,); -1 if no step was looked at.
+            (runs, 3); see `StepError`. NaN in a run that ended early.
+        joint: in a row of all robots' joints, at which it was, (runs,); -1 if no step was looked at, or the
+            run ended early.
         status: 0 of a run that went to its end, else what the guard found, see `stepper.found_check`,
             (runs,).
         stop_time: when it ended, s, (runs,).
@@ -38,6 +41,7 @@ class Measured(NamedTuple):
     sync_error: MeasuredErrors
     peak_torque: np.ndarray
     cut: np.ndarray
+    own: np.ndarray
     step_error: np.ndarray
     joint: np.ndarray
     status: np.ndarray
@@ -75,15 +79,16 @@ def joined(parts: Sequence[Seen], count: int) -> Measured:
     worst = one(part.worst for part in parts)
     times = max((part.times for part in parts), key=len)
     tally = {name: one(part.tally[name] for part in parts) for name in parts[0].tally}
-    for array in tally.values():
+    for array in (*tally.values(), worst[:, :3]):
         array[status != 0] = np.nan  # of a run that ended early nothing is known
     return Measured(
         tracking_error=_errors("tracking", tally, times),
         sync_error=_errors("sync", tally, times),
         peak_torque=tally["torque torque"],
         cut=tally["torque cut"],
+        own=np.stack([tally[f"own {name}"] for name in ("largest", "integral", "before")], axis=-1),
         step_error=worst[:, :3],
-        joint=worst[:, 3].astype(int),
+        joint=np.where(status != 0, -1, worst[:, 3]).astype(int),
         status=status.astype(int),
         stop_time=stop_time,
         robot=robot.astype(int),

@@ -31,19 +31,32 @@ static void record(const Cell *c, Quantities *a, long row, const Log *log) {
 }
 
 /* What is measured of errors: largest, integral of the square by the trapezoidal rule, last instant outside a band. */
-static void measure_errors(const vec *e, int rows, double half, long row, Errors *x) {
+static void measure_errors(const vec *e, int rows, double span, long row, Errors *x) {
     for (int i = 0, j = 0; i < rows; i++)
         for (int k = 0; k < m; k++, j++) {
             vec size = v_fabs(e[j]), square = e[j] * e[j];
             x->peak[j] = choose(is_less(x->peak[j], size), size, x->peak[j]);
-            x->ise[j] += splat(half) * (square + x->square[j]) / splat(2);
+            x->ise[j] += splat(span) * (square + x->square[j]) / splat(2);
             x->outside[j] = choose(is_less(x->band[k], size), splat(row), x->outside[j]);
             x->square[j] = square;
             x->final[j] = e[j];
         }
 }
 
-/* Measures of all runs at one instant, which is row number `row` of a log. */
+/* Numbers of a user's own at one instant. */
+typedef void Own(const Quantities *a, vec *numbers);
+
+/* What is made of them: the largest, and the integral by the trapezoidal rule. */
+static void measure_own(const Quantities *a, double span, Tally *x) {
+    ((Own *)x->own)(a, x->now);
+    for (long k = 0; k < x->count; k++) {
+        x->largest[k] = choose(is_less(x->largest[k], x->now[k]), x->now[k], x->largest[k]);
+        x->integral[k] += splat(span) * (x->now[k] + x->before[k]) / splat(2);
+        x->before[k] = x->now[k];
+    }
+}
+
+/* Measures of all runs at one instant. */
 static void tally(const Cell *c, const Quantities *a, double t, Tally *x) {
     double span = x->rows ? t - x->t : 0;
     measure_errors(a->e, c->n, span, x->rows, &x->tracking);
@@ -53,6 +66,7 @@ static void tally(const Cell *c, const Quantities *a, double t, Tally *x) {
         x->torque[j] = choose(is_less(x->torque[j], size), size, x->torque[j]);
         x->cut[j] += cut;
     }
+    if (x->own) measure_own(a, span, x);
     x->t = t;
     x->rows++;
 }

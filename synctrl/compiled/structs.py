@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .address import Address, Callbacks, Chars, Doubles, Ints, Vectors
+from .address import Address, Anything, Callbacks, Chars, Doubles, Ints, Vectors
 from .hearing import Exchange
 from .quantities import LOGS, QUANTITIES, owned_by
 
@@ -91,12 +91,17 @@ class Tally(ctypes.Structure):
         tracking, sync: of the errors.
         torque, cut: largest torque that was asked for, and at how many instants it was more than the limit,
             (n, nv).
+        own, count: the function of a user's own measures, or 0, and how many these are.
+        now, before, largest, integral: its numbers, those of the instant before, and what is made of them.
         t, rows: the last instant, s, and how many there were.
     """
 
     _fields_ = [
         *((name, Errors) for name in ("tracking", "sync")),
         *((name, Vectors) for name in ("torque", "cut")),
+        ("own", Anything),
+        ("count", ctypes.c_long),
+        *((name, Vectors) for name in ("now", "before", "largest", "integral")),
         ("t", ctypes.c_double),
         ("rows", ctypes.c_long),
     ]

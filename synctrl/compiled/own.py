@@ -1,0 +1,90 @@
+"""Measures of a user's own: numbers of an instant, traced, compiled and counted up beside the others."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import CompilationError, InputError
+from ..simulation.instant import Instant
+from .build import cached_library, content_key, require_casadi
+from .emit import written_own
+from .header import prelude
+from .kind import Kind
+from .quantities import LOGS, shape
+
+#: a number of an instant
+Value = Callable[[Instant], Any]
+
+
+def own_function(values: Sequence[Value], sizes: Mapping[str, int]) -> Any:
+    """A CasADi function of the quantities of all robots: one number per measure.
+
+    Args:
+        values: the measures.
+        sizes: of the cell.
+
+    Raises:
+        InputError: one of them cannot be traced, or gives something else than one number.
+    """
+    import casadi as ca
+
+    given = {name: ca.SX.sym(name, int(np.prod(shape(LOGS[name], sizes)))) for name in Instant._fields}
+    instant = Instant(
+        **{name: _array(given[name]).reshape(shape(LOGS[name], sizes)) for name in Instant._fields}
+    )
+    found = [ca.SX(_traced(k, value, instant)) for k, value in enumerate(values)]
+    names = [LOGS[name] for name in Instant._fields]
+    return ca.Function("own", [*given.values()], ca.cse([ca.vertcat(*found)]), names, ["numbers"])
+
+
+def own_library(
+    values: Sequence[Value], kinds: list[Kind], sizes: Mapping[str, int], width: int
+) -> ctypes.CDLL:
+    """The measures of a cell as a library with the function `own`, found or built.
+
+    Args:
+        values: the measures.
+        kinds: kinds of its robots.
+        sizes: of the cell.
+        width: number of lanes.
+
+    Raises:
+        InputError: see `own_function`.
+        MissingDependencyError, CompilationError: see `cached_library`.
+    """
+    source = prelude(kinds, width) + written_own(own_function(values, sizes))
+    key = content_key("own measures", source, require_casadi())
+    return cached_library(key, lambda: iter([source]), _check)
+
+
+# -- internals --------------------------------------------------------------------------------------------
+
+
+def _array(column: Any) -> np.ndarray:
+    """The entries of a column of symbols."""
+    found = np.empty(column.numel(), dtype=object)
+    for k in range(column.numel()):
+        found[k] = column[k]
+    return found
+
+
+def _traced(k: int, value: Value, instant: Instant) -> Any:
+    """The number that a measure makes of symbols."""
+    try:
+        found = np.asarray(value(instant), dtype=object)
+    except Exception as error:
+        raise InputError(
+            f"it cannot be traced with symbols: {type(error).__name__}: {error}", subject=f"own measure {k}"
+        ) from error
+    if found.size != 1:
+        raise InputError.expected("one number", found.shape, f"own measure {k}")
+    return found.item()
+
+
+def _check(library: ctypes.CDLL) -> None:
+    if not hasattr(library, "own"):
+        raise CompilationError("the library was made from other code", subject="own measures")
