@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
+from warnings import catch_warnings, filterwarnings
 
 import numpy as np
 
@@ -36,7 +37,7 @@ def own_function(values: Sequence[Value], sizes: Mapping[str, int]) -> Any:
     instant = Instant(
         **{name: _array(given[name]).reshape(shape(LOGS[name], sizes)) for name in Instant._fields}
     )
-    found = [ca.SX(_traced(k, value, instant)) for k, value in enumerate(values)]
+    found = [_traced(k, value, instant) for k, value in enumerate(values)]
     names = [LOGS[name] for name in Instant._fields]
     return ca.Function("own", [*given.values()], ca.cse([ca.vertcat(*found)]), names, ["numbers"])
 
@@ -74,15 +75,20 @@ def _array(column: Any) -> np.ndarray:
 
 def _traced(k: int, value: Value, instant: Instant) -> Any:
     """The number that a measure makes of symbols."""
+    import casadi as ca
+
     try:
-        found = np.asarray(value(instant), dtype=object)
+        with catch_warnings():
+            filterwarnings("ignore", r"\s*casadi: a numpy function", FutureWarning)
+            found = np.asarray(value(instant), dtype=object)
+        number = ca.SX(found.item()) if found.size == 1 else None
     except Exception as error:
         raise InputError(
             f"it cannot be traced with symbols: {type(error).__name__}: {error}", subject=f"own measure {k}"
         ) from error
-    if found.size != 1:
+    if number is None:
         raise InputError.expected("one number", found.shape, f"own measure {k}")
-    return found.item()
+    return number
 
 
 def _check(library: ctypes.CDLL) -> None:
