@@ -15,6 +15,7 @@ from ..checks import choice, label
 from ..errors import InputError, SweepError, SynctrlError
 from ..simulation.instant import Instant
 from ..simulation.result import Result
+from ..simulation.simulate import Experiment
 from .measures import Measure
 
 #: how the numbers of all instants become one, in words
@@ -109,8 +110,8 @@ class OwnMeasure:
 class OwnMeasures:
     """The measures of a user's own that the runs of a sweep have.
 
-    Of runs of the compiled engine they are found as its libraries find them: by the operations of the traced
-    functions, one after another. The bits are the same, but for the last ones of sines and the like.
+    Runs of the compiled engine are asked by the library that takes the measures of runs side by side, if all
+    functions can be traced: the bits are the same. Others are asked instant by instant.
 
     Args:
         measures: the measures.
@@ -119,30 +120,39 @@ class OwnMeasures:
 
     def __init__(self, measures: Sequence[OwnMeasure], engine: str):
         self._measures, self._engine = measures, engine
-        self._traced: dict[tuple[tuple[int, ...], ...], Any] = {}
+        self._known: dict[tuple[tuple[int, ...], ...], Any] = {}
 
-    def of(self, result: Result) -> list[float | None]:
+    def of(self, result: Result, experiment: Experiment) -> list[float | None]:
         """The measures of a run.
+
+        Args:
+            result: the run.
+            experiment: that was run.
 
         Raises:
             SweepError: a function fails, or returns something else than one number.
         """
-        traced = self._function(result) if self._measures and self._engine == "compiled" else None
-        if traced is None:
+        compiled = self._measures and self._engine == "compiled"
+        numbers = self._numbers(result, experiment) if compiled else None
+        if numbers is None:
             return [measure.of(result) for measure in self._measures]
-        count = len(result.t)
-        columns = (getattr(result, name).reshape(count, -1).T for name in Instant._fields)
-        rows = traced.map(count)(*columns).full().reshape(-1, count)
+        rows = numbers.of(Instant(*(getattr(result, name) for name in Instant._fields)))
         return [kept(own.over, result.t, row) for own, row in zip(self._measures, rows, strict=True)]
 
     # -- internals ----------------------------------------------------------------------------------------
 
-    def _function(self, result: Result) -> Any:
-        """The traced functions for a cell of the size of a run's; None if they cannot be traced."""
+    def _numbers(self, result: Result, experiment: Experiment) -> Any:
+        """The library for a cell of the size of a run's; None if there is none, made once."""
         shapes = tuple(getattr(result, name).shape[1:] for name in Instant._fields)
-        if shapes not in self._traced:
-            self._traced[shapes] = _traced([own.value for own in self._measures], _sizes(result))
-        return self._traced[shapes]
+        if shapes not in self._known:
+            from ..compiled.own import OwnNumbers
+
+            try:
+                found = OwnNumbers([own.value for own in self._measures], experiment.closed_loop())
+            except SynctrlError:
+                found = None
+            self._known[shapes] = found
+        return self._known[shapes]
 
 
 def own_of_all(measures: Sequence[OwnMeasure], measured: Any, span: float) -> list[list[float | None]]:
@@ -155,11 +165,10 @@ def own_of_all(measures: Sequence[OwnMeasure], measured: Any, span: float) -> li
     """
     if not measures:
         return [[] for _ in measured.status]
-    largest, integral, final = np.moveaxis(measured.own, -1, 0)
-    found = {"largest": largest, "mean": integral / span, "integral": integral, "final": final}
+    found = _made(*np.moveaxis(measured.own, -1, 0), span)
     return [
         [finite_or_none(found[own.over][run, k]) for k, own in enumerate(measures)]
-        for run in range(len(largest))
+        for run in range(len(measured.own))
     ]
 
 
@@ -174,14 +183,10 @@ def kept(over: str, t: np.ndarray, numbers: np.ndarray) -> float | None:
         numbers: one of each.
     """
     with np.errstate(all="ignore"):
-        if over == "largest":
-            return finite_or_none(numbers.max())
-        if over == "final":
-            return finite_or_none(numbers[-1])
-        areas = np.zeros(len(t))
-        areas[1:] = np.diff(t) * (numbers[1:] + numbers[:-1]) / 2.0
-        integral = np.cumsum(areas)[-1]
-        return finite_or_none(integral / (t[-1] - t[0]) if over == "mean" else integral)
+        before = np.append(0.0, numbers[:-1])
+        integral = np.cumsum(np.diff(t, prepend=t[0]) * (numbers + before) / 2.0)[-1]
+    made = _made(np.fmax.reduce(numbers), integral, numbers[-1], t[-1] - t[0])
+    return finite_or_none(made[over])
 
 
 def checked_measures(measures: Sequence[OwnMeasure], taken: Sequence[str]) -> tuple[OwnMeasure, ...]:
@@ -211,20 +216,11 @@ def checked_measures(measures: Sequence[OwnMeasure], taken: Sequence[str]) -> tu
 # -- internals --------------------------------------------------------------------------------------------
 
 
-def _traced(values: Sequence[Callable[[Instant], Any]], sizes: Mapping[str, int]) -> Any:
-    """See `compiled.own.own_function`; None where there is none."""
-    from ..compiled.own import own_function
-
-    try:
-        return own_function(values, sizes)
-    except SynctrlError:
-        return None
-
-
-def _sizes(result: Result) -> dict[str, int]:
-    """Sizes of the cell of a run, as the compiled engine has them."""
-    (_, n, m), p, nv = result.x.shape, result.sync_error.shape[1], result.q.shape[2]
-    return {"n": n, "m": m, "p": p, "nv": nv}
+def _made(largest: Any, integral: Any, final: Any, span: float) -> dict[str, Any]:
+    """What is kept, by the words of `OVER`; nothing is the largest of numbers among which one is NaN."""
+    with np.errstate(all="ignore"):
+        largest = np.where(np.isnan(integral), np.nan, largest)
+        return {"largest": largest, "mean": integral / span, "integral": integral, "final": final}
 
 
 def _told(error: Exception) -> str:

@@ -171,7 +171,8 @@ class Runner:
         doubt = None
         if status == COMPLETED and result is not None:
             values, doubt = measures(result, self.job.bands), doubt_of(result)
-            values += further_values(self.job.further, self.job.setup(task.values)) + self._own.of(result)
+            setup = self.job.setup(task.values)
+            values += further_values(self.job.further, setup) + self._own.of(result, setup.experiment)
         row = [task.run, *task.values, status, cause, None if time is None else float(time), *values]
         return Outcome(row, self._keep(task, result), doubt)
 
