@@ -14,6 +14,7 @@ from refusals import refused
 from sweeps import DT, base, quiet
 from test_columns import small
 
+from synctrl.compiled import processor
 from synctrl.errors import InputError, ResultError, SweepError, SweepFileError
 from synctrl.experiments import planar_four
 from synctrl.sweep import Grid, LogUniform, OwnMeasure, Sweep, Uniform, gain, load, model_error, weights
@@ -95,6 +96,15 @@ def test_rows_side_by_side_are_those_of_runs_alone(make):
     assert together == 11
     assert all(isinstance(value, float) for row in found for value in row[-5:])
     assert all(row[-1] < 0 for row in found)
+
+
+@pytest.mark.parametrize("width", [1, 2, 4, 8])
+def test_rows_are_the_same_in_any_number_of_lanes(width, monkeypatch):
+    if width > processor.widest():
+        pytest.skip(f"this processor has {processor.widest()} lanes")
+    expected = rows(sweep())
+    monkeypatch.setattr(processor, "widest", lambda: width)
+    assert rows(sweep()) == expected
 
 
 def test_own_measures_leave_all_others_alone():
@@ -236,15 +246,18 @@ def test_a_function_that_fails_ends_the_sweep_and_is_named(value, engine):
 
 
 def test_what_is_no_finite_number_is_empty():
+    q = sweep([], 1).simulate(0).q[:, 0, 0]
+    middle = float(np.median(q))  # of some instants there is a number, of others none
     measures = [
         OwnMeasure("none", lambda at: at.v[0, 0] * np.inf, "largest"),
         OwnMeasure("root", lambda at: np.sqrt(-1 - energy(at)), "mean"),
+        OwnMeasure("at_times", lambda at: np.sqrt(at.q[0, 0] - middle), "largest"),
         OwnMeasure("one", lambda at: 1.0, "integral"),
     ]
     for engine in ("compiled", "pinocchio"):
         found, alone, _ = rows(sweep(measures, 2, engine=engine))
         assert found == alone
-        assert all(row[-3:-1] == [None, None] for row in found)
+        assert all(row[-4:-1] == [None] * 3 for row in found)
         assert all(row[-1] == pytest.approx(small().duration, rel=1e-12) for row in found)
 
 
