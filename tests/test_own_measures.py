@@ -10,10 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from machines import random_robot
 from refusals import refused
 from sweeps import DT, base, quiet
 from test_columns import small
 
+from synctrl import CartesianSpace, Cell, Coupling, Experiment, ExponentialApproach, Gains, Member
 from synctrl.compiled import processor
 from synctrl.errors import InputError, ResultError, SweepError, SweepFileError
 from synctrl.experiments import planar_four
@@ -107,6 +109,25 @@ def test_rows_are_the_same_in_any_number_of_lanes(width, monkeypatch):
     assert rows(sweep()) == expected
 
 
+def unlike() -> Sweep:
+    """Two joints beside three: rows of the first robot are padded."""
+    robots = [random_robot(seed, 2 + seed) for seed in range(2)]
+    starts = [np.linspace(0.4, 0.9, robot.nv) for robot in robots]
+    members = []
+    for robot, q in zip(robots, starts, strict=True):
+        tip = robot.tip_position(q)[:2]
+        members.append(Member(robot, ExponentialApproach(tip, tip + 0.01), q))
+    cell = Cell(members, Coupling.pair([1.0, 1.0]), CartesianSpace("xy"))
+    start = Experiment(cell, Gains(5.0, 5.0, 3.0, 1.0, 0.1), 0.1)
+    return sweep(start=start, factors=[gain("beta", Uniform(1, 9))])
+
+
+def test_rows_of_robots_that_are_not_alike_are_those_of_runs_alone():
+    found, alone, together = rows(unlike())
+    assert found == alone
+    assert together == 11
+
+
 def test_own_measures_leave_all_others_alone():
     (found, *_), (others, *_) = rows(sweep()), rows(sweep([]))
     assert [row[:-5] for row in found] == others
@@ -162,6 +183,11 @@ def test_the_table_is_the_same_for_any_workers(tmp_path):
     tables.add(quiet(made, tmp_path / "serial", backend="serial"))
     tables.add(quiet(made, tmp_path / "kept", 1, keep_every=2))
     assert len(tables) == 1
+
+
+def test_functions_go_to_other_processes(tmp_path):
+    made = sweep([OwnMeasure("branching", branching, "mean"), OwnMeasure("one", lambda at: 1.0, "final")], 4)
+    assert quiet(made, tmp_path / "processes", 2, batch=1) == quiet(made, tmp_path / "here", 1)
 
 
 def test_a_sweep_goes_on_and_its_folder_says_what_the_measures_are(tmp_path):
