@@ -165,7 +165,8 @@ def own_of_all(measures: Sequence[OwnMeasure], measured: Any, span: float) -> li
     """
     if not measures:
         return [[] for _ in measured.status]
-    found = _made(*np.moveaxis(measured.own, -1, 0), span)
+    largest, integral, final = np.moveaxis(measured.own, -1, 0)
+    found = _made(largest, integral, final, span)
     return [
         [finite_or_none(found[own.over][run, k]) for k, own in enumerate(measures)]
         for run in range(len(measured.own))
