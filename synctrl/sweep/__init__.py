@@ -47,6 +47,7 @@ from .network_factors import (
     network_receiver,
     network_seed,
 )
+from .own import OwnMeasure
 from .sweep import Sweep
 
 __all__ = [
@@ -55,6 +56,7 @@ __all__ = [
     "Grid",
     "LogUniform",
     "Normal",
+    "OwnMeasure",
     "Sweep",
     "Uniform",
     "adaptation",

@@ -18,6 +18,7 @@ from .distributions import Value
 from .factors import Setup
 from .further import further_values
 from .measures import doubt_of_row, measures_of_all
+from .own import own_of_all
 from .rows import COMPLETED
 from .tasks import Job, Outcome, Task
 
@@ -95,14 +96,18 @@ class Blocks:
         made = [task for task, left in zip(tasks, columns.left, strict=True) if not left]
         if not made:
             return {}
-        outcomes = told(made, bench.run, bench.batch.measure(arrays, len(made)))
-        return {task.run: self._further(task, outcomes[task.run]) for task in made if task.run in outcomes}
+        return self._told(made, bench.run, bench.batch.measure(arrays, len(made)))
 
-    def _further(self, task: Task, outcome: Outcome) -> Outcome:
-        """A run with what a search asks for beside the measures of runs."""
-        names = self._job.further
-        found = further_values(names, self._job.setup(task.values)) if names else []
-        return outcome._replace(row=[*outcome.row, *found])
+    def _told(self, tasks: Sequence[Task], run: Run, measured: Any) -> dict[int, Outcome]:
+        """Runs that went to their end, with what is asked for beside the measures of all runs."""
+        outcomes, names = told(tasks, run, measured), self._job.further
+        own = own_of_all(self._job.own, measured, run.clock.end)
+        for task, last in zip(tasks, own, strict=True):
+            if task.run in outcomes:
+                found = further_values(names, self._job.setup(task.values)) if names else []
+                outcome = outcomes[task.run]
+                outcomes[task.run] = outcome._replace(row=[*outcome.row, *found, *last])
+        return outcomes
 
     def _bench(self, shared: tuple[Value, ...]) -> Bench | None:
         """The base run of a group, None if it cannot have one; made once."""

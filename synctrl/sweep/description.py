@@ -30,6 +30,8 @@ FORMATS: Mapping[str, Sequence[str]] = MappingProxyType(
     {"synctrl sweep 1": [name for name in MEASURES if name not in TRUST], FORMAT: MEASURES}
 )
 ABOUT = "sweep.json"
+#: where it has measures that a user has defined
+OWN = "own_measures"
 #: instants at which desired motion and closed loop are looked at
 INSTANTS = 40
 #: digits that count: fewer than those in which machines may differ
@@ -102,24 +104,39 @@ def row_format(about: Mapping[str, Any]) -> Format:
     duration = positive_number("duration", about.get("duration"))
     if "search" in about:
         population = count("population", about["search"].get("population"))
-        return Format(expected, Generations(factors, population), duration, measures)
+        return Format(expected, Generations(factors, population), duration, measures, own_of(about))
     draws = Draws(factors, count("samples", about.get("samples")), count("seed", about.get("seed"), least=0))
     if about.get("runs") != draws.count:
         raise InputError.expected(f"{draws.count}, as the factors say", about.get("runs"), "runs")
-    return Format(expected, draws, duration, measures)
+    return Format(expected, draws, duration, measures, own_of(about))
 
 
 def measures_of(about: Mapping[str, Any]) -> tuple[str, ...]:
     """Names of the measures in the rows of a sweep or a search, by its description.
 
     Raises:
-        InputError: further measures that are none.
+        InputError: further measures that are none, or see `own_of`.
     """
     search = about.get("search", {})
     instance("search", search, Mapping, "a description of the search")
     further = search.get("further", [])
     instance("further", further, list, "a list of further measures")
-    return (*FORMATS[about["format"]], *(choice("further", name, tuple(FURTHER)) for name in further))
+    named = (choice("further", name, tuple(FURTHER)) for name in further)
+    return (*FORMATS[about["format"]], *named, *own_of(about))
+
+
+def own_of(about: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of the measures that a user has defined, by the description of a sweep or a search.
+
+    Raises:
+        InputError: no descriptions of such measures.
+    """
+    found = about.get(OWN, [])
+    instance(OWN, found, list, "a list of measures")
+    for own in found:
+        instance(OWN, own, Mapping, "descriptions of measures")
+        instance(OWN, own.get("name"), str, "the name of a measure")
+    return tuple(own["name"] for own in found)
 
 
 def checked_bands(bands: Any) -> dict[str, Band]:

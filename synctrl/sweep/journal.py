@@ -21,7 +21,7 @@ from ..checks import count
 from ..errors import MissingDependencyError, ResultError
 from ..files import read_regular, reported, write_whole
 from ..simulation.result import Result
-from .description import ABOUT, FORMAT, difference, measures_of, read_about, row_format
+from .description import ABOUT, FORMAT, difference, measures_of, own_of, read_about, row_format
 from .distributions import Value
 from .rows import Draws, Format, Generations, Row, fault_of_values, line_of, wrong_line
 
@@ -88,7 +88,8 @@ class Journal:
                 other = f"'{self.folder}' holds another sweep: {found}; choose another folder"
                 raise ResultError(other, file=self.folder, found=found)
             content = read_regular(self.folder / RUNS)
-            rows = Format(about["columns"], runs, about["duration"], measures_of(self.about))
+            measures, own = measures_of(self.about), own_of(self.about)
+            rows = Format(about["columns"], runs, about["duration"], measures, own)
             self.rows = rows.read(self.folder / RUNS, content)
             self._file.truncate(content.rfind(b"\n") + 1)  # an incomplete last line does not count
 

@@ -125,12 +125,14 @@ class Format(NamedTuple):
         runs: which runs there are.
         duration: of every run, s.
         measures: names of the last entries.
+        own: names of those of them that a user has defined, and that may be negative.
     """
 
     columns: Sequence[str]
     runs: Draws | Generations
     duration: float
     measures: Sequence[str] = MEASURES
+    own: Sequence[str] = ()
 
     def read(self, path: Path, content: bytes) -> dict[int, Row]:
         """Rows of a file's complete lines by number of the run, in the order of the lines.
@@ -163,7 +165,7 @@ class Format(NamedTuple):
         return (
             self.runs.fault(run, values, rows)
             or _fault_of_ending(status, cause, stop_time, self.duration)
-            or _fault_of_measures(status, self.measures, row[measured:])
+            or _fault_of_measures(status, self.measures, row[measured:], self.own)
         )
 
 
@@ -202,14 +204,15 @@ def _fault_of_ending(status: Any, cause: Any, stop_time: Any, duration: float) -
     return ""
 
 
-def _fault_of_measures(status: str, names: Sequence[str], measured: Sequence[Any]) -> str:
+def _fault_of_measures(status: str, names: Sequence[str], measured: Sequence[Any], own: Sequence[str]) -> str:
     for name, value in zip(names, measured, strict=True):
         if value is None:
             continue
         if status != COMPLETED:
             return f"{name}: expected none of a run that {status}, found {_short(value)}"
-        if not _is_number(value) or value < 0:
-            return f"{name}: expected a finite number of at least 0, found {_short(value)}"
+        least = "" if name in own else " of at least 0"
+        if not _is_number(value) or (least and value < 0):
+            return f"{name}: expected a finite number{least}, found {_short(value)}"
     return ""
 
 

@@ -15,13 +15,14 @@ from ..errors import InputError, SimulationError
 from ..simulation.description import versions
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
-from .description import checked_bands, describe_base
+from .description import OWN, checked_bands, describe_base
 from .distributions import Value
 from .evaluation import Evaluation, Evaluator, progress_bar
 from .factors import Factor, Setup
 from .further import FURTHER
 from .journal import Journal
 from .measures import MEASURES, definitions, warn_of
+from .own import OwnMeasure, checked_measures
 from .rows import Draws, columns
 from .tasks import Drawn, Job, Task
 from .worker import Prepared, Runner
@@ -36,6 +37,7 @@ class StudyOptions(TypedDict, total=False):
     engine: str
     control_period: float | None
     bands: Mapping[str, Band] | None
+    measures: Sequence[OwnMeasure]
 
 
 class Study:
@@ -51,9 +53,10 @@ class Study:
         control_period: None for continuous control, or the period of sampled control, s.
         bands: settling bands by kind of error, in its unit; by default 5% of the largest error of the base
             experiment's run, which then has to run to its end.
+        measures: measures of your own, which the table has after all others.
 
     Raises:
-        InputError: a value of the wrong kind, no factor, two factors of one name, or an adaptation and Gamma.
+        InputError: a value of the wrong kind, no factor, two columns of one name, or an adaptation and Gamma.
     """
 
     def __init__(
@@ -67,6 +70,7 @@ class Study:
         engine: str = "compiled",
         control_period: float | None = None,
         bands: Mapping[str, Band] | None = None,
+        measures: Sequence[OwnMeasure] = (),
     ):
         instance("base", base, Experiment, "an Experiment")
         duration = base.duration if duration is None else positive_number("duration", duration)
@@ -74,6 +78,8 @@ class Study:
         period = None if control_period is None else positive_number("control_period", control_period)
         self.base = Setup(base, duration, positive_number("dt", dt), engine, period)
         self.factors = _checked_factors(factors)
+        taken = columns((factor.name for factor in self.factors), (*MEASURES, *FURTHER))
+        self.measures = checked_measures(measures, taken)
         self.seed = count("seed", seed, least=0)
         self._bands = None if bands is None else checked_bands(bands)
 
@@ -83,13 +89,16 @@ class Study:
             bands = checked_bands(known["settling_bands"])
         else:
             bands = self._found_bands
-        return Job(self.base, self.factors, bands, keep_every)
+        return Job(self.base, self.factors, bands, keep_every, own=self.measures)
 
     def about(self, job: Job, **more: Any) -> dict[str, Any]:
         """Everything that a row depends on, as plain data, and what its entries mean."""
         setup = self.base
         measured = definitions(setup.experiment.cell)
         measured |= {name: FURTHER[name].measure for name in job.further}
+        measured |= {own.name: own.measure for own in job.own}
+        if job.own:
+            more[OWN] = [own.describe() for own in job.own]
         return {
             "factors": [factor.describe() for factor in self.factors],
             "seed": self.seed,
@@ -101,7 +110,7 @@ class Study:
             "base": describe_base(setup),
             "settling_bands": {kind: np.asarray(band).tolist() for kind, band in job.bands.items()},
             "columns": job.columns,
-            "measures": {name: measured[name]._asdict() for name in (*MEASURES, *job.further)},
+            "measures": {name: measured[name]._asdict() for name in job.measures},
             "versions": versions(),
         }
 
@@ -136,10 +145,10 @@ class Sweep:
         base: the experiment that is varied.
         factors: what differs from run to run; applied in this order.
         samples: draws per combination of grid values; with no grid, the number of runs.
-        options: `seed`, `duration`, `dt`, `engine`, `control_period` and `bands`, see `Study`.
+        options: `seed`, `duration`, `dt`, `engine`, `control_period`, `bands` and `measures`, see `Study`.
 
     Raises:
-        InputError: a value of the wrong kind, no factor, or two factors of one name.
+        InputError: a value of the wrong kind, no factor, or two columns of one name.
     """
 
     def __init__(

@@ -10,6 +10,7 @@ from ..simulation.result import Result
 from .distributions import Value
 from .factors import Factor, Setup
 from .measures import MEASURES, Doubt
+from .own import OwnMeasure
 from .rows import Draws, Row, columns
 
 
@@ -67,6 +68,7 @@ class Job(NamedTuple):
         bands: settling bands by kind of error.
         keep_every: which of the logged instants are kept, or None for no trajectories.
         further: names of the measures of `FURTHER` that rows have too, after all others.
+        own: measures of the user's own, which come last.
     """
 
     base: Setup
@@ -74,6 +76,7 @@ class Job(NamedTuple):
     bands: Mapping[str, Band]
     keep_every: int | None = None
     further: tuple[str, ...] = ()
+    own: tuple[OwnMeasure, ...] = ()
 
     def __repr__(self) -> str:
         return f"Job: {self.base!r}, {len(self.factors)} factors"
@@ -81,7 +84,12 @@ class Job(NamedTuple):
     @property
     def columns(self) -> list[str]:
         """Names of the entries of a row."""
-        return columns((factor.name for factor in self.factors), (*MEASURES, *self.further))
+        return columns((factor.name for factor in self.factors), self.measures)
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """Names of the measures of a row."""
+        return (*MEASURES, *self.further, *(own.name for own in self.own))
 
     def setup(self, values: Sequence[Value]) -> Setup:
         """The base with all factors applied, in their order."""

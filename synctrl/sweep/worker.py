@@ -17,7 +17,8 @@ from ..simulation.simulate import Experiment
 from .blocks import LANES, Blocks
 from .factors import Setup
 from .further import further_values
-from .measures import MEASURES, doubt_of, measures
+from .measures import doubt_of, measures
+from .own import OwnMeasure, OwnMeasures
 from .rows import COMPLETED, REFUSED, STOPPED
 from .tasks import Job, Outcome
 from .tasks import Task as Task
@@ -76,16 +77,19 @@ class Prepared:
         """
         return self._engine.run(self._looked_at(experiment, control_period), None)
 
-    def batch(self, setup: Setup, bands: Mapping[str, Band]) -> tuple[Run, Any]:
+    def batch(
+        self, setup: Setup, bands: Mapping[str, Band], own: Sequence[OwnMeasure] = ()
+    ) -> tuple[Run, Any]:
         """A variation as the base of many, and what makes runs side by side that differ from it in numbers.
 
         Raises:
+            InputError: own measures that cannot be traced.
             see `Experiment.simulate`
         """
         from ..compiled.batch import Batch
 
         run = self._looked_at(setup.experiment, setup.control_period)
-        return run, Batch(run, bands, self._libraries)
+        return run, Batch(run, bands, self._libraries, own=[measure.value for measure in own])
 
     def _looked_at(self, experiment: Experiment, control_period: float | None) -> Run:
         """A run that can begin."""
@@ -114,7 +118,8 @@ class Runner:
     def __init__(self, job: Job):
         self.job = job
         self._prepared = Prepared(*job.base[:4])
-        self._blocks = Blocks(job, partial(self._prepared.batch, bands=job.bands))
+        self._blocks = Blocks(job, partial(self._prepared.batch, bands=job.bands, own=job.own))
+        self._own = OwnMeasures(job.own, job.base.engine)
         self.lanes = LANES if self._blocks.possible else 1
 
     def outcomes(self, tasks: Sequence[Task]) -> Iterator[Outcome]:
@@ -162,11 +167,12 @@ class Runner:
         if error is not None:  # halves of surrogate pairs, which a name may have, become question marks
             cause = f"{type(error).__name__}: {error}".encode(errors="replace").decode()
         time = error.time if isinstance(error, SimulationError) else None
-        values: list[Any] = [None] * (len(MEASURES) + len(self.job.further))
+        values: list[Any] = [None] * len(self.job.measures)
         doubt = None
         if status == COMPLETED and result is not None:
             values, doubt = measures(result, self.job.bands), doubt_of(result)
-            values += further_values(self.job.further, self.job.setup(task.values))
+            setup = self.job.setup(task.values)
+            values += further_values(self.job.further, setup) + self._own.of(result, setup.experiment)
         row = [task.run, *task.values, status, cause, None if time is None else float(time), *values]
         return Outcome(row, self._keep(task, result), doubt)
 

@@ -57,7 +57,7 @@ def tune(
         generations, population: how often the population is renewed, and its size, at least 5.
         folder: write every run there, and read runs made there before instead of making them again.
         progress, workers, backend, client: see `Sweep.run`, also for errors and warnings.
-        options: `seed`, `duration`, `dt`, `engine`, `control_period` and `bands`, see `Study`.
+        options: `seed`, `duration`, `dt`, `engine`, `control_period`, `bands` and `measures`, see `Study`.
 
     Raises:
         InputError: a value of the wrong kind.
@@ -87,7 +87,9 @@ class _Search:
             FURTHER[name].find(study.base)  # refuses an experiment that has none
         self.several = len(goals) > 1
         self.optuna = need_optuna().__version__ if self.several else None
-        self.columns = columns((factor.name for factor in study.factors), (*MEASURES, *self.further))
+        self.own = {own.name: own.measure for own in study.measures}
+        self.names = (*MEASURES, *self.further, *self.own)
+        self.columns = columns((factor.name for factor in study.factors), self.names)
         self.runs = Generations({factor.name: factor.values for factor in study.factors}, self.population)
         self.history: list[dict[str, Any]] = []
 
@@ -148,7 +150,7 @@ class _Search:
             raise self._nothing()
         experiment = self.study.base.experiment
         measured = definitions(experiment.cell) | {name: FURTHER[name].measure for name in self.further}
-        measured = {name: measured[name] for name in (*MEASURES, *self.further)}
+        measured = {name: (measured | self.own)[name] for name in self.names}
         whole = Tuned(
             self.judge, self.history, front, front[0]["run"], measured, experiment, self.study.factors
         )
