@@ -202,7 +202,7 @@ GAMMA = row("Gamma", "P")
 FAULTS = {
     "a sign of S is lost": ("sum += c->sign[t] * fetch(", "sum += fetch("),
     "a share takes another pair": ("c->incident + t * LANES", "c->incident"),
-    "a share's sign is lost": ("sum += c->incident_sign[t] * fetch(", "sum += fetch("),
+    "a share's sign is lost": ("vec sign = c->incident_sign[t]", "vec sign = splat(1)"),
     "the place of the base": row("base", "12"),
     "the posture's gain": row("gain", "nv", "posture"),
     "the weights of W": row("W_inv", "nv", "gain"),
