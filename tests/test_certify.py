@@ -322,11 +322,11 @@ def test_damping_in_task_space_takes_and_what_it_gives_is_the_damped_inverse() -
 
 
 def kinked() -> Experiment:
-    """Joints that rest and then move on at once: the desired velocity jumps from 0 to 1 and -0.5 rad/s."""
-    robot, rates = load_robot("planar2r"), np.array([1.0, -0.5])
-    members = []
-    for q in np.array([[0.3, 1.2], [-0.2, 0.9]]):
-        path = SmoothTrajectory(lambda t, q=q: q + max(t - 0.05, 0.0) * rates, 0.1, breaks=(0.05,))
+    """Joints that rest and then move on at once: a desired velocity jumps from 0 to 1 and -0.5 rad/s."""
+    robot, members = load_robot("planar2r"), []
+    for share, q in zip((1.0, 0.9), np.array([[0.3, 1.2], [-0.2, 0.9]]), strict=True):
+        rates = share * np.array([1.0, -0.5])
+        path = SmoothTrajectory(lambda t, q=q, v=rates: q + max(t - 0.05, 0.0) * v, 0.1, breaks=(0.05,))
         members.append(Member(robot, path, q, theta_hat0=0.7 * robot.inertial_parameters))
     return Experiment(Cell(members, Coupling.pair()), GAINS, 0.1)
 
