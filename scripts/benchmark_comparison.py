@@ -111,8 +111,8 @@ def _steps(figures: Figures, amount: Amount, then: str) -> Table:
 def _features(figures: Figures, amount: Amount, then: str) -> Table:
     rows = []
     for name in amount.features or FEATURES:
-        cost = _spread(figures, f"{name}, cost", inverse=True) or _why(figures, f"{name}, cost")
-        of_all = _spread(figures, f"{name}, cost of all", inverse=True)
+        cost = _spread(figures, f"{name}, cost") or _why(figures, f"{name}, cost")
+        of_all = _spread(figures, f"{name}, cost of all")
         gain = _spread(figures, f"{name}, factor") or "not there" * (f"{name}, factor" in figures.missing)
         rows.append([name, FEATURES[name].cell, cost, of_all, gain])
     note = (
@@ -175,11 +175,11 @@ def _both(figures: Figures, name: str) -> list[str]:
     return [_spread(figures, name.format(by)) or "not measured" for by in ("now", "then")]
 
 
-def _spread(figures: Figures, name: str, inverse: bool = False) -> str:
+def _spread(figures: Figures, name: str) -> str:
     """A figure's median, least and largest value, or nothing."""
     if name not in figures.values:
         return ""
-    values = 1 / np.array(figures.values[name]) if inverse else np.array(figures.values[name])
+    values = np.array(figures.values[name])
     middle = _number(float(np.median(values)))
     return middle if values.size == 1 else f"{middle} ({_number(values.min())} to {_number(values.max())})"
 

@@ -40,6 +40,8 @@ KEPT = 28e6
 TABLES = "synctrl.compiled.tables", "synctrl.compiled.engine", "synctrl.simulation.compiled.engine"
 #: share of the steps that a second run has: the difference is what steps cost without what comes before them
 FEW = 0.2
+#: robots from which on a run is timed while it goes, and how often it has to tell of itself for that
+LARGE, TOLD = 500, 3
 #: how often a measurement is repeated at most, because it is short
 REPEATS = 8
 
@@ -55,7 +57,7 @@ def cell_named(name: str) -> Experiment:
     return getattr(import_module("synctrl.experiments"), name)()
 
 
-def engine(libraries: dict, width: int | None = None, kept: bool = False) -> Callable[[Any], Any]:
+def engine(libraries: dict, width: int | None = None, kept: bool = False) -> Callable[..., Any]:
     """What takes a planned run through time as generated code.
 
     Args:
@@ -68,7 +70,7 @@ def engine(libraries: dict, width: int | None = None, kept: bool = False) -> Cal
         compiled = import_module("synctrl.compiled.engine").Compiled
     except ModuleNotFoundError:  # version 0.1
         run = import_module("synctrl.simulation.simulate").run_compiled
-        return lambda planned: run(planned, None, libraries, tables)
+        return lambda planned, progress=None: run(planned, progress, libraries, tables)
     return compiled(libraries, tables, **({} if width is None else {"widest": width})).run
 
 
@@ -97,6 +99,7 @@ class Stepper:
         self._plan = partial(self._planned, experiment, options)
         self._engines = make(), make()  # what one keeps is of one length
         run, self._seconds = partial(self._run, 0), seconds
+        self._large = experiment.cell.n >= LARGE
         self.steps = _enough(run, seconds, _most(experiment, kept))
         self.few = max(1, round(FEW * self.steps))
         for which, steps in enumerate((self.steps, self.few)):
@@ -104,12 +107,26 @@ class Stepper:
 
     def measure(self) -> float:
         """CPU time of a step, s."""
+        if self._large and (found := self._on_the_way()):
+            return found
         first = _seconds(partial(self._run, 0), self.steps)
         times = [first - _seconds(partial(self._run, 1), self.few)]
         for _ in range(min(REPEATS, int(self._seconds / max(first, 1e-9))) - 1):
             long = _seconds(partial(self._run, 0), self.steps)
             times.append(long - _seconds(partial(self._run, 1), self.few))
         return float(np.median(times)) / (self.steps - self.few)
+
+    def _on_the_way(self) -> float:
+        """CPU time of a step, s, from the first to the last time that a run tells of itself; 0 if it does not.
+
+        What comes before the first step of a large cell outweighs its steps: no difference of runs has them.
+        """
+        marks: list[tuple[float, float]] = []
+        self._engines[0](self._plan(self.steps), lambda t: marks.append((t, time.process_time())))
+        if len(marks) < TOLD:
+            return 0.0
+        (began, before), (ended, after) = marks[0], marks[-1]
+        return (after - before) * DT / (ended - began)
 
     def _run(self, which: int, steps: int) -> None:
         self._engines[which](self._plan(steps))

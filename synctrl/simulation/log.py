@@ -122,7 +122,7 @@ class WholeLog:
     """Arrays for all rows of a run; the system gives memory to those that are filled."""
 
     def __init__(self, shapes: Shapes, rows: int):
-        self.rows = {name: np.zeros((rows, *shape)) for name, shape in shapes.items()}
+        self.rows = {name: np.empty((rows, *shape)) for name, shape in shapes.items()}
         self.count = 0
 
     @property
@@ -190,7 +190,7 @@ class MemoryTarget:
 
     def __init__(self, shapes: Shapes, rows: int, dtype: str):
         kinds = {name: "float64" if name == "t" else dtype for name in shapes}
-        self._arrays = {name: np.zeros((rows, *shape), kinds[name]) for name, shape in shapes.items()}
+        self._arrays = {name: np.empty((rows, *shape), kinds[name]) for name, shape in shapes.items()}
         self._count = 0
 
     def put(self, rows: Mapping[str, np.ndarray]) -> None:
