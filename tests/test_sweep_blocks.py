@@ -40,7 +40,9 @@ from synctrl.sweep import (
     true_parameters,
     weights,
 )
+from synctrl.sweep.blocks import LANES
 from synctrl.sweep.worker import Runner
+from synctrl.tune import tune
 
 pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
 pytest.importorskip("pandas", reason="tables are read with pandas: pip install 'synctrl[sweep]'")
@@ -246,6 +248,25 @@ def test_a_sweep_goes_on_in_the_middle_of_a_block(whole, tmp_path):
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[3:4] + lines[6:9]) + lines[0][:40])
     assert quiet(free(), tmp_path, 2) == whole
+
+
+def generations(folder, monkeypatch, backend: str) -> tuple[list[int], list[int]]:
+    """A search of four generations of 24: how many runs each task of a worker has, and each trial of one."""
+    sizes, tried = [], []
+    outcomes, go_together = Runner.outcomes, Runner.go_together
+    monkeypatch.setattr(Runner, "outcomes", lambda *given: sizes.append(len(given[1])) or outcomes(*given))
+    monkeypatch.setattr(
+        Runner, "go_together", lambda *given: tried.append(len(given[1])) or go_together(*given)
+    )
+    search = {"beta": LogUniform(1, 100), "Lambda": Uniform(4, 9)}
+    options = {"generations": 3, "population": 24, "workers": 2, "progress": False}
+    tune(small(), search, folder=folder, backend=backend, duration=0.01, dt=DT, bands=BANDS, **options)
+    return sizes, tried
+
+
+def test_tasks_of_generations_fill_the_lanes_while_all_workers_have_one(tmp_path, monkeypatch):
+    sizes, _ = generations(tmp_path, monkeypatch, "serial")
+    assert sum(sizes) == 4 * 24 and {*sizes} == {LANES}
 
 
 # -- nothing is lost but runs in flight -------------------------------------------------------------------
