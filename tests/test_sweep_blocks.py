@@ -27,6 +27,7 @@ from synctrl.sweep import (
     Normal,
     Sweep,
     Uniform,
+    backends,
     control_period,
     disturbance_scale,
     disturbance_start,
@@ -267,6 +268,15 @@ def generations(folder, monkeypatch, backend: str) -> tuple[list[int], list[int]
 def test_tasks_of_generations_fill_the_lanes_while_all_workers_have_one(tmp_path, monkeypatch):
     sizes, _ = generations(tmp_path, monkeypatch, "serial")
     assert sum(sizes) == 4 * 24 and {*sizes} == {LANES}
+
+
+def test_workers_of_one_generation_are_those_of_the_next(tmp_path, monkeypatch):
+    pytest.importorskip("joblib", reason="pip install 'synctrl[sweep]'")
+    made: list[bytes] = []
+    runner_of = backends.runner_of
+    monkeypatch.setattr(backends, "runner_of", lambda payload: made.append(payload) or runner_of(payload))
+    sizes, tried = generations(tmp_path, monkeypatch, "joblib")
+    assert sum(sizes) == 4 * 24 and len(tried) == 2 and len(made) < 2
 
 
 # -- nothing is lost but runs in flight -------------------------------------------------------------------
