@@ -10,15 +10,17 @@ import warnings
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from machines import random_robot
+from refusals import refused
 from sweeps import DT, quiet
 from test_columns import small
 
 from synctrl import Cell, Coupling, Experiment, ExponentialApproach, Gains, JointSpace, Member
 from synctrl.control.adaptation import Box
 from synctrl.control.laws import SunMills
-from synctrl.errors import StepWarning
+from synctrl.errors import InputError, StepWarning, SweepError
 from synctrl.experiments import planar_four
 from synctrl.sweep import (
     Factor,
@@ -42,6 +44,7 @@ from synctrl.sweep import (
     weights,
 )
 from synctrl.sweep.blocks import LANES
+from synctrl.sweep.columns import Columns
 from synctrl.sweep.worker import Runner
 from synctrl.tune import tune
 
@@ -195,6 +198,21 @@ def test_a_users_own_factor_may_have_columns(monkeypatch):
     alone = [runner.outcome(task).row for task in tasks]
     monkeypatch.setattr(Runner, "outcome", None)
     assert [each.row for each in runner.outcomes(tasks)] == alone
+
+
+def test_columns_of_a_users_own_that_fail_end_the_sweep_and_name_their_factor(tmp_path):
+    made = sweep([Factor("own", Grid([1, 2]), stiffer, lambda arrays, values: values["K_eps"])], 1)
+    with refused(SweepError, "factor 'own'"):
+        quiet(made, tmp_path, 1, "serial")
+    with refused(InputError, "factor 'own', columns", found=3):
+        Factor("own", Grid([1]), stiffer, 3)
+
+
+def test_theta_follows_true_parameters_that_are_those_of_the_base():
+    columns = Columns(small().plan(0.01, 1e-3), 2)
+    before = columns["theta"].copy()
+    columns.moved(0)
+    np.testing.assert_allclose(columns["theta"], before, rtol=1e-9)
 
 
 def test_runs_that_cannot_go_together_are_left_to_processes(tmp_path, monkeypatch):
