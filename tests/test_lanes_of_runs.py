@@ -253,6 +253,19 @@ def test_nothing_of_runs_is_left_when_the_next_ones_begin(name):
         assert bits(those.batch(1).measure(*those.some(slice(k, k + 1)))) == bits(first, slice(k, k + 1))
 
 
+@pytest.mark.parametrize("width", WIDTHS[:2])
+def test_what_runs_have_of_their_own_leaves_the_planned_run_alone(width):
+    those = RUNS["gains"]()
+    run = those.experiment.plan(0.005, 1e-3)
+    batch, controller = Batch(run, BANDS, width=width), run.loop.controller
+    planned = {name: getattr(controller, name).copy() for name in ("Lambda", "beta", "K_eps", "K_r")}
+    before = batch.measure({}, 1)
+    batch.measure(those.columns, COUNT)
+    assert bits(batch.measure({}, 1)) == bits(before)
+    for name, expected in planned.items():
+        np.testing.assert_array_equal(getattr(controller, name), expected)
+
+
 def test_what_runs_have_no_column_for_is_refused():
     batch = Batch(arms(2).plan(0.01, 1e-3), BANDS, width=1)
     for name in ("tau", "nonsense", "desired"):

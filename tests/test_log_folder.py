@@ -141,6 +141,36 @@ def test_a_run_that_is_interrupted_leaves_a_whole_folder(engine, tmp_path, exper
         np.testing.assert_array_equal(getattr(loaded, name), getattr(usual, name)[:rows])
 
 
+@pytest.mark.parametrize("written", [1, 2, 3])
+@pytest.mark.parametrize("kept", [("run", "float64"), ("run", "float32"), (None, "float32")])
+def test_rows_are_there_once_if_an_interrupt_comes_while_they_are_written(
+    kept, written, tmp_path, monkeypatch
+):
+    folder, dtype = kept
+    kept = Keeping(None if folder is None else tmp_path / folder, dtype)
+    log = make_log({"t": (), "x": (2,), "y": (3,)}, 3 * OFTEN, kept)
+    put, numbers = log._target.put, np.arange(3.0 * OFTEN)
+
+    def interrupted(first: int, rows: dict[str, np.ndarray]) -> None:
+        monkeypatch.undo()
+        put(first, dict(list(rows.items())[:written]))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(log._target, "put", interrupted)
+    strikes = 0
+    for number in numbers:
+        for array in log.rows.values():
+            array[log.at] = number
+        try:
+            log.advance(1)
+        except KeyboardInterrupt:
+            strikes += 1
+    assert strikes == 1
+    for array in log.taken().values():
+        rows = array.reshape(-1, int(np.prod(array.shape[1:])))
+        np.testing.assert_array_equal(rows, np.repeat(numbers[:, None], rows.shape[1], axis=1))
+
+
 # -- refusals ----------------------------------------------------------------------------------------------
 
 

@@ -10,15 +10,17 @@ import warnings
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from machines import random_robot
+from refusals import refused
 from sweeps import DT, quiet
 from test_columns import small
 
 from synctrl import Cell, Coupling, Experiment, ExponentialApproach, Gains, JointSpace, Member
 from synctrl.control.adaptation import Box
 from synctrl.control.laws import SunMills
-from synctrl.errors import StepWarning
+from synctrl.errors import InputError, StepWarning, SweepError
 from synctrl.experiments import planar_four
 from synctrl.sweep import (
     Factor,
@@ -27,6 +29,7 @@ from synctrl.sweep import (
     Normal,
     Sweep,
     Uniform,
+    backends,
     control_period,
     disturbance_scale,
     disturbance_start,
@@ -40,7 +43,10 @@ from synctrl.sweep import (
     true_parameters,
     weights,
 )
+from synctrl.sweep.blocks import LANES
+from synctrl.sweep.columns import Columns
 from synctrl.sweep.worker import Runner
+from synctrl.tune import tune
 
 pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
 pytest.importorskip("pandas", reason="tables are read with pandas: pip install 'synctrl[sweep]'")
@@ -194,6 +200,21 @@ def test_a_users_own_factor_may_have_columns(monkeypatch):
     assert [each.row for each in runner.outcomes(tasks)] == alone
 
 
+def test_columns_of_a_users_own_that_fail_end_the_sweep_and_name_their_factor(tmp_path):
+    made = sweep([Factor("own", Grid([1, 2]), stiffer, lambda arrays, values: values["K_eps"])], 1)
+    with refused(SweepError, "factor 'own'"):
+        quiet(made, tmp_path, 1, "serial")
+    with refused(InputError, "factor 'own', columns", found=3):
+        Factor("own", Grid([1]), stiffer, 3)
+
+
+def test_theta_follows_true_parameters_that_are_those_of_the_base():
+    columns = Columns(small().plan(0.01, 1e-3), 2)
+    before = columns["theta"].copy()
+    columns.moved(0)
+    np.testing.assert_allclose(columns["theta"], before, rtol=1e-9)
+
+
 def test_runs_that_cannot_go_together_are_left_to_processes(tmp_path, monkeypatch):
     pytest.importorskip("joblib", reason="pip install 'synctrl[sweep]'")
     learning = replace(small(), adaptation=Box(0.1, -9.0, 9.0), gains=small().gains.replace(Gamma=None))
@@ -246,6 +267,34 @@ def test_a_sweep_goes_on_in_the_middle_of_a_block(whole, tmp_path):
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[3:4] + lines[6:9]) + lines[0][:40])
     assert quiet(free(), tmp_path, 2) == whole
+
+
+def generations(folder, monkeypatch, backend: str) -> tuple[list[int], list[int]]:
+    """A search of four generations of 24: how many runs each task of a worker has, and each trial of one."""
+    sizes, tried = [], []
+    outcomes, go_together = Runner.outcomes, Runner.go_together
+    monkeypatch.setattr(Runner, "outcomes", lambda *given: sizes.append(len(given[1])) or outcomes(*given))
+    monkeypatch.setattr(
+        Runner, "go_together", lambda *given: tried.append(len(given[1])) or go_together(*given)
+    )
+    search = {"beta": LogUniform(1, 100), "Lambda": Uniform(4, 9)}
+    options = {"generations": 3, "population": 24, "workers": 2, "progress": False}
+    tune(small(), search, folder=folder, backend=backend, duration=0.01, dt=DT, bands=BANDS, **options)
+    return sizes, tried
+
+
+def test_tasks_of_generations_fill_the_lanes_while_all_workers_have_one(tmp_path, monkeypatch):
+    sizes, _ = generations(tmp_path, monkeypatch, "serial")
+    assert sum(sizes) == 4 * 24 and {*sizes} == {LANES}
+
+
+def test_workers_of_one_generation_are_those_of_the_next(tmp_path, monkeypatch):
+    pytest.importorskip("joblib", reason="pip install 'synctrl[sweep]'")
+    made: list[bytes] = []
+    runner_of = backends.runner_of
+    monkeypatch.setattr(backends, "runner_of", lambda payload: made.append(payload) or runner_of(payload))
+    sizes, tried = generations(tmp_path, monkeypatch, "joblib")
+    assert sum(sizes) == 4 * 24 and len(tried) == 2 and len(made) < 2
 
 
 # -- nothing is lost but runs in flight -------------------------------------------------------------------

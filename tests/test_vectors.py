@@ -18,6 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synctrl.compiled.compiler import compiler
+from synctrl.compiled.emit import written_own
 
 ca = pytest.importorskip("casadi", reason="CasADi is an extra: pip install 'synctrl[compiled]'")
 
@@ -294,6 +295,12 @@ def test_exact_operations_are_those_of_casadi(library, name, ab):
     if name in ("fmin", "fmax"):  # of 0 and -0, either
         found, expected = found + 0.0, expected + 0.0
     np.testing.assert_array_equal(bits(found), bits(expected))
+
+
+@pytest.mark.parametrize("name", (*ROUNDED, *LIBRARY, *ROUNDED_PAIRED, "fmod", "remainder"))
+def test_what_lanes_have_is_written_where_symbols_ask_for_it(name):
+    found = getattr(ca, name)(*(A, B)[: 1 if name in ROUNDED + LIBRARY else 2])
+    assert f"= v_{name}(" in written_own(ca.Function("own", [A, B], [found], ["q", "v"], ["numbers"]))
 
 
 @given(ab=several)

@@ -70,7 +70,8 @@ class CompiledLoop:
         self.constants = {
             name: checked(name, array, self.sizes) for name, array in _constants(loop, classified).items()
         }
-        self._arrays = {name: self._packed(name, array) for name, array in self.constants.items()}
+        # copies: what `put` writes is neither the loop's nor what `reset` goes back to
+        self._arrays = {name: aligned(self._packed(name, array)) for name, array in self.constants.items()}
         self._arrays |= {name: room(*shape(name, self._rows), width) for name in owned_by("work")}
         for name, array in self._arrays.items():
             setattr(self.quantities, name, self.address(array))

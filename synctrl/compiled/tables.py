@@ -12,14 +12,15 @@ from ..coupling.cell import Cell
 from ..coupling.desired import rows_of
 from ..simulation.advance import up_to_a_failure
 from ..simulation.clock import Clock, Stretch
+from ..simulation.log import AHEAD
 from .arrays import CompiledLoop
 from .quantities import DESIRED, SLIDE
 from .weighing import weighing_of
 
 #: bytes of references that one block of steps may need
 BLOCK_BYTES = 32_000_000
-#: steps of a block at most
-BLOCK_STEPS = 1024
+#: steps of a block at most: the log has room for no more rows
+BLOCK_STEPS = AHEAD
 
 
 class DesiredStretch(NamedTuple):

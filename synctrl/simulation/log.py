@@ -180,7 +180,8 @@ class PassedLog:
     def _pass_on(self) -> None:
         """Hand on the rows that were filled; the next ones are filled in their place."""
         if self.at:
-            self._target.put({name: array[: self.at] for name, array in self.rows.items()})
+            rows = {name: array[: self.at] for name, array in self.rows.items()}
+            self._target.put(self.count - self.at, rows)
             self._last = {name: array[self.at - 1].copy() for name, array in self.rows.items()}
             self.at = 0
 
@@ -193,11 +194,11 @@ class MemoryTarget:
         self._arrays = {name: np.empty((rows, *shape), kinds[name]) for name, shape in shapes.items()}
         self._count = 0
 
-    def put(self, rows: Mapping[str, np.ndarray]) -> None:
-        """Take further rows of every array."""
-        end = self._count + len(next(iter(rows.values())))
+    def put(self, first: int, rows: Mapping[str, np.ndarray]) -> None:
+        """Take rows of every array from a number on; once more if an interrupt came meanwhile."""
+        end = first + len(next(iter(rows.values())))
         for name, part in rows.items():
-            self._arrays[name][self._count : end] = part
+            self._arrays[name][first:end] = part
         self._count = end
 
     def logged(self) -> dict[str, np.ndarray]:

@@ -49,13 +49,15 @@ class FolderWriter:
         self._files: dict[str, IO[bytes]] = {}
         self._count = 0
 
-    def put(self, rows: Mapping[str, np.ndarray]) -> None:
-        """Write further rows of every array."""
+    def put(self, first: int, rows: Mapping[str, np.ndarray]) -> None:
+        """Write rows of every array from a number on; once more if an interrupt came meanwhile."""
         with reported("write the log to", self.folder):
             self._open()
             for name, part in rows.items():
-                self._files[name].write(part.astype(self._codes[name], copy=False).data)
-        self._count += len(next(iter(rows.values())))
+                numbers = part.astype(self._codes[name], copy=False)
+                self._files[name].seek(LENGTH + first * prod(part.shape[1:]) * numbers.itemsize)
+                self._files[name].write(numbers.data)
+        self._count = first + len(next(iter(rows.values())))
 
     def logged(self) -> dict[str, np.ndarray]:
         """What has come until now, mapped."""

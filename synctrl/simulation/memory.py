@@ -69,9 +69,9 @@ def in_parts(array: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def let_go(array: np.ndarray) -> None:
-    """Free the memory that holds what was read of a file, if an array is mapped from one."""
+    """Free the memory that holds what was read of a file, if an array is mapped from one to be read only."""
     mapped = getattr(array, "_mmap", None)
-    if mapped is not None and hasattr(mapped, "madvise"):
+    if mapped is not None and hasattr(mapped, "madvise") and getattr(array, "mode", "") == "r":
         mapped.madvise(mmap.MADV_DONTNEED)
 
 

@@ -6,7 +6,6 @@ import ast
 import contextlib
 import logging
 import sys
-import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -46,12 +45,14 @@ def joblib(runner: Runner, workers: int, *_: Any) -> Iterator[Crew]:
     """
     _need("joblib")
     payload = pickled(runner.job)
+    runners, together = deque([runner]), False
 
     def crew(batches: Iterable[Batch]) -> Iterator[list[Outcome]]:
+        nonlocal together
         waiting = iter(batches)
         for first in waiting:
-            together = runner.go_together(first)
-            make = _threads(runner, payload, workers) if together else _processes(payload, workers)
+            together = together or runner.go_together(first)
+            make = _threads(runners, payload, workers) if together else _processes(payload, workers)
             yield from make(chain([first], waiting))
 
     yield crew
@@ -73,14 +74,18 @@ def _processes(payload: bytes, workers: int) -> Crew:
     return crew
 
 
-def _threads(runner: Runner, payload: bytes, workers: int) -> Crew:
-    """Threads of this process, each with a runner of its own, of which one is there already."""
-    own, spare = threading.local(), iter([runner])
+def _threads(runners: deque[Runner], payload: bytes, workers: int) -> Crew:
+    """Threads of this process: each takes a runner that is free, or makes one, and puts it back."""
 
     def run(batch: Batch) -> list[Outcome]:
-        if not hasattr(own, "runner"):
-            own.runner = next(spare, None) or runner_of(payload)
-        return [*own.runner.outcomes(batch)]
+        try:
+            runner = runners.pop()
+        except IndexError:
+            runner = runner_of(payload)
+        try:
+            return [*runner.outcomes(batch)]
+        finally:
+            runners.append(runner)
 
     def crew(batches: Iterable[Batch]) -> Iterator[list[Outcome]]:
         waiting = iter(batches)

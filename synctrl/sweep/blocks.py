@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import SynctrlError
+from ..errors import SweepError, SynctrlError
 from ..simulation.engines import Run
 from .columns import Columns, apart
 from .distributions import Value
-from .factors import Setup
+from .factors import Factor, Setup
 from .further import further_values
 from .measures import doubt_of_row, measures_of_all
 from .own import own_of_all
@@ -59,7 +59,11 @@ class Blocks:
         self._benches: dict[tuple[Value, ...], Bench | None] = {}
 
     def outcomes(self, tasks: Sequence[Task]) -> dict[int, Outcome]:
-        """What became of runs that were made side by side to their end, by number of the run."""
+        """What became of runs that were made side by side to their end, by number of the run.
+
+        Raises:
+            SweepError: the columns of a user's factor failed.
+        """
         groups: dict[tuple[Value, ...], list[Task]] = {}
         for task in tasks if self.possible else ():
             groups.setdefault(tuple(task.values[k] for k in self._apart), []).append(task)
@@ -69,6 +73,8 @@ class Blocks:
                 continue
             try:
                 found |= self._group(shared, group)
+            except SweepError:
+                raise
             except SynctrlError:  # made one by one, each of them says why
                 continue
         return found
@@ -91,7 +97,7 @@ class Blocks:
                     values = as_numbers(task.values[k] for task in tasks)
                     if values is None:
                         return {}
-                    factor.columns(columns, values)
+                    _change(columns, factor, values)
         arrays = columns.arrays()
         made = [task for task, left in zip(tasks, columns.left, strict=True) if not left]
         if not made:
@@ -122,6 +128,22 @@ class Blocks:
             except SynctrlError:
                 self._benches[shared] = None
         return self._benches[shared]
+
+
+def _change(columns: Columns, factor: Factor, values: np.ndarray) -> None:
+    """Write the columns of a factor.
+
+    Raises:
+        SweepError: its function, which may be a user's, failed.
+    """
+    try:
+        factor.columns(columns, values)  # type: ignore[misc]
+    except SynctrlError:
+        raise
+    except Exception as error:
+        raise SweepError(
+            f"its columns failed with {type(error).__name__}: {error}", subject=f"factor '{factor.name}'"
+        ) from error
 
 
 def as_numbers(values: Iterable[Value]) -> np.ndarray | None:

@@ -110,9 +110,10 @@ class Columns:
 
     def _follow(self) -> None:
         """Make theta of robots that moved what it is for their inertial parameters now."""
-        cell, pi = self.run.loop.cell, self._arrays.get("pi")
+        if not self._moved:
+            return
+        cell, pi = self.run.loop.cell, self["pi"]
         for i in sorted(self._moved):
-            assert pi is not None
             true = pi[:, i, : 10 * cell.robots[i].body_count]
             found = _true_values(cell.parameters[i], true)
             self._arrays["theta"][:, i, : found.shape[1]] = found

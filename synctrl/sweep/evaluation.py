@@ -34,7 +34,7 @@ class Evaluation:
         workers: number of processes (or of workers of a new Dask cluster).
         backend: "joblib" for processes of this machine, "dask" for a cluster, "serial" for none of both.
         client: for "dask", a client or the address of a scheduler; by default a cluster of this machine.
-        batch: runs per task of a worker; by default as many as take about a second.
+        batch: runs per task of a worker; by default as many as take about a second, or fill the lanes.
 
     Attributes:
         rows: of all runs that are made, by number of the run.
@@ -106,12 +106,14 @@ class Evaluation:
 
     def _first(self, tasks: Sequence[Task], left: int) -> list[Row]:
         """Make some runs here, to see how long one takes."""
-        self._runner.go_together(tasks[:1])
+        together = self._runner.go_together(tasks)
         start = perf_counter()
         outcomes = [*self._runner.outcomes(tasks)]
         took = (perf_counter() - start) / len(tasks)
         share = -(-left // (SHARES * self.workers))
         size = max(1, min(int(BATCH_TIME / took), share))
+        if together:  # fewer runs side by side take as long
+            size = max(size, min(self._runner.lanes, -(-left // self.workers)))
         self._batch = max(size - size % self._runner.lanes, min(size, self._runner.lanes))
         return self._write(outcomes)
 

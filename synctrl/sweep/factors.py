@@ -73,6 +73,8 @@ class Factor:
             )
         if not callable(self.change):
             raise InputError.expected("a function", self.change, f"factor '{self.name}'")
+        if self.columns is not None and not callable(self.columns):
+            raise InputError.expected("a function or None", self.columns, f"factor '{self.name}', columns")
 
     def apply(self, setup: Setup, value: Value) -> Setup:
         """The setup with this factor at a value.
