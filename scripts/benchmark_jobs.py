@@ -117,7 +117,7 @@ class Stepper:
         return float(np.median(times)) / (self.steps - self.few)
 
     def _on_the_way(self) -> float:
-        """CPU time of a step, s, from the first to the last time that a run tells of itself; 0 if it does not.
+        """CPU time of a step, s, from the first to the last time that a run tells of itself; 0 without.
 
         What comes before the first step of a large cell outweighs its steps: no difference of runs has them.
         """
