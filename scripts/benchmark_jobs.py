@@ -98,9 +98,8 @@ class Stepper:
     ):
         self._plan = partial(self._planned, experiment, options)
         self._engines = make(), make()  # what one keeps is of one length
-        run, self._seconds = partial(self._run, 0), seconds
-        self._large = experiment.cell.n >= LARGE
-        self.steps = _enough(run, seconds, _most(experiment, kept))
+        self._seconds, self._large = seconds, experiment.cell.n >= LARGE
+        self.steps = _enough(partial(self._run, 0), seconds, _most(experiment, kept))
         self.few = max(1, round(FEW * self.steps))
         for which, steps in enumerate((self.steps, self.few)):
             self._run(which, steps)
@@ -168,8 +167,8 @@ class Bench:
         if cell not in self._cells:
             self._cells[cell] = cell_named(cell)
         experiment, key = self._cells[cell], (cell, width, kept, str(options))
+        make = partial(engine, self._libraries, width, kept)
         if key not in self._steppers:
-            make = partial(engine, self._libraries, width, kept)
             self._steppers[key] = Stepper(experiment, make, options or {}, seconds, kept)
         return {"seconds": self._steppers[key].measure(), "robots": experiment.cell.n}
 

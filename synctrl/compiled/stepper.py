@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from functools import cached_property
 from typing import NamedTuple
@@ -61,7 +62,7 @@ class Told(NamedTuple):
     kept: list[np.ndarray]
 
 
-class Stepper:
+class Stepper(ABC):
     """The structure `Steps` of a run, told of one block after another.
 
     Args:
@@ -72,11 +73,13 @@ class Stepper:
         steps: what the library is given.
     """
 
+    _told: Told
+
     def __init__(self, program: CompiledLoop, run: Run):
         self.program, self.run = program, run
         period = run.info.get("control_period") or 0.0
         self.steps = structs.Steps(holds=run.every is not None, period=period)
-        self._told: Told | None = None
+        self._said: DesiredStretch | None = None
         self.say_what_acts()
 
     def say_what_acts(self) -> None:
@@ -86,7 +89,7 @@ class Stepper:
 
     def look_at(self, block: DesiredStretch) -> None:
         """Say what is desired and happens in the steps of a block, if that was not said before."""
-        if self._told is None or block is not self._told.block:
+        if block is not self._said:
             self._say(self._read(block))
 
     def look_at_end(self) -> None:
@@ -96,9 +99,7 @@ class Stepper:
     def call(self, first: int, last: int) -> None:
         """Make some steps of the block that was told of last."""
         self._point(first, last)
-        told = self._told
-        assert told is not None
-        self._made(told.times[first : last + 1], told.marks[first:last])
+        self._made(self._told.times[first : last + 1], self._told.marks[first:last])
 
     # -- internals ----------------------------------------------------------------------------------------
 
@@ -127,21 +128,20 @@ class Stepper:
         kept = [self.steps.kept[name] for name in block.desired]
         return Told(block, np.ascontiguousarray(block.steps.times), marks, acting, arrays, kept)
 
+    @abstractmethod
     def _made(self, times: np.ndarray, marks: np.ndarray) -> None:
         """Call the library for steps between these times, with what happens at their starts."""
-        raise NotImplementedError
 
     def _say(self, told: Told) -> None:
         """Tell the library of a block."""
         for name, arrays in told.arrays.items():
             setattr(self.steps, name, arrays)
-        self.steps.length, self._told = len(told.marks), told
+        self.steps.length, self._told, self._said = len(told.marks), told, told.block
         self.steps.ends = told.block.ends.ctypes.data
 
     def _point(self, first: int, last: int) -> None:
         """Say which steps of the block are to be made."""
         steps, told = self.steps, self._told
-        assert told is not None
         disturbed, loaded = told.acting
         steps.first, steps.count = first, last - first
         steps.t, steps.marks = told.times[first:].ctypes.data, told.marks[first:].ctypes.data
