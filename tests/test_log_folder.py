@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from synctrl.compiled.tables import BLOCK_STEPS
 from synctrl.errors import InputError, ResultError, RunInterrupted, SimulationError
 from synctrl.simulation import memory
 from synctrl.simulation.log import AHEAD, OFTEN, Keeping, make_log
+from synctrl.simulation.log_folder import FolderWriter
 from synctrl.simulation.result import LAYOUT
 
 ENGINES = ["pinocchio", "compiled"]
@@ -293,3 +295,24 @@ def test_damaged_folders_are_refused_by_name(name, folder):
 def test_a_link_to_the_folder_itself_is_followed(folder, tmp_path):
     (tmp_path / "here").symlink_to(folder)
     assert Result.load(tmp_path / "here") == Result.load(folder)
+
+
+@pytest.mark.parametrize("when", [0, 1, 2])
+def test_an_interrupt_while_files_are_made_costs_no_row(when, tmp_path, monkeypatch):
+    writer = FolderWriter(tmp_path / "run", {"t": (), "q": (2, 3), "z": (4,)}, "float64")
+    opened, open_file = [], Path.open
+
+    def interrupted(path, *arguments, **options):
+        opened.append(path)
+        if len(opened) == when + 1:
+            raise KeyboardInterrupt
+        return open_file(path, *arguments, **options)
+
+    rows = {"t": np.arange(2.0), "q": np.arange(12.0).reshape(2, 2, 3), "z": np.ones((2, 4))}
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "open", interrupted)
+        with suppress(KeyboardInterrupt):
+            writer.put(0, rows)
+    writer.put(0, rows)
+    for name, array in writer.taken().items():
+        np.testing.assert_array_equal(array, rows[name])

@@ -47,7 +47,7 @@ class FolderWriter:
         self.folder, self._shapes = folder, row_shapes
         self._codes = {name: _CODES["float64" if name == "t" else dtype] for name in row_shapes}
         self._files: dict[str, IO[bytes]] = {}
-        self._count = 0
+        self._count, self._begun = 0, False
 
     def put(self, first: int, rows: Mapping[str, np.ndarray]) -> None:
         """Write rows of every array from a number on; once more if an interrupt came meanwhile."""
@@ -76,15 +76,18 @@ class FolderWriter:
         return {name: self._mapped(name) for name in self._files}
 
     def _open(self) -> None:
-        """Make the files, if they are not there yet."""
-        if self._files:
+        """Make those of the files that are not there yet; it can be called again if an interrupt came."""
+        if len(self._files) == len(self._shapes):
             return
-        self.folder.mkdir(parents=True)
-        (self.folder / ROWS).mkdir()
-        (self.folder / OUTPUTS).mkdir()
-        for name in self._shapes:
-            self._files[name] = self._path(name).open("xb")
-            self._files[name].write(b" " * LENGTH)
+        if not self._begun:
+            self.folder.mkdir(parents=True)
+            self._begun = True
+        for name in (ROWS, OUTPUTS):
+            (self.folder / name).mkdir(exist_ok=True)
+        for name in (name for name in self._shapes if name not in self._files):
+            file = self._path(name).open("wb")
+            file.write(b" " * LENGTH)
+            self._files[name] = file
 
     def _path(self, name: str) -> Path:
         return (self.folder if name in LAYOUT else self.folder / ROWS) / f"{name}.npy"
