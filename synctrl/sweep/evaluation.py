@@ -91,8 +91,7 @@ class Evaluation:
                     raise
                 todo = left
 
-    @property
-    def doubts(self) -> dict[int, Doubt]:
+    def look_into_doubts(self) -> dict[int, Doubt]:
         """What is to be doubted of runs that were made here, to their end, by number of the run.
 
         The worst of those with too long a step are made again, to find out which step would do.

@@ -260,7 +260,7 @@ class Sweep:
             for rows in evaluation.run(tasks):
                 bar.update(len(rows))
         table = journal.finish()
-        warn_of(evaluation.doubts, "sweep", self.study.base.dt)
+        warn_of(evaluation.look_into_doubts(), "sweep", self.study.base.dt)
         return table
 
     def _task(self, run: int) -> Task:

@@ -111,7 +111,7 @@ class _Search:
             found = self.found()
             if journal is not None:
                 found.save_front(journal.folder / FRONT)
-        warn_of(evaluation.doubts, "tune", self.study.base.dt)
+        warn_of(evaluation.look_into_doubts(), "tune", self.study.base.dt)
         return found
 
     def about(self, job: Job) -> dict[str, Any]:
