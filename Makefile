@@ -55,9 +55,10 @@ clean:
 	find . -path "./$(VENV)*" -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)/.installed-core: WHAT := .[compiled,mujoco]
-$(VENV)/.installed-test: WHAT := .[test,notebooks,compiled,compiler,mujoco,sweep,tune,xacro]
+$(VENV)/.installed-test: WHAT := .[test,notebooks,compiled,compiler,mujoco,sweep,tune,xacro,data]
+$(VENV)/.installed-docs: WHAT := .[docs,notebooks,compiled,compiler,mujoco,sweep,tune,xacro,data]
 $(VENV)/.installed-dev:  WHAT := .[dev]
-$(LOWEST)/.installed-lowest: WHAT := .[test,compiled,compiler,mujoco,sweep,tune]
+$(LOWEST)/.installed-lowest: WHAT := .[test,compiled,compiler,mujoco,sweep,tune,data]
 
 $(VENV)/.installed-%: $(VENV)/.made pyproject.toml constraints.txt
 	$(call install,$(VENV),$(WHAT),constraints.txt)
