@@ -103,8 +103,7 @@ def take_apart(nodes: Sequence[Node]) -> tuple[list[Frame], list[Body]]:
 
 
 def _visit(node: Node, parent: str, above: str, frames: list[Frame], bodies: list[Body]) -> None:
-    name = f"{above}/{node.name.partition(' ')[2]}" if above else node.name
-    name = name.removeprefix("robot ")
+    name = f"{above}/{node.name.partition(' ')[2]}" if above else node.name.removeprefix("robot ")
     frame = parent
     if len(node.position) > 1 or len(node.quaternion) > 1 or np.any(node.position):
         frame = name

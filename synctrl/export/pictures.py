@@ -40,13 +40,13 @@ class Pictures:
         """Topics and messages of picture k, which shows the time t, s; pictures are asked for in order."""
         yield FRAMES, self._transforms(k, t)
         if k == 0 and self._still:
-            yield STILL, _update(self._still, k, t)
+            yield STILL, update(self._still, k, t)
         if self._changing:
-            yield CHANGING, _update(self._changing, k, t)
+            yield CHANGING, update(self._changing, k, t)
         seen = [body for body in self._growing if body.seen(k)]
         if len(seen) != self._grown and self._growing:
             self._grown = len(seen)
-            yield GROWING, _update(seen, k, t)
+            yield GROWING, update(seen, k, t)
 
     def _transforms(self, k: int, t: float) -> Any:
         found = message("FrameTransforms")
@@ -86,8 +86,8 @@ def _named(values: np.ndarray) -> dict[str, float]:
     return dict(zip("xyzw", values.tolist(), strict=False))
 
 
-def _update(bodies: Sequence[Body], k: int, t: float) -> Any:
-    """All these bodies as they are in picture k."""
+def update(bodies: Sequence[Body], k: int, t: float) -> Any:
+    """A `SceneUpdate` with all these bodies as they are in picture k, which shows the time t, s."""
     found = message("SceneUpdate")
     for body in bodies:
         entity = found.entities.add(timestamp=stamp(t), frame_id=body.frame, id=body.name, frame_locked=True)
