@@ -298,6 +298,8 @@ def test_shapes_are_as_large_as_they_should_be_and_look_outwards(tmp_path):
     (entity,) = update([body], 0, 0.0).entities
     found = sorted(mesh.volume for mesh, _ in meshes(entity))
     np.testing.assert_allclose(found, sorted(expected), rtol=0.03)
+    cone = next(mesh for mesh, _ in meshes(entity) if np.isclose(mesh.volume, np.pi * 0.005 / 3, rtol=0.03))
+    np.testing.assert_allclose(cone.center_mass, turn.act(np.array([0, 0, -0.125])), atol=1e-3)  # point up
     pill = next(mesh for mesh, _ in meshes(entity) if len(mesh.vertices) == len(entity.triangles[0].points))
     np.testing.assert_allclose(pill.centroid, turn.translation, atol=1e-6)
 
