@@ -23,7 +23,6 @@ def test_the_examples_of_the_page_run_one_after_another(tmp_path, monkeypatch):
 
 def test_the_page_has_every_way_out_of_a_result():
     told = re.findall(r"^\| `result\.(\w+)\(", PAGE, flags=re.MULTILINE)
-    assert told == [name for name in ("to_xarray", "to_netcdf", "to_pandas", "to_csv", "to_mat", "to_mcap")]
     assert {*told} == {name for name in vars(Exported) if name.startswith("to_")}
 
 
