@@ -72,11 +72,11 @@ def test_every_number_of_every_instant_is_there_under_its_name(recording, name):
     assert json.loads(constant["/info"]["TextDocument:text"][0][0]) == dict(run.info)
 
 
-def test_curves_are_called_by_joint_and_unit(recording):
+def test_curves_are_called_by_robot_joint_and_unit(recording):
     first, second = made("sliding").names
     constant = recording("sliding")[True]
-    assert constant[f"/tau/{first}"]["SeriesLines:names"][0][0] == "rail [N]"
-    assert constant[f"/tau/{second}"]["SeriesLines:names"][0][:2] == ["shoulder [N·m]", "elbow [N·m]"]
+    assert constant[f"/tau/{first}"]["SeriesLines:names"][0][0] == f"{first}, rail [N]"
+    assert constant[f"/tau/{second}"]["SeriesLines:names"][0][2] == f"{second}, lift [N]"
 
 
 @pytest.mark.parametrize("name", ["sliding", "carried", "network"])

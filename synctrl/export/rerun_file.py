@@ -75,7 +75,9 @@ def _log_quantity(stream: Any, t: np.ndarray, quantity: Quantity) -> None:
     for row, columns in rows.items():
         path = rerun.new_entity_path([quantity.name, *filter(None, [row])])
         entries = [quantity.entries[k] for k in columns]
-        names = [f"{entry.column or entry.row or quantity.name} [{entry.unit}]" for entry in entries]
+        names = [
+            f"{', '.join(filter(None, entry[1:3])) or quantity.name} [{entry.unit}]" for entry in entries
+        ]
         stream.log(path, rerun.SeriesLines(names=names), static=True)
         values = numbers[:, columns].astype(float)
         series = rerun.Scalars.columns(scalars=values.ravel()).partition([len(columns)] * len(t))
