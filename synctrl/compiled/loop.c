@@ -108,7 +108,7 @@ static void drive(const Cell *c, Quantities *a, double t) {
 /* v' under a torque that is asked for, where sine and cosine are known, and q' = v */
 static void move(const Cell *c, Quantities *a, const vec *tau) {
     int joints = c->n * nv;
-    memcpy(a->q_dot, a->v, sizeof(vec) * joints);
+    for (int j = 0; j < joints; j++) a->q_dot[j] = a->v[j];
     for (int j = 0; j < joints; j++)
         a->moving[j] = (c->saturates ? applied(tau[j], a->limits[j]) : tau[j]) + a->disturbance[j];
     if (c->rubs)
