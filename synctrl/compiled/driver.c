@@ -1,32 +1,16 @@
 /* From step to step: samples, the method of Runge and Kutta, and what is looked at and kept on the way. */
 
-/* out = y + h slope */
-static void combine(vec *out, const vec *y, double h, const vec *slope, int size) {
-    int j = 0;
-    for (; j + WIDE <= size; j += WIDE) store_wide(out + j, load_wide(y + j) + h * load_wide(slope + j));
-    for (; j < size; j++) out[j] = y[j] + splat(h) * slope[j];
-}
-
-/* y += h (k1 + 2 (k2 + k3) + k4) */
-static void conclude(vec *y, double h, vec *const *k, int size) {
-    int j = 0;
-    for (; j + WIDE <= size; j += WIDE) {
-        wide middle = 2.0 * (load_wide(k[1] + j) + load_wide(k[2] + j));
-        store_wide(y + j, load_wide(y + j) + h * (load_wide(k[0] + j) + middle + load_wide(k[3] + j)));
-    }
-    for (; j < size; j++) y[j] += splat(h) * (k[0][j] + splat(2) * (k[1][j] + k[2][j]) + k[3][j]);
-}
-
 /* One step of the classical Runge-Kutta method from y, whose first slope is at hand. */
 static void runge_kutta(const Cell *c, Quantities *a, Work *k, const Steps *s, Rate *rate, int step, double h, vec *y) {
     static const int stages[] = { 0, 1, 1, 2 };
     vec *const *slope = k->k;
-    int size = state_size(c);
+    double *at = (double *)y, *const *rate_of = (double *const *)k->k;
+    long size = state_size(c) * LANES;
     for (int i = 1; i < 4; i++) {
-        combine(k->stage, y, i < 3 ? 0.5 * h : h, slope[i - 1], size);
+        combine((double *)k->stage, at, i < 3 ? 0.5 * h : h, rate_of[i - 1], size);
         rate(c, a, k, s, stages[i], step, k->stage, slope[i]);
     }
-    conclude(y, h / 6, slope, size);
+    conclude(at, h / 6, rate_of[0], rate_of[1], rate_of[2], rate_of[3], size);
 }
 
 /* Let adaptations make of their state what they do after a step or a sample, before anything is asked about it. */

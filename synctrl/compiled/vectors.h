@@ -86,16 +86,6 @@ VECTOR vec strided(const double *from) {
 #undef NEXT
 }
 
-/* Numbers one after another, whatever lanes they are in, in the widest registers that there are. */
-#define WIDE (8 / LANES)
-typedef double wide __attribute__((vector_size(64)));
-VECTOR wide load_wide(const vec *from) {
-    wide found;
-    memcpy(&found, from, sizeof found);
-    return found;
-}
-VECTOR void store_wide(vec *to, wide x) { memcpy(to, &x, sizeof x); }
-
 /* -- masks: all bits of a lane, or none -------------------------------------------------------------------------- */
 
 VECTOR ivec bits(vec x) { return ((Lanes){.all = x}).whole; }
