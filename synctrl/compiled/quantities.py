@@ -179,8 +179,8 @@ FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
         ),
         "measure": Signature(
             (
-                "q", "v", "sine", "cosine", "tool", "base", *DESIRED, *SLIDE, "weights", "W_inv", "posture", "gain",
-                "z", "body", "wrench", "lift", "share", "giving",
+                "q", "v", "sine", "cosine", "tool", "base", *DESIRED, *SLIDE, "weights", "W_inv", "posture",
+                "gain", "z", "body", "wrench", "lift", "share", "giving",
             ),
             (
                 "x", "e", "e_dot", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot", "J", "J_dot",
