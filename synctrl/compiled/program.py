@@ -28,7 +28,7 @@ AGREEMENT = 1e-9
 
 
 def generate(kinds: list[Kind], width: int) -> Iterator[str]:
-    """C sources one after another: of each function of kinds of robots and of objects, then the driver's two."""
+    """C sources one after another: of functions of kinds of robots and of objects, then the driver's two."""
     before = prelude(kinds, width)
     for k, kind in enumerate(kinds):
         for function in Trace(kind, f"kind{k}").functions():
