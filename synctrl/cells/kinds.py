@@ -47,9 +47,9 @@ class Kind:
     read: Callable[[Any], Mapping[str, Any]]
     model: type[Table]
 
-    def written(self, part: Any) -> dict[str, Any]:
-        """Keys and values of a part, but for those that are what they are by default."""
-        known, values = self.model.model_fields, self.read(part)
+    def told(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """The keys and values that a file has to say: those that are not what they are by default."""
+        known = self.model.model_fields
         given = {name: plain(value) for name, value in values.items() if value is not None}
         return {name: value for name, value in given.items() if not _is_default(known[name].default, value)}
 

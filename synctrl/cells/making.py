@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -18,13 +18,22 @@ from .folders import below
 from .kinds import Table
 from .problems import Misfit, Place
 from .robots import ARM, Base
-from .values import FileName, MotionName, PathName, RobotName
+from .values import FileName, MotionName, PathName, RobotName, RobotNumber
 
 #: parts of an experiment that are made as they stand, with the argument that each becomes
 PARTS = {
     "law": "law", "adaptation": "adaptation", "network": "network", "admittance": "admittance",
     "sensors": "sensors", "actuators": "actuators", "disturbances": "disturbances", "loads": "payloads",
     "plant": "plant_type",
+}  # fmt: skip
+#: what messages call parts of a file
+OTHERWISE: dict[str, Place] = {
+    "name": ("robots",), "disturbance": ("disturbances",), "payload": ("loads",), "payloads": ("loads",), "plant_type": ("plant",),
+}  # fmt: skip
+#: what messages call what is said of a robot
+WORDS = {
+    "trajectory": "motion", "q0": "q0", "v0": "v0", "theta_hat0": "estimate", "friction": "friction",
+    "parameters": "parameters",
 }  # fmt: skip
 #: values of an experiment
 VALUES = "title", "saturate", "reference_acceleration", "k_r_space"
@@ -54,7 +63,7 @@ class Maker:
         gains = self.part(file.gains, ("gains",))
         options = {name: getattr(file, name) for name in VALUES if name in keys}
         made = {PARTS[name]: self.part(getattr(file, name), (name,)) for name in PARTS if name in keys}
-        with _placed((), {"gains": ("gains",), "payloads": ("loads",)}):
+        with _placed((), self._meant()):
             return Experiment(cell, gains, file.duration, **options, **made)
 
     def part(self, value: Any, place: Place) -> Any:
@@ -77,6 +86,7 @@ class Maker:
         return {
             FileName: lambda name, place: below(self._folder, name, place),
             RobotName: self._robot_index,
+            RobotNumber: self._robot_number,
             MotionName: lambda name, place: self._shared("motions", "a motion", name, place),
             PathName: lambda name, place: self._shared("paths", "a path", name, place),
         }
@@ -110,6 +120,21 @@ class Maker:
             raise Misfit(place, f"expected {listed}, found {str(name)!r}{near(name, known)}", str(name))
         return self._names.index(name)
 
+    def _robot_number(self, number: int, place: Place) -> int:
+        if not 0 <= number < len(self._names):
+            last = len(self._names) - 1
+            raise Misfit(place, f"expected the number of a robot, from 0 to {last}, found {number}", number)
+        return int(number)
+
+    def _meant(self) -> dict[str, Place]:
+        """Places in the file, by the words with which errors about a cell name them."""
+        gains = {name: ("gains", name) for name in self._file.gains.model_fields_set}
+        names = [name or f"robot {i}" for i, name in enumerate(self._names, start=1)]
+        robots: dict[str, Place] = {name: ("robots", i) for i, name in enumerate(names)}
+        robots |= {f"{name}, {word}": (*robots[name], key) for name in names for word, key in WORDS.items()}
+        values = {name: (name,) for name in self._file.model_fields_set}
+        return {**values, **OTHERWISE, **gains, **robots}
+
     def _cell(self) -> Cell:
         file = self._file
         members = [self._member(robot, ("robots", i)) for i, robot in enumerate(file.robots)]
@@ -119,7 +144,7 @@ class Maker:
             coupling = maker(told)
         space = None if file.space is None else self.part(file.space, ("space",))
         clocks = {} if file.clocks is None else {"clocks": file.clocks}
-        with _placed((), {f"{name}": ("robots", i) for i, name in enumerate(_called(members))}):
+        with _placed((), self._meant()):
             return Cell(members, coupling, space, file.name, **clocks)
 
     def _member(self, table: Any, place: Place) -> Member:
@@ -144,7 +169,9 @@ class Maker:
         base: Base | None = values.get("base")
         if base is not None and base.name is None:
             values["base"] = base._replace(name=table.name)
-        with _placed(place, {name: (*place, name) for name in given}):
+        keys = {name: (*place, name) for name in given}
+        keys |= {name: (*place, "base", name) for name in ("xyz", "rpy") if base is not None}
+        with _placed(place, keys):
             return ARM.make(**values)
 
 
@@ -152,22 +179,20 @@ class _Unfinished:
     """A part that is being made."""
 
 
-def _called(members: list[Member]) -> list[str]:
-    return [member.name or f"robot {i}" for i, member in enumerate(members, start=1)]
-
-
 @contextmanager
-def _placed(place: Place, keys: dict[str, Place]) -> Iterator[None]:
+def _placed(place: Place, keys: Mapping[str, Place]) -> Iterator[None]:
     """Say at which place something is that is refused in between.
 
     Args:
         place: of the whole.
-        keys: places of what an error may be about, by the words with which its subject begins or ends.
+        keys: places of what an error may be about, by a word of its subject.
     """
     try:
         yield
     except SynctrlError as error:
         subject = error.subject or ""
-        words = [word.strip() for word in subject.split(",")]
-        at = next((keys[word] for word in words if word in keys), place)
-        raise Misfit(at, str(error), error.found) from error
+        words = [subject] if subject in keys else [word.strip() for word in subject.split(",") if subject]
+        at = next((keys[word] for word in reversed(words) if word in keys), place)
+        left = [word for word in words if word not in keys]
+        problem = (error.problem or str(error)) if not left else f"{', '.join(left)}: {error.problem or error}"
+        raise Misfit(at, problem, error.found) from error

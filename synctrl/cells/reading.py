@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +17,7 @@ from .file import CellTable
 from .making import Maker
 from .places import lines_of, nearest
 from .problems import CellFileError, Misfit, Place, key_of
-from .schema import keys_at
+from .schema import Loc, keys_at, kinds_at, meaning_at
 from .values import shown
 
 #: bytes of a cell file, at most
@@ -103,34 +103,53 @@ def _error(path: Path, text: str, misfit: Misfit) -> CellFileError:
 
 
 def _problems(path: Path, text: str, data: Any, error: ValidationError) -> Iterator[CellFileError]:
-    lines = lines_of(text)
-    for problem in error.errors(include_url=False):
-        place, words, found = _said(problem, data)
+    lines, found = lines_of(text), error.errors(include_url=False)
+    mistyped = {name for problem in found for name in _meant(problem, found)}
+    for problem in found:
+        if problem["type"] == "missing" and problem["loc"] in mistyped:
+            continue  # it is there under a name that is nearly the right one, which is said
+        place, words, value = _said(problem, data)
         key, line = key_of(place) or None, nearest(lines, place)
-        yield CellFileError(words, subject=key, found=found, file=path, line=line)
+        yield CellFileError(words, subject=key, found=value, file=path, line=line)
 
 
-def _said(problem: Mapping[str, Any], data: Any) -> tuple[Place, str, Any]:
+def _meant(problem: Any, found: Sequence[Any]) -> list[Loc]:
+    """Missing keys that a key without a meaning may have meant."""
+    *table, name = problem["loc"] or ("",)
+    if problem["type"] != "extra_forbidden":
+        return []
+    missing = [p["loc"] for p in found if p["type"] == "missing" and [*p["loc"][:-1]] == table]
+    return [loc for loc in missing if near(str(name), [str(loc[-1])])]
+
+
+def _said(problem: Any, data: Any) -> tuple[Place, str, Any]:
     """Where a problem is, in words, and what was found."""
-    kind, found = problem["type"], problem["input"]
-    place = _place(problem["loc"], data, kind == "missing")
+    kind, found, loc = problem["type"], problem["input"], problem["loc"]
+    place = _place(loc, data, kind == "missing")
     if kind == "missing":
-        return place, "expected a value, found none", None
+        meaning = meaning_at(loc).rstrip(".")
+        return place, f"expected a value{f' ({meaning})' if meaning else ''}, found none", None
     if kind == "extra_forbidden":
-        known = keys_at(problem["loc"][:-1])
-        words = f"expected no key of this name{near(str(place[-1]), known)}"
-        return place, f"{words}; known are {', '.join(known)}", place[-1]
-    if kind == "union_tag_invalid":
-        known = re.findall(r"'([^']*)'", problem["ctx"]["expected_tags"])
-        tag = problem["ctx"]["tag"]
-        listed = ", ".join(map(repr, known))
-        return (*place, "kind"), f"expected one of {listed}, found {tag!r}{near(tag, known)}", tag
-    if kind == "union_tag_not_found":
-        return place, f"expected a table with a `kind`, found {shown(found)}", found
+        known = keys_at(loc[:-1])
+        words = f"expected no key of this name{near(str(loc[-1]), known)}"
+        return place, f"{words}; known are {', '.join(known)}", loc[-1]
+    if kind.startswith("union_tag"):
+        return _unknown_kind(place, found, kinds_at(loc))
     if kind == "cell_value":
         return place, problem["msg"], found
     words = {"list_type": "a list", "dict_type": "a table", "model_type": "a table"}.get(kind, kind)
     return place, f"expected {words}, found {shown(found)}", found
+
+
+def _unknown_kind(place: Place, found: Any, known: list[str]) -> tuple[Place, str, Any]:
+    listed = f"one of {', '.join(map(repr, known))}"
+    if not isinstance(found, dict):
+        return place, f"expected a table with a `kind`, {listed}, found {shown(found)}", found
+    if "kind" not in found:
+        return (*place, "kind"), f"expected a value, {listed}, found none", None
+    kind = found["kind"]
+    said = f"{shown(kind)}{near(kind, known) if isinstance(kind, str) else ''}"
+    return (*place, "kind"), f"expected {listed}, found {said}", kind
 
 
 def _place(loc: tuple[str | int, ...], data: Any, missing: bool) -> Place:

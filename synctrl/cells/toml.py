@@ -28,8 +28,10 @@ def _table(data: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:
         name = ".".join(map(_key, (*path, key)))
         header, rows = ("[{}]", [value]) if isinstance(value, Mapping) else ("[[{}]]", value)
         for row in rows:
-            yield from ("", header.format(name))
-            yield from _table(row, (*path, key))
+            lines = [*_table(row, (*path, key))]
+            is_said = not isinstance(value, Mapping) or not lines or bool(lines[0])
+            yield from ("", header.format(name)) if is_said else ()
+            yield from lines
 
 
 def _has_own_lines(key: str, value: Any) -> bool:

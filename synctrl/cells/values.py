@@ -27,6 +27,10 @@ class RobotName(str):
     """A robot of the file, by name."""
 
 
+class RobotNumber(int):
+    """A robot of the file, counted from 0."""
+
+
 class FileName(str):
     """A file below the folder of the cell file."""
 
@@ -124,10 +128,10 @@ def choice(*words: str) -> Any:
     return _kept(partial(_choice, words), {"enum": list(words)})
 
 
-def _robot(value: Any) -> RobotName | int:
+def _robot(value: Any) -> RobotName | RobotNumber:
     if isinstance(value, str):
         return RobotName(value)
-    return _of(int, "the name of a robot, or its number, counted from 0", value)
+    return RobotNumber(_of(int, "the name of a robot, or its number, counted from 0", value))
 
 
 def _rotation(value: Any) -> Any:
@@ -183,6 +187,6 @@ def plain(value: Any) -> Any:
     """Arrays and numbers of numpy's as Python's; anything else as it is."""
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
-    if isinstance(value, (list, tuple)):
+    if type(value) in (list, tuple):
         return [plain(each) for each in value]
     return value

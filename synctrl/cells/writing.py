@@ -27,6 +27,7 @@ from .folders import from_folder
 from .plants import PLANTS
 from .problems import CellFileError, Misfit, Place, key_of
 from .robots import CHANGES
+from .sharing import with_names
 from .values import PLAIN, plain
 
 
@@ -79,7 +80,7 @@ class Writer:
         motions = [member.trajectory for member in cell.members]
         with _placed(("coupling",)):
             coupling = coupling_keys(cell.coupling, motions)
-        return {
+        said = {
             "form": FORM,
             **self._values(made),
             "robots": [self._member(member, ("robots", i)) for i, member in enumerate(cell.members)],
@@ -87,6 +88,7 @@ class Writer:
             **self._parts(made),
             **self._plant(made.plant_type),
         }
+        return with_names(said)
 
     def part(self, part: Any, place: Place) -> Any:
         """Plain data of a part.
@@ -108,7 +110,7 @@ class Writer:
             name = getattr(value, "__qualname__", type(value).__qualname__)
             words = f"expected a part that has a name in cell files, found {name}, which has none"
             raise Misfit(place, words, name)
-        keys = {name: self.part(each, (*place, name)) for name, each in kind.written(value).items()}
+        keys = {name: self.part(each, (*place, name)) for name, each in kind.told(kind.read(value)).items()}
         return {"kind": kind.name, **keys} if kind.name else keys
 
     # -- internals ----------------------------------------------------------------------------------------
@@ -235,10 +237,8 @@ class Writer:
         if kind is None:
             name = getattr(plant, "__qualname__", repr(plant))
             raise Misfit(place, f"expected a plant that has a name in cell files, found {name}", name)
-        keys: dict[str, Any] = {"kind": kind.name}
-        for name, value in given.items():
-            keys[name] = self._of_plant(name, value, (*place, name))
-        return {"plant": {name: value for name, value in keys.items() if value is not None}}
+        keys = {name: self._of_plant(name, value, (*place, name)) for name, value in given.items()}
+        return {"plant": {"kind": kind.name, **kind.told(keys)}}
 
     def _of_plant(self, name: str, value: Any, place: Place) -> Any:
         if name == "robots" and value is not None:
