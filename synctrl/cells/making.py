@@ -170,7 +170,9 @@ class Maker:
             if "holds" in parts:
                 return replace(held_by(robot, i, parts.pop("holds"), plant), **parts)
             if "motion" not in parts:
-                raise InputError("expected a desired motion, or what it `holds`, found none", subject="motion")
+                raise InputError(
+                    "expected a desired motion, or what it `holds`, found none", subject="motion"
+                )
             return _free(robot, **parts)
 
     def _robot(self, table: Any, place: Place) -> Robot:
@@ -186,7 +188,9 @@ class Maker:
             return ARM.make(**values)
 
 
-def _free(robot: Robot, motion: Any, known: float | None = None, estimate: Any = None, **parts: Any) -> Member:
+def _free(
+    robot: Robot, motion: Any, known: float | None = None, estimate: Any = None, **parts: Any
+) -> Member:
     """A member that holds nothing."""
     adapted = parts.pop("parameters", None)
     parts["parameters"] = None if adapted is None else adapted(robot)
@@ -217,7 +221,5 @@ def _placed(place: Place, keys: Mapping[str, Place]) -> Iterator[None]:
         words = [subject] if subject in keys else [word.strip() for word in subject.split(",") if subject]
         at = next((keys[word] for word in reversed(words) if word in keys), place)
         left = [word for word in words if word not in keys]
-        problem = (
-            (error.problem or str(error)) if not left else f"{', '.join(left)}: {error.problem or error}"
-        )
-        raise Misfit(at, problem, error.found) from error
+        said = str(error) if error.file or not error.problem else ": ".join([*left, error.problem])
+        raise Misfit(at, said, error.found) from error
