@@ -1,0 +1,31 @@
+"""Arguments and options that several commands have."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+CellFile = Annotated[Path, typer.Argument(metavar="CELL", help="A cell file (TOML).")]
+Folder = Annotated[
+    Path, typer.Option("--out", "-o", metavar="FOLDER", help="For everything that is written.")
+]
+Workers = Annotated[int, typer.Option(min=1, help="Number of processes.")]
+Duration = Annotated[
+    float | None, typer.Option(metavar="SECONDS", help="How long to run; by default what the file says.")
+]
+Step = Annotated[float, typer.Option("--dt", metavar="SECONDS", help="Step of the integration.")]
+Engine = Annotated[
+    str,
+    typer.Option(
+        help="pinocchio, compiled (C, many times faster), or auto: compiled where it can be had.",
+        metavar="ENGINE",
+    ),
+]
+Period = Annotated[
+    float | None,
+    typer.Option("--control-period", metavar="SECONDS", help="Hold torque so long; by default not at all."),
+]
+Seed = Annotated[int, typer.Option(min=0, help="Of random numbers.")]
