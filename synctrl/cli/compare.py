@@ -20,7 +20,8 @@ from ..files import reported, write_whole
 from ..simulation.simulate import Experiment
 from .answer import Answer, answering
 from .console import DIM, GOOD, lines, number, table
-from .engines import AUTO, chosen
+from .made import planned
+from .names import law_names
 from .options import CellFile, Duration, Engine, Json, Step
 from .plain import plain
 from .progress import waiting
@@ -31,6 +32,7 @@ Laws = Annotated[
         metavar="NAME,...",
         help="What the cell's own law is compared with: independent, chung-slotine, master-slave, "
         "computed-torque, pd-gravity, sun-mills.",
+        autocompletion=law_names,
     ),
 ]
 Equal = Annotated[
@@ -52,8 +54,8 @@ def compare(
     equal: Equal = [],  # noqa: B006
     out: Pages = None,
     duration: Duration = None,
-    dt: Step = 1e-3,
-    engine: Engine = AUTO,
+    dt: Step = None,
+    engine: Engine = None,
     as_json: Json = False,
 ) -> None:
     """Compare the law of a cell with others, each with as much gain, torque or tracking error as it.
@@ -63,16 +65,14 @@ def compare(
     the cell there is a second run with that.
     """
     with answering(as_json) as answer:
-        from ..cells import read_cell
         from .laws import named_laws
 
-        experiment = read_cell(cell)
+        asked = {"duration": duration, "dt": dt, "engine": engine}
+        experiment, how = planned(answer, cell, **asked)
         rules = [_rule(word) for word in equal] or [*RULES]
         others = named_laws(_others(laws, experiment), experiment.gains)
-        run, remark = chosen(engine, experiment, dt)
-        answer.data |= {"engine": run, "engine_remark": remark}
         with waiting(f"comparing {len(others)} laws with that of the cell, {len(rules)} rows each"):
-            found = compare_laws(experiment, others, rules, duration=duration, dt=dt, engine=run)
+            found = compare_laws(experiment, others, rules, **how)
         found = replace(found, rows=tuple(_renamed(row) for row in found.rows))
         _tell(answer, found)
         if out is not None:

@@ -10,6 +10,19 @@ def robot_names(incomplete: str) -> list[str]:
     return [name for name in catalog_names() if name.startswith(incomplete)]
 
 
+def engine_names(incomplete: str) -> list[str]:
+    """Names of engines."""
+    return [name for name in ("auto", "compiled", "pinocchio") if name.startswith(incomplete)]
+
+
+def law_names(incomplete: str) -> list[str]:
+    """Names of laws; of several, separated by commas, the last one is completed."""
+    from .laws import LAWS
+
+    before, comma, last = incomplete.rpartition(",")
+    return [f"{before}{comma}{name}" for name in LAWS if name.startswith(last)]
+
+
 def ready_cells(incomplete: str) -> list[str]:
     """Names of the ready cells that are experiments."""
     from .. import experiments

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from .names import engine_names
+
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 CellFile = Annotated[Path, typer.Argument(metavar="CELL", help="A cell file (TOML).")]
 Folder = Annotated[
@@ -16,16 +18,23 @@ Workers = Annotated[int, typer.Option(min=1, help="Number of processes.")]
 Duration = Annotated[
     float | None, typer.Option(metavar="SECONDS", help="How long to run; by default what the file says.")
 ]
-Step = Annotated[float, typer.Option("--dt", metavar="SECONDS", help="Step of the integration.")]
+Step = Annotated[
+    float | None,
+    typer.Option("--dt", metavar="SECONDS", help="Step; by default what the file says, or 0.001."),
+]
 Engine = Annotated[
-    str,
+    str | None,
     typer.Option(
-        help="pinocchio, compiled (C, many times faster), or auto: compiled where it can be had.",
         metavar="ENGINE",
+        help="pinocchio, compiled (C, many times faster), or auto: compiled where it can be had. By default "
+        "what the file says, or auto.",
+        autocompletion=engine_names,
     ),
 ]
 Period = Annotated[
     float | None,
-    typer.Option("--control-period", metavar="SECONDS", help="Hold torque so long; by default not at all."),
+    typer.Option(
+        "--control-period", metavar="SECONDS", help="Hold torque so long; by default as the file says."
+    ),
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Of random numbers.")]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
 
 from ..analysis.certify import Certificate, certify
@@ -82,14 +81,18 @@ def write_page(
     return page
 
 
-def cell_beside(path: Path) -> Experiment | None:
-    """The experiment of the cell file that lies beside a result, if there is one that can be read."""
+def cell_beside(answer: Answer, path: Path) -> Experiment | None:
+    """The experiment of the cell file that lies beside a result; None, and why, if there is none."""
     from ..cells import read_cell
 
     file = (path if path.is_dir() else path.parent) / CELL
+    reason = "the cell that made it is not known; name its file by --cell"
     if file.is_file():
-        with suppress(SynctrlError):
+        try:
             return read_cell(file)
+        except SynctrlError as error:
+            reason = f"{reason}: {error}"
+    answer.data["uncertified"] = reason
     return None
 
 

@@ -8,8 +8,7 @@ from typing import Annotated
 import typer
 
 from .answer import answering
-from .engines import AUTO
-from .made import How, make_run
+from .made import make_run, planned
 from .options import CellFile, Duration, Engine, Folder, Json, Period, Step
 from .pages import certified, tell_run, write_page, write_run
 
@@ -17,7 +16,9 @@ LogStep = Annotated[
     float | None,
     typer.Option("--log-dt", metavar="SECONDS", help="Interval of the log; by default the step."),
 ]
-Plant = Annotated[str, typer.Option(metavar="LIBRARY", help="What computes the plant: pinocchio or mujoco.")]
+Plant = Annotated[
+    str | None, typer.Option(metavar="LIBRARY", help="What computes the plant: pinocchio or mujoco.")
+]
 Page = Annotated[bool, typer.Option(help="Write the page with figures and animation, beside the numbers.")]
 
 
@@ -25,11 +26,11 @@ def run(
     cell: CellFile,
     out: Folder = Path("out"),
     duration: Duration = None,
-    dt: Step = 1e-3,
-    engine: Engine = AUTO,
+    dt: Step = None,
+    engine: Engine = None,
     control_period: Period = None,
     log_dt: LogStep = None,
-    plant: Plant = "pinocchio",
+    plant: Plant = None,
     page: Page = True,
     as_json: Json = False,
 ) -> None:
@@ -39,10 +40,9 @@ def run(
     shows them. A run that has to stop, or is interrupted by Ctrl-C, is written as far as it came.
     """
     with answering(as_json) as answer:
-        from ..cells import read_cell
-
-        experiment = read_cell(cell)
-        result = make_run(answer, experiment, How(duration, dt, engine, control_period, log_dt, plant))
+        asked = {"duration": duration, "dt": dt, "engine": engine, "control_period": control_period}
+        experiment, how = planned(answer, cell, **asked, log_dt=log_dt, plant=plant)
+        result = make_run(answer, experiment, how)
         certificate = certified(answer, result, experiment)
         tell_run(answer, result, certificate)
         write_run(answer, out, result, certificate, cell)

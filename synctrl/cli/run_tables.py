@@ -67,7 +67,7 @@ def _torque(result: Result, found: Metrics, robot: int) -> list[str | Text]:
     worst = int(np.argmax(peaks))
     limits = np.array([x if x else np.inf for x in about.get("torque_limits") or [None] * len(peaks)], float)
     share = float((peaks / limits).max())
-    words = f"{share:.0%}" if share else "no limit"
+    words = f"{number(100 * share, 2)} %" if share else "no limit"
     beyond = share > NEAR
     return [f"{number(peaks[worst])} {units[worst]}", Text(words, style=BAD) if beyond else words]
 

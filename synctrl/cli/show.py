@@ -50,10 +50,8 @@ def show(
         from ..simulation.result import Result
 
         loaded = Result.load(result)
-        experiment = cell_beside(result) if cell is None else read_cell(cell)
+        experiment = cell_beside(answer, result) if cell is None else read_cell(cell)
         certificate = None if experiment is None else certified(answer, loaded, experiment)
-        if experiment is None:
-            answer.data["uncertified"] = "the cell that made it is not known; name its file by --cell"
         tell_run(answer, loaded, certificate)
         if page:
             made = write_page(answer, _folder(result, out), loaded, certificate, experiment)

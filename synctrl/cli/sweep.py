@@ -10,7 +10,7 @@ import typer
 
 from . import codes
 from .answer import Answer, answering
-from .engines import AUTO, chosen
+from .made import planned
 from .options import CellFile, Duration, Engine, Folder, Json, Period, Seed, Step, Workers
 
 Vary = Annotated[
@@ -34,8 +34,8 @@ def sweep(
     samples: Samples = 1,
     seed: Seed = 0,
     duration: Duration = None,
-    dt: Step = 1e-3,
-    engine: Engine = AUTO,
+    dt: Step = None,
+    engine: Engine = None,
     control_period: Period = None,
     workers: Workers = 2,
     backend: Backend = "joblib",
@@ -48,37 +48,27 @@ def sweep(
     Rows are on the disk as soon as they are there: whatever ends a sweep, the same command goes on from them.
     """
     with answering(as_json) as answer:
-        from ..cells import read_cell
         from ..checks import choice
         from ..sweep import Sweep
         from ..sweep.measures import MEASURES
         from .values import read_factor
 
-        experiment = read_cell(cell)
         choice("--best", best, MEASURES)
+        asked = {"duration": duration, "dt": dt, "engine": engine, "control_period": control_period}
+        base = planned(answer, cell, **asked)
+        experiment, answer.data["folder"] = base.experiment, out
         factors = [read_factor("--vary", text, experiment.gains) for text in vary]
-        run, remark = chosen(engine, experiment, dt, control_period)
-        answer.data |= {"engine": run, "engine_remark": remark, "folder": out}
-        planned = Sweep(
-            experiment,
-            factors,
-            samples=samples,
-            seed=seed,
-            duration=duration,
-            dt=dt,
-            engine=run,
-            control_period=control_period,
-        )
+        made = Sweep(experiment, factors, samples=samples, seed=seed, **base.shared)
         try:
             shown = sys.stderr.isatty()
-            table = planned.run(out, workers, backend, keep_every=keep_every, progress=shown)
+            table = made.run(out, workers, backend, keep_every=keep_every, progress=shown)
             answer.data["table"] = table
         except KeyboardInterrupt as error:
             answer.fault(error, codes.INTERRUPTED)
-        _tell(answer, out, len(planned), [factor.name for factor in factors], best, experiment.cell)
+        _tell(answer, out, len(made), [factor.name for factor in factors], best, experiment.cell)
 
 
-def _tell(answer: Answer, folder: Path, planned: int, names: list[str], best: str, cell: object) -> None:
+def _tell(answer: Answer, folder: Path, whole: int, names: list[str], best: str, cell: object) -> None:
     from ..sweep.measures import definitions
     from ..sweep.rows import COMPLETED
     from .rows import best_table, endings, read_rows, spread_table, spreads
@@ -86,16 +76,16 @@ def _tell(answer: Answer, folder: Path, planned: int, names: list[str], best: st
     rows = read_rows(folder)
     good = [row for row in rows if row["status"] == COMPLETED and row.get(best) is not None]
     first = sorted(good, key=lambda row: row[best])[:LISTED]
-    answer.data |= {"planned": planned, "runs": len(rows), "endings": endings(rows)}
+    answer.data |= {"planned": whole, "runs": len(rows), "endings": endings(rows)}
     answer.data |= {"measures": spreads(rows), "best": first}
     ended = ", ".join(f"{count} {status}" for status, count in endings(rows).items())
-    answer.show(f"{len(rows)} of {planned} runs: {ended or 'none yet'}", "")
+    answer.show(f"{len(rows)} of {whole} runs: {ended or 'none yet'}", "")
     if good:
         units = definitions(cell)  # type: ignore[arg-type]
         answer.show(spread_table(rows, units), "")
         columns = [*names, *dict.fromkeys([best, "sync_rms", "tracking_rms", "peak_torque"])]
         answer.show(best_table(f"Least {best}, in SI units", first, columns), "")
-    if len(rows) < planned:
+    if len(rows) < whole:
         answer.show(f"Rows so far are in {folder}; the same command goes on from them.")
     else:
         answer.show(f"Written: {answer.data.get('table', folder)}")

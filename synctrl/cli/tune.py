@@ -11,7 +11,7 @@ import typer
 from ..errors import InputError, SynctrlError
 from ..tune import Tuned
 from .answer import Answer, answering
-from .engines import AUTO, chosen
+from .made import planned
 from .options import CellFile, Duration, Engine, Folder, Json, Period, Seed, Step, Workers
 
 Search = Annotated[
@@ -33,6 +33,15 @@ Limit = Annotated[
 Generations = Annotated[int, typer.Option(min=1, help="How often the population is renewed.")]
 Population = Annotated[int, typer.Option(min=5, help="Runs of a generation.")]
 
+File = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="The cell with the values found; by default FOLDER/tuned.toml. Robots' files "
+        "have to lie below its folder.",
+    ),
+]
+
 
 def tune(
     cell: CellFile,
@@ -45,32 +54,26 @@ def tune(
     population: Population = 24,
     seed: Seed = 0,
     duration: Duration = None,
-    dt: Step = 1e-3,
-    engine: Engine = AUTO,
+    dt: Step = None,
+    engine: Engine = None,
     control_period: Period = None,
     workers: Workers = 2,
+    tuned: File = None,
     as_json: Json = False,
 ) -> None:
     """Search ranges of gains for the best runs, and write the cell with the gains that were found.
 
     With several goals what is found is a front, and the run chosen is nearest to the best of every goal.
-    FOLDER/tuned.toml is the cell with its values; the same command goes on where it was interrupted.
+    FOLDER/tuned.toml is the cell with its values. The same command goes on where it was interrupted.
     """
     with answering(as_json) as answer:
-        from ..cells import read_cell
         from ..tune import tune as find
         from .values import read_factor
 
-        experiment = read_cell(cell)
+        asked = {"duration": duration, "dt": dt, "engine": engine, "control_period": control_period}
+        base = planned(answer, cell, **asked)
+        experiment, answer.data["folder"] = base.experiment, out
         factors = [read_factor("--search", text, experiment.gains) for text in search]
-        run, remark = chosen(engine, experiment, dt, control_period)
-        answer.data |= {"engine": run, "engine_remark": remark, "folder": out}
-        options: dict[str, Any] = {
-            "seed": seed,
-            "duration": duration,
-            "dt": dt,
-            "control_period": control_period,
-        }
         found = find(
             experiment,
             factors,
@@ -82,11 +85,12 @@ def tune(
             folder=out,
             workers=workers,
             progress=sys.stderr.isatty(),
-            engine=run,
-            **options,
+            seed=seed,
+            **base.shared,
         )
         _tell(answer, found)
         _write(answer, found, out)
+        _write_cell(answer, found, tuned or out / "tuned.toml", base.how)
 
 
 def _limits(texts: list[str]) -> dict[str, float]:
@@ -123,19 +127,26 @@ def _tell(answer: Answer, found: Tuned) -> None:
 
 
 def _write(answer: Answer, found: Tuned, folder: Path) -> None:
-    """The front as a table and a figure, and the cell with the values of the chosen run."""
-    from ..cells import write_cell
+    """The front as a table and a figure."""
     from ..show.front_figures import front_figure
     from ..show.plots import save
 
     written = [found.save_front(folder / "front.csv")]
     if len(found.goals) > 1:
         written += save(front_figure(found), folder / "front")
-    try:
-        write_cell(found.experiment, folder / "tuned.toml")
-        written.append(folder / "tuned.toml")
-    except SynctrlError as error:
-        answer.data["not_written"] = str(error)
-        answer.show("", f"Not written as a cell file: {error}")
     answer.data["written"] = written
     answer.show("", f"Written: {', '.join(map(str, written))}")
+
+
+def _write_cell(answer: Answer, found: Tuned, file: Path, how: dict[str, Any]) -> None:
+    """The cell with the values of the chosen run; one that no file can say is no failure of the search."""
+    from ..cells import write_cell
+
+    try:
+        write_cell(found.experiment, file, run={name: x for name, x in how.items() if name != "engine"})
+    except SynctrlError as error:
+        answer.data["not_written"] = str(error)
+        answer.show(f"Not written as a cell file: {error}")
+        return
+    answer.data["written"].append(file)
+    answer.show(f"Run it: synctrl run {file} -o out")

@@ -1,4 +1,6 @@
-"""What `--vary` and `--search` say: `gains.beta=log(5,150)`, as a factor of a sweep. A text is one of
+"""What `--vary` and `--search` say: `gains.beta=log(5,150)`, as a factor of a sweep.
+
+A text is one of
 
     NAME=uniform(LOW,HIGH)   NAME=log(LOW,HIGH)   NAME=normal(MEAN,STD)
     NAME=choice(A,B,...)     NAME=grid(A,B,...)
