@@ -27,7 +27,7 @@ nitpicky = True
 nitpick_ignore_regex = [(r"py:(?:class|obj|exc|data)", r".*")]  # types in signatures, and code in backticks
 
 # Pages: Markdown as code hosts show it.
-myst_enable_extensions = ["dollarmath", "amsmath", "tasklist"]
+myst_enable_extensions = ["dollarmath", "amsmath", "attrs_inline"]
 myst_heading_anchors = 4
 myst_dmath_double_inline = True
 suppress_warnings = ["myst.header"]  # a page may go from a title to a third level, as docstrings do

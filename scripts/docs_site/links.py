@@ -16,6 +16,9 @@ PIECES = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 
+#: tests that a page names for a statement, in brackets
+TESTS = re.compile(r"\[[^\[\]]*`test_[^\[\]]*\](?!\()")
+
 
 def relinked(text: str, page: str, places: Mapping[str, str]) -> str:
     """A page's text with the links that it needs at its place on the site.
@@ -45,7 +48,7 @@ def relinked(text: str, page: str, places: Mapping[str, str]) -> str:
             raise FileNotFoundError(f"{page}: the picture {path} is not on the site")
         return found["words"][1:-1]
 
-    return PIECES.sub(changed, text)
+    return TESTS.sub(r"\g<0>{.tests}", PIECES.sub(changed, text))
 
 
 def contents(index: str) -> dict[str, list[tuple[str, str]]]:
