@@ -30,11 +30,12 @@ def gather(work: Path) -> Path:
     with ThreadPoolExecutor(2) as pool:
         formulas = pool.submit(fetch, work / "npm", source / "_static" / "mathjax")
         runs = [pool.submit(executed, path, place, work / "executed") for path, place in notebooks.items()]
-        pages = reference.pages(reference.public_names(reference.example_sources(ROOT)))
+        names = reference.public_names(reference.example_sources(ROOT))
+        pages = reference.pages(names)
         for page, text in pages.items():
             keep(source / page, text.encode())
         keep(source / "_static" / "site.css", (ROOT / "docs" / "site.css").read_bytes())
-        written = stage(ROOT, source, made=pages)
+        written = stage(ROOT, source, pages, reference.sources(names))
         kept = [*written, *(source / page for page in pages), *notebooks.values(), source / "_static" / "site.css"]
         kept += formulas.result()
         for run in runs:

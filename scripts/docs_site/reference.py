@@ -18,6 +18,7 @@ from types import ModuleType
 from typing import Any
 
 import synctrl
+from docs_site.docstrings import escaped
 
 TITLES = {
     "": "The front",
@@ -105,6 +106,13 @@ def example_sources(root: Path) -> Iterator[str]:
         yield re.sub(r"(?m)^%.*", "", script.read_text("utf-8"))
 
 
+def sources(names: Iterable[Public]) -> dict[str, str]:
+    """Of the modules whose source the site shows beside entries, path in the repository and on the site."""
+    made = [each.thing for each in names if inspect.isclass(each.thing) or inspect.isfunction(each.thing)]
+    modules = [thing.__module__.split(".") for thing in made if thing.__module__.startswith("synctrl.")]
+    return {f"{'/'.join(module)}.py": f"_modules/{'/'.join(module)}.html" for module in modules}
+
+
 def entries(names: Iterable[Public]) -> dict[str, Public]:
     """By where it is defined, the name under which a thing has its entry: that with the shortest path."""
     found: dict[str, Public] = {}
@@ -126,9 +134,9 @@ def pages(names: list[Public]) -> dict[str, str]:
 def page(room: str, modules: dict[str, list[Public]], chosen: dict[str, Public]) -> str:
     """The page of a room: what its names are for in a table, then every entry."""
     package = import_module(f"synctrl.{room}" if room else "synctrl")
-    lines = [*heading(title_of(room), "="), escape(first_line(package)), ""]
+    lines = [*heading(title_of(room), "="), escaped(first_line(package)), ""]
     for module, names in sorted(modules.items(), key=lambda item: (item[0].count("."), item[0])):
-        lines += [*heading(f"From {module}", "-"), *table(names, chosen)]
+        lines += [*heading(f"From ``{module}``", "-"), *table(names, chosen)]
         for each in sorted(names, key=lambda each: each.name.lower()):
             if chosen[each.origin] == each:
                 lines += entry(each)
@@ -139,7 +147,7 @@ def table(names: list[Public], chosen: dict[str, Public]) -> list[str]:
     """A table of names, each a link to its entry, with the first sentence about it."""
     lines = [".. list-table::", "   :class: names", "   :widths: 1 2", ""]
     for each in sorted(names, key=lambda each: each.name.lower()):
-        lines += [f"   * - :py:obj:`{each.name} <{chosen[each.origin].path}>`", f"     - {escape(first_line(each.thing))}"]
+        lines += [f"   * - :py:obj:`{each.name} <{chosen[each.origin].path}>`", f"     - {escaped(first_line(each.thing))}"]
     return [*lines, ""]
 
 
@@ -161,15 +169,7 @@ def first_line(thing: Any) -> str:
     """The first sentence of a docstring that is a thing's own; of plain data its value."""
     if not (inspect.ismodule(thing) or callable(thing)):
         return f"`{thing!r}`"
-    words = " ".join((inspect.getdoc(thing) or "").partition("\n\n")[0].split())
-    return words
-
-
-def escape(words: str) -> str:
-    """Words of a docstring as reStructuredText."""
-    from docs_site.docstrings import escaped
-
-    return escaped(words)
+    return " ".join((inspect.getdoc(thing) or "").partition("\n\n")[0].split())
 
 
 def heading(words: str, line: str) -> list[str]:
