@@ -36,6 +36,7 @@ ROOMS = (
     "tune",
     "show",
     "experiments",
+    "cells",
     "paper",
 )
 
