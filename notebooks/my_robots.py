@@ -117,8 +117,8 @@ URDF = f"""<robot name="crane">
   </joint>
 </robot>
 """
-Path("crane.urdf").write_text(URDF)
-crane = load_robot("crane.urdf", tip="hand")
+Path("out/crane.urdf").write_text(URDF)
+crane = load_robot("out/crane.urdf", tip="hand")
 print(crane)
 print(crane.report)
 
@@ -142,11 +142,11 @@ print("torque of gravity, N·m:", crane.gravity(straight).round(4), "by hand:", 
 # message has the file, the line, what was found and what is expected.
 
 # %%
-Path("broken.urdf").write_text(
+Path("out/broken.urdf").write_text(
     URDF.replace("<inertia ", "<!-- ").replace('"/>\n    </inertial>', '" -->\n    </inertial>')
 )
 try:
-    load_robot("broken.urdf")
+    load_robot("out/broken.urdf")
 except SynctrlError as error:
     print(error)
 
@@ -348,9 +348,9 @@ side_by_side({"independent": alone, "tuned": tuned})
 # A result is a file without code, which opens years later with its robots. A scene is one HTML file.
 
 # %%
-tuned.save("tuned.npz")
-scene_of(tuned).write("tuned.html")
-print([(path.name, path.stat().st_size // 1024) for path in sorted(Path().glob("tuned.*"))], "kB")
+tuned.save("out/tuned.npz")
+scene_of(tuned).write("out/tuned.html")
+print([(path.name, path.stat().st_size // 1024) for path in sorted(Path("out").glob("tuned.*"))], "kB")
 
 # %% [markdown]
 # ## Exercises

@@ -89,9 +89,9 @@ measures = [OwnMeasure("peak_power", power, "largest", "W", "largest power of al
 # %%
 sweep = Sweep(planar_four(), factors, samples=RUNS, seed=0, duration=DURATION, dt=2e-3, measures=measures)
 begin = perf_counter()
-sweep.run("sweep", workers=2, progress=False)
+sweep.run("out/sweep", workers=2, progress=False)
 took = perf_counter() - begin
-table = load("sweep")
+table = load("out/sweep")
 print(f"{len(table)} runs of {DURATION:g} s in {took:.1f} s, {len(table) / took:.0f} runs per second")
 print(table["status"].value_counts().to_dict())
 

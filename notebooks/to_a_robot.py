@@ -222,9 +222,9 @@ print(f"and on it goes: hands apart by {1e3 * np.linalg.norm(patient.signals.eps
 # `load` reads it into another controller, which goes on as the first one would have.
 
 # %%
-patient.save("controller.npz")
+patient.save("out/controller.npz")
 another = experiment.controller(PERIOD, faults="hold")
-another.load("controller.npz")
+another.load("out/controller.npz")
 sample = robots.read()
 print("the same next torque:", np.array_equal(another.step(*sample), patient.step(*sample)))
 
