@@ -37,7 +37,9 @@ ROOMS = (
     "show",
     "export",
     "experiments",
+    "cells",
     "paper",
+    "cli",
 )
 
 # Imported inside the functions that use them: most users of a robot need neither figures nor a second engine.
@@ -53,6 +55,8 @@ EXPORTING = ("xarray", "h5netcdf", "mcap", "mcap_protobuf", "foxglove_schemas_pr
 OWNERS = {
     "matplotlib": {"show", "paper"},
     "meshcat": {"show"},
+    "typer": {"cli"},
+    "rich": {"cli"},
     **{library: {"export"} for library in EXPORTING},
 }
 
@@ -138,8 +142,9 @@ def arrows(package: Path) -> Iterator[tuple[str, str, int]]:
 
 
 def room(module: str) -> str:
-    """ "synctrl.robots.urdf" -> "robots"; "" for the package itself."""
-    return module.split(".")[1] if "." in module else ""
+    """ "synctrl.robots.urdf" -> "robots"; "" for the package itself, and for what `python -m` runs of it."""
+    name = module.split(".")[1] if "." in module else ""
+    return "" if name == "__main__" else name
 
 
 def unknown_rooms(package: Path) -> list[str]:

@@ -22,7 +22,7 @@ from .log_folder import DTYPES, FolderWriter
 from .memory import check_fits, check_fits_disk
 
 #: rows that an engine may fill before it counts them, at most
-AHEAD = 1024
+AHEAD = 4096
 #: rows that are passed on together where they come one by one
 OFTEN = 64
 #: doubles in a piece of memory: the allocator of Linux gives up to 32 MB out again without asking the system
