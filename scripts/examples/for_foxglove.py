@@ -16,7 +16,6 @@ from synctrl.show.style import robot_color
 out, short = arguments(__doc__)
 result = planar_four().simulate(0.1 if short else 2.0, dt=1e-3)
 path = result.to_mcap(out / "for_foxglove.mcap", fps=60)
-
 frames, errors = [], []
 with path.open("rb") as file:
     reader = make_reader(file, decoder_factories=[DecoderFactory()])
@@ -29,11 +28,9 @@ with path.open("rb") as file:
 with style():
     figure, ((plane, time),) = new_figure(3.6, 1, 2, width=7.4)
     for k in range(1, 5):
-        joints = f"robot {k}/joint1", f"robot {k}/joint2"
+        names = f"robot {k}/joint1", f"robot {k}/joint2", f"sphere tip of robot {k}"
         for each in frames[:: max(1, len(frames) // 8)]:
-            points = np.array(
-                [(each[name].x, each[name].y) for name in (*joints, f"sphere tip of robot {k}")]
-            )
+            points = np.array([(each[name].x, each[name].y) for name in names])
             plane.plot(*points.T, "o-", ms=3, color=robot_color(k - 1), alpha=0.4)
     plane.set(aspect="equal", xlabel="x, m", ylabel="y, m", title="arms, from /tf")
     t, *coordinates = np.array(errors).T
