@@ -45,7 +45,9 @@ def test_the_page_has_every_kind_and_no_other():
 @pytest.mark.parametrize("name", [name for name, kind in KINDS.items() if not issubclass(kind, Warning)])
 def test_a_section_says_what_its_kind_derives_from(name):
     (told,) = re.findall(r"(?m)^\*A kind of (.*)\.\*$", SECTIONS[name])
-    assert re.findall(r"`(\w+)`", told) == [base.__name__ for base in KINDS[name].__bases__ if base is not Portable]
+    assert re.findall(r"`(\w+)`", told) == [
+        base.__name__ for base in KINDS[name].__bases__ if base is not Portable
+    ]
 
 
 @pytest.mark.parametrize("name", SECTIONS)
