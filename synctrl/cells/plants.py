@@ -28,7 +28,7 @@ from .kinds import kind, one_of, table_or
 from .motions import BODY
 from .robots import ARM
 from .values import (
-    ANY_NUMBERS,
+    INERTIA,
     MATRIX,
     NUMBER,
     NUMBERS,
@@ -80,7 +80,7 @@ SPACE = one_of(*SPACES)
 DISTURBANCE = kind("", Disturbance, robot=ROBOT, torque=NUMBERS, start=NUMBER, stop=NUMBER)
 LOAD = kind(
     "", Payload,
-    robot=ROBOT, mass=NUMBER, com=VECTOR, inertia=ANY_NUMBERS, frame=TEXT, start=NUMBER, stop=NUMBER,
+    robot=ROBOT, mass=NUMBER, com=VECTOR, inertia=INERTIA, frame=TEXT, start=NUMBER, stop=NUMBER,
 )  # fmt: skip
 
 # -- objects -----------------------------------------------------------------------------------------------
@@ -99,7 +99,7 @@ def _pin(part: Pin) -> dict[str, Any]:
 OUTLINE = kind("", Outline, points=MATRIX, thickness=NUMBER)
 OBJECT = kind(
     "", CarriedObject, read=_object,
-    mass=NUMBER, com=VECTOR, inertia=ANY_NUMBERS, box=VECTOR, center=VECTOR, name=TEXT, shape=OUTLINE.model,
+    mass=NUMBER, com=VECTOR, inertia=INERTIA, box=VECTOR, center=VECTOR, name=TEXT, shape=OUTLINE.model,
 )  # fmt: skip
 FIXTURES = (
     kind("fixture", Fixture, stiffness=VECTOR, damping=VECTOR),

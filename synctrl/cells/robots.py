@@ -22,7 +22,22 @@ from ..robots.parameters import (
 from ..robots.payload import Payload, carrying, holding
 from ..robots.robot import Robot
 from .kinds import kind, one_of, table_or
-from .values import ANGLE, ANGLES, ANY_NUMBERS, FILE, NUMBER, NUMBERS, ROTATION, SOURCE, TEXT, TRUTH, VECTOR, choice, scalar
+from .values import (
+    ANGLE,
+    ANGLES,
+    ANY_NUMBERS,
+    INERTIA,
+    FILE,
+    NUMBER,
+    NUMBERS,
+    ROTATION,
+    SOURCE,
+    TEXT,
+    TRUTH,
+    VECTOR,
+    choice,
+    scalar,
+)
 
 Change = Callable[[Robot], Robot]
 
@@ -120,10 +135,10 @@ def moved(xyz: Any = (0.0, 0.0, 0.0), rpy: Any = (0.0, 0.0, 0.0), name: str | No
 
 
 BASE = kind("", None, Base, xyz=VECTOR, rpy=ANGLES, name=TEXT)
-INERTIAL = kind("", None, inertial, mass=NUMBER, com=VECTOR, inertia=ANY_NUMBERS)
+INERTIAL = kind("", None, inertial, mass=NUMBER, com=VECTOR, inertia=INERTIA)
 CHANGES = {
     "holding": kind("tool", None, tool, xyz=VECTOR, rotation=ROTATION, name=TEXT),
-    "carrying": kind("load", None, load, mass=NUMBER, com=VECTOR, inertia=ANY_NUMBERS, frame=TEXT),
+    "carrying": kind("load", None, load, mass=NUMBER, com=VECTOR, inertia=INERTIA, frame=TEXT),
     "with_tip": kind("tip", None, tip, tip=TEXT),
     "with_parameters": kind("bodies", None, bodies, pi=VECTOR),
     "with_armature": kind("rotors", None, rotors, armature=NUMBERS),
