@@ -1,4 +1,4 @@
-"""Task spaces, and what is beside plain robots in a cell: objects that they carry, joints that others hold."""
+"""Task spaces, and what is beside plain robots: objects that they carry, joints that others hold."""
 
 from __future__ import annotations
 
@@ -38,6 +38,7 @@ from .values import (
     VECTOR,
     angles,
     choice,
+    list_of,
     numbers,
 )
 
@@ -190,10 +191,10 @@ def meeting(duration: float) -> MakesPlant:
 
 
 PID = kind("", Pid, P=NUMBERS, I=NUMBERS, D=NUMBERS)
-_ARMS = list[ARM.model]  # type: ignore[name-defined]
+_ARMS = list_of(ARM.model)
 _CARRIED: dict[str, Any] = {
     "body": OBJECT.model,
-    "grasps": list[GRASP.model],  # type: ignore[name-defined]
+    "grasps": list_of(GRASP.model),
     "at": AT.model,
     "robots": _ARMS,
     "desired": BODY,

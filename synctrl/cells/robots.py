@@ -26,8 +26,8 @@ from .values import (
     ANGLE,
     ANGLES,
     ANY_NUMBERS,
-    INERTIA,
     FILE,
+    INERTIA,
     NUMBER,
     NUMBERS,
     ROTATION,
@@ -35,7 +35,9 @@ from .values import (
     TEXT,
     TRUTH,
     VECTOR,
+    by_name,
     choice,
+    list_of,
     scalar,
 )
 
@@ -188,14 +190,14 @@ def arm(
 ARM_KEYS: dict[str, Any] = {
     "robot": SOURCE,
     "tip": TEXT,
-    "locked": dict[str, ANGLE],
-    "packages": list[FILE],
-    "inertials": dict[str, INERTIAL.model],
+    "locked": by_name(ANGLE),
+    "packages": list_of(FILE),
+    "inertials": by_name(INERTIAL.model),
     "strict": TRUTH,
-    "xacro": dict[str, scalar()],
+    "xacro": by_name(scalar()),
     "gravity": TRUTH,
     "base": BASE.model,
-    "changes": list[one_of(*CHANGES.values())],  # type: ignore[misc]
+    "changes": list_of(one_of(*CHANGES.values())),
 }
 ARM = kind("", None, arm, **ARM_KEYS)
 
@@ -248,7 +250,7 @@ def rubbing(base: Adapted = FullParameters, armature: bool = False) -> Adapted:
 _RIGID = (
     kind("full", None, full),
     kind("base", None, base),
-    kind("linear", None, linear, matrix=ANY_NUMBERS, theta=VECTOR, names=list[TEXT]),  # type: ignore[valid-type]
+    kind("linear", None, linear, matrix=ANY_NUMBERS, theta=VECTOR, names=list_of(TEXT)),
     kind("planar-two-link", None, planar, masses=VECTOR, lengths=VECTOR),
 )
 RUBBING = kind("friction", None, rubbing, base=one_of(*_RIGID), armature=TRUTH)
