@@ -279,7 +279,7 @@ def test_nothing_is_said_to_diverge_that_does_not():
 
 def test_changes_one_after_another_come_to_an_end_that_converges():
     """Everything is wrong at once, and only the first change is ever made."""
-    cell = moving()
+    cell = CELLS["planar"]()
     gains = good(cell, period=PERIOD)
     gains = Gains(300 * gains.Lambda, 300 * gains.beta, 50 * gains.K_r, 1e4 * gains.K_eps, 1e5 * gains.Gamma)
     for _ in range(12):
