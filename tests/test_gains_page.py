@@ -47,7 +47,8 @@ def test_beta_and_k_eps_do_what_the_table_says():
         run = simulate(cell, some, 2.0, payloads=[Payload(0, 2.0)], engine="compiled")
         apart, off = (np.rad2deg(np.abs(part)) for part in (run.sync_error, run.tracking_error))
         found = apart.max(), apart[-1].max(), off.max()
-        np.testing.assert_allclose(found, [float(peak), float(left), float(error)], rtol=0.01, atol=6e-5)
+        told, last = np.array([peak, left, error], float), np.array([1e-3, 1e-4, 1e-3])
+        assert (np.abs(found - told) < 0.6 * last).all()
         margin = advise(cell, some, duration=1.0).delay.delay
         assert delay == ("every" if np.isinf(margin) else f"{1e3 * margin:.1f} ms")
 
