@@ -36,7 +36,9 @@ def again(experiment: Experiment, path: Path) -> Experiment:
     return read_cell(write_cell(experiment, path))
 
 
-@pytest.mark.parametrize(("make", "options"), CELLS, ids=[f"{make.__name__}-{k}" for k, (make, _) in enumerate(CELLS)])
+@pytest.mark.parametrize(
+    ("make", "options"), CELLS, ids=[f"{make.__name__}-{k}" for k, (make, _) in enumerate(CELLS)]
+)
 def test_a_ready_cell_reads_back_to_the_same_bits(make: Any, options: dict[str, Any], tmp_path: Path) -> None:
     experiment, path = make(**options), tmp_path / "cell.toml"
     back = again(experiment, path)

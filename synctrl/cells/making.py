@@ -194,5 +194,7 @@ def _placed(place: Place, keys: Mapping[str, Place]) -> Iterator[None]:
         words = [subject] if subject in keys else [word.strip() for word in subject.split(",") if subject]
         at = next((keys[word] for word in reversed(words) if word in keys), place)
         left = [word for word in words if word not in keys]
-        problem = (error.problem or str(error)) if not left else f"{', '.join(left)}: {error.problem or error}"
+        problem = (
+            (error.problem or str(error)) if not left else f"{', '.join(left)}: {error.problem or error}"
+        )
         raise Misfit(at, problem, error.found) from error
