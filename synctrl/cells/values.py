@@ -60,11 +60,14 @@ def misfit(expected: str, found: str) -> PydanticCustomError:
 
 
 def _depth(value: Any, level: int = 0) -> int:
-    """How deep numbers lie in lists."""
+    """How deep numbers lie in lists, the same everywhere."""
     if isinstance(value, list):
         if level == DEEPEST:
             raise misfit("lists that are not that deep", "more lists in lists")
-        return 1 + max((_depth(each, level + 1) for each in value), default=0)
+        depths = {_depth(each, level + 1) for each in value}
+        if len(depths) > 1:
+            raise misfit("numbers or lists", "some of each in one list")
+        return 1 + max(depths, default=0)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise misfit("numbers" if level else "a number", shown(value))
     return 0
@@ -96,7 +99,7 @@ def _number_schema(depth: int) -> dict[str, Any]:
     return {"type": "number"} if depth == 0 else {"type": "array", "items": _number_schema(depth - 1)}
 
 
-def _kept(read: Callable[[Any], Any], schema: dict[str, Any]) -> Any:
+def kept(read: Callable[[Any], Any], schema: dict[str, Any]) -> Any:
     """A type of values that `read` reads."""
     return Annotated[Any, PlainValidator(read), WithJsonSchema(schema)]
 
@@ -105,7 +108,7 @@ def numbers(*depths: int) -> Any:
     """Numbers in lists that are that deep."""
     schemas = [_number_schema(depth) for depth in depths]
     schema = schemas[0] if len(schemas) == 1 else {"anyOf": schemas}
-    return _kept(partial(_numbers, depths), schema)
+    return kept(partial(_numbers, depths), schema)
 
 
 def _of(kind: type, words: str, value: Any) -> Any:
@@ -114,7 +117,8 @@ def _of(kind: type, words: str, value: Any) -> Any:
     return value
 
 
-def _choice(words: tuple[str, ...], value: Any) -> str:
+def checked_choice(words: tuple[str, ...], value: Any) -> str:
+    """A text, if it is one of some words."""
     known = ", ".join(map(repr, words))
     if not isinstance(value, str):
         raise misfit(f"one of {known}", shown(value))
@@ -125,7 +129,7 @@ def _choice(words: tuple[str, ...], value: Any) -> str:
 
 def choice(*words: str) -> Any:
     """One of some words."""
-    return _kept(partial(_choice, words), {"enum": list(words)})
+    return kept(partial(checked_choice, words), {"enum": list(words)})
 
 
 def _robot(value: Any) -> RobotName | RobotNumber:
@@ -150,7 +154,7 @@ def _text_of(kind: Callable[[str], Any], words: str, value: Any) -> Any:
 
 def texts(kind: Callable[[str], Any], words: str) -> Any:
     """A text that stands for something else."""
-    return _kept(partial(_text_of, kind, words), {"type": "string"})
+    return kept(partial(_text_of, kind, words), {"type": "string"})
 
 
 def _source(value: Any) -> str:
@@ -167,18 +171,18 @@ def _scalar(value: Any) -> Any:
 
 def scalar() -> Any:
     """A number, a text or a truth value."""
-    return _kept(_scalar, {"type": ["number", "string", "boolean"]})
+    return kept(_scalar, {"type": ["number", "string", "boolean"]})
 
 
 NUMBER, VECTOR, MATRIX = numbers(0), numbers(1), numbers(2)
 #: one for all, or one for each
 NUMBERS, ANY_NUMBERS = numbers(0, 1), numbers(0, 1, 2, 3)
-INTEGER = _kept(partial(_of, int, "a whole number"), {"type": "integer"})
-TEXT = _kept(partial(_of, str, "a text"), {"type": "string"})
-TRUTH = _kept(partial(_of, bool, "true or false"), {"type": "boolean"})
-ROTATION = _kept(_rotation, {"type": "array", "minItems": 3, "maxItems": 3})
-ROBOT = _kept(_robot, {"type": ["string", "integer"]})
-SOURCE = _kept(_source, {"type": "string"})
+INTEGER = kept(partial(_of, int, "a whole number"), {"type": "integer"})
+TEXT = kept(partial(_of, str, "a text"), {"type": "string"})
+TRUTH = kept(partial(_of, bool, "true or false"), {"type": "boolean"})
+ROTATION = kept(_rotation, {"type": "array", "minItems": 3, "maxItems": 3})
+ROBOT = kept(_robot, {"type": ["string", "integer"]})
+SOURCE = kept(_source, {"type": "string"})
 FILE = texts(FileName, "a path below the folder of this file")
 MOTION_NAME, PATH_NAME = texts(MotionName, "the name of a motion"), texts(PathName, "the name of a path")
 
