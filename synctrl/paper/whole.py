@@ -87,34 +87,40 @@ def page_of(
         certificates: by name of the run.
         data: the metrics of every run.
     """
-    runs, fair = every.named(*PLANNED), {name: done[f"fair {name}"] for name in FAIR}
-    bodies, _ = done["bodies"]
-    claims, own = papers_claims(runs), our_findings(runs, bodies[BODIES], fair["planar_four"][0])
+    runs, (bodies, _) = every.named(*PLANNED), done["bodies"]
+    claims, own = papers_claims(runs), our_findings(runs, bodies[BODIES], done["fair planar_four"][0])
     found, tasks = zip(*(done[f"task {k}"] for k in range(len(TASKS))), strict=True)
     checked = [*claims, *own, *chain.from_iterable(found)]
-    after = [
-        honesty_section(own, what_parts_do(fair["planar_four"][1])),
-        grid_section(done["grid"], tried),
-        done["bodies"][1],
-        identification_section(done["learned"]),
-        *(section for _, _, section in fair.values()),
-        told(certificates, done["promises"]),
-        certificate_section(certificates, out / "figures"),
-        done["judge"],
-        step_section(runs),
-    ]
     cells = [done[name] for name in (*SCENES, "full", "friction")]
-    sections = [
-        introduction(checked, every),
-        *cells,
-        *tasks,
-        margins_told(done["margins"], done["map"]),
-        *after,
-    ]
+    margins = margins_told(done["margins"], done["map"])
+    sections = [introduction(checked, every), *cells, *tasks, margins]
+    sections += further(runs, own, tried, done, certificates, out / "figures")
     write_numbers(out / "metrics.json", data, checked, done, certificates)
     print_table(runs)
     print(f"\n{tally(checked)} The page says which do not, and why.")
     return write(out / "index.html", sections, max(run.t[-1] for run in runs.values()))
+
+
+def further(
+    runs: SavedRuns,
+    own: Sequence[Claim],
+    tried: float,
+    done: Mapping[str, Any],
+    certificates: Mapping[str, Certificate],
+    figures: Path,
+) -> list[Section]:
+    """The sections behind those of the tasks; arguments as of `page_of`, and what the paper leaves unsaid."""
+    return [
+        honesty_section(own, what_parts_do(done["fair planar_four"][1])),
+        grid_section(done["grid"], tried),
+        done["bodies"][1],
+        identification_section(done["learned"]),
+        *(done[f"fair {name}"][2] for name in FAIR),
+        told(certificates, done["promises"]),
+        certificate_section(certificates, figures),
+        done["judge"],
+        step_section(runs),
+    ]
 
 
 def write_numbers(
