@@ -58,7 +58,7 @@ def stage(root: Path, source: Path, made: Iterable[str], sources: Mapping[str, s
 
 
 def unnamed(index: str, pages: Iterable[str]) -> dict[str, list[str]]:
-    """By section of the index, the pages that it does not name, and that no page of a folder of theirs names."""
+    """By section of the index, the pages that it does not name."""
     named = {path for links in contents(index).values() for _, path in links} | {"index.md"}
     found: dict[str, list[str]] = {}
     for page in pages:
