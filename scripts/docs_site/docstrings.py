@@ -1,7 +1,7 @@
 """Docstrings of the package as Sphinx reads them: plain words, names in single backticks, indented code.
 
 They follow Google's style, but are no reStructuredText: a * or | in them is a star or an absolute value, and
-a name in backticks is code, and a link where the reference has that name. One item may be about several names.
+a name in backticks is code, and a link where the reference has that name. One item may have several names.
 """
 
 from __future__ import annotations
