@@ -1,0 +1,64 @@
+"""A task space of your own: coordinates around a post, in which a logarithmic spiral is a straight line.
+
+They are the logarithm of z = x + iy: how far the tip is, and in which direction. `measure` says where the robots
+are, `to_joints` and `to_torque` are the ways to joint space and back.
+"""
+
+import numpy as np
+from example import arguments
+
+from synctrl import CartesianSpace, Cell, Coupling, Cubic, Gains, Member, load_robot, simulate
+from synctrl.show.plots import new_figure, save, style
+from synctrl.tasks.inverse_kinematics import reach
+from synctrl.tasks.measurement import Measurement, Tips
+
+
+class AroundThePost:
+    unit = "1"
+
+    def labels(self, robots):
+        return "log distance", "direction"
+
+    def bind(self, robots):
+        self.tips = Tips(robots)
+        return self
+
+    def measure(self, motion, desired):
+        (p, v), J, J_dot = self.tips.positions(*motion)
+        z, z_dot = (part[:, :1] + 1j * part[:, 1:2] for part in (p, v))
+        dz, dz_dot = (part[:, 0] + 1j * part[:, 1] for part in (J, J_dot))
+        found = np.log(z), z_dot / z, dz / z, dz_dot / z - dz * z_dot / z**2
+        x, x_dot, J, J_dot = (np.stack((part.real, part.imag), axis=1) for part in found)
+        motion = np.array([x, x_dot])[..., 0]
+        return Measurement(motion, desired[:2] - motion, desired[1:], J, np.linalg.inv(J), J_dot)
+
+    def to_joints(self, task, xref_dot, xref_ddot):
+        v_ref = np.matvec(task.J_inv, xref_dot)
+        return v_ref, np.matvec(task.J_inv, xref_ddot - np.matvec(task.J_dot, v_ref))
+
+    def to_torque(self, task, force):
+        return np.matvec(task.J.mT, force)
+
+
+out, short = arguments(__doc__)
+members = []
+for bearing in (1.0, -1.0):  # rad, of the bases and the spirals, around a post at 0
+    arm = load_robot("planar2r").placed((0.45 * np.cos(bearing), 0.45 * np.sin(bearing), 0))
+    way = Cubic([np.log(0.25), bearing - 0.5], [np.log(0.1), bearing + 1.0], duration=1.5)
+    start = 0.25 * np.exp(1j * (0.95 * bearing - 0.5))  # a little beside the spiral, in opposite senses
+    q0 = reach(arm, np.array([start.real, start.imag]), np.zeros(2), CartesianSpace("xy"))
+    members.append(Member(arm, way, q0))
+gains = Gains(Lambda=6, beta=6, K_r=2, K_eps=0.5, Gamma=0.1)
+run = simulate(Cell(members, Coupling.pair(), AroundThePost()), gains, 0.05 if short else 2.0)
+z = np.exp(run.x[..., 0] + 1j * run.x[..., 1])
+wanted = np.exp(run.x_desired[..., 0] + 1j * run.x_desired[..., 1])
+with style():
+    figure, axes = new_figure(3.4, 1, 2, width=7.5)
+    axes[0, 0].plot(z.real, z.imag, label=run.names)
+    axes[0, 0].plot(wanted.real, wanted.imag, "k-.", lw=1, label=["desired", "_"])
+    axes[0, 0].plot(0, 0, "ko", label="post")
+    axes[0, 1].plot(*run.x.transpose(2, 0, 1))
+    axes[0, 0].set(xlabel="x, m", ylabel="y, m", aspect="equal", title="in the plane")
+    axes[0, 1].set(xlabel="log distance", ylabel="direction, rad", title="in the task space")
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+save(figure, out / "own_space")
