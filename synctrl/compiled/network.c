@@ -11,7 +11,9 @@
 /* A coordinate of the rows of robots, or pairs, that a term speaks of: one row per lane, see `Cell`. */
 INSIDE vec fetch(const Cell *c, const vec *rows, const int *places) {
     const double *numbers = (const double *)rows;
-    return c->scattered ? gather(numbers, places) : load(numbers + places[0]);
+    if (!c->scattered) return load(numbers + places[0]);
+    int together = c->n == 1 && c->p == 1; /* one row of robots, and one of pairs */
+    return together ? permuted(*rows, places) : gather(numbers, places);
 }
 
 /* S times rows of robots: one row per pair. */
