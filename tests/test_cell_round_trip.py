@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import tomllib
 import warnings
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+import jsonschema
 import pytest
 from cell_variants import CELLS, PARTS
 
 from synctrl import Experiment
-from synctrl.cells import read_cell, write_cell
+from synctrl.cells import read_cell, schema, write_cell
 from synctrl.experiments import a460_pair
 from synctrl.simulation.result import LAYOUT
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
+JUDGE = jsonschema.Draft202012Validator(schema())
 #: s, of a few steps
 LONG, STEP = 4e-3, 1e-3
 
@@ -36,11 +37,14 @@ def again(experiment: Experiment, path: Path) -> Experiment:
     return read_cell(write_cell(experiment, path))
 
 
-@pytest.mark.parametrize(("make", "options"), CELLS, ids=[f"{make.__name__}-{k}" for k, (make, _) in enumerate(CELLS)])
+@pytest.mark.parametrize(
+    ("make", "options"), CELLS, ids=[f"{make.__name__}-{k}" for k, (make, _) in enumerate(CELLS)]
+)
 def test_a_ready_cell_reads_back_to_the_same_bits(make: Any, options: dict[str, Any], tmp_path: Path) -> None:
     experiment, path = make(**options), tmp_path / "cell.toml"
     back = again(experiment, path)
     assert ran(back) == ran(experiment)
+    JUDGE.validate(tomllib.loads(path.read_text("utf-8")))
     assert write_cell(back, tmp_path / "again.toml").read_text() == path.read_text()
 
 

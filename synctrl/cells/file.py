@@ -7,9 +7,9 @@ from typing import Any
 
 from pydantic import Field, create_model
 
-from . import controls, couplings, motions, plants, robots
+from . import controls, couplings, holding, motions, plants, robots
 from .kinds import Kind, Table
-from .values import NUMBER, NUMBERS, TEXT, TRUTH, VECTOR, choice
+from .values import ANGLES, NUMBER, NUMBERS, TEXT, TRUTH, VECTOR, choice
 
 #: version of the form of these files
 FORM = "1"
@@ -36,9 +36,10 @@ def _named(kept: Any, meaning: str) -> _Key:
 #: what is said of a robot beside the robot itself
 MEMBER: dict[str, Any] = {
     "name": _optional(TEXT, "of the robot, for legends and messages"),
-    "motion": _key(motions.MOTION, "desired motion in the cell's space"),
-    "q0": _optional(VECTOR, "joint positions at t = 0, rad; by default on the path"),
-    "v0": _optional(VECTOR, "joint velocities at t = 0, rad/s; by default at rest"),
+    "motion": _optional(motions.MOTION, "desired motion in the cell's space, unless it `holds` an object"),
+    "holds": _optional(holding.HOLDS.model, "its share of the object in [plant] that it carries with others"),
+    "q0": _optional(ANGLES, "joint positions at t = 0, rad; by default on the path"),
+    "v0": _optional(ANGLES, "joint velocities at t = 0, rad/s; by default at rest"),
     "parameters": _optional(robots.PARAMETERS, 'what is adapted; by default "full"'),
     "known": _optional(NUMBER, "share of the true parameters with which the estimate begins"),
     "estimate": _optional(VECTOR, "the estimate at t = 0, in the place of `known`; by default zeros"),
@@ -100,7 +101,9 @@ VALUES: dict[str, Any] = {
 }
 CellTable = _table("Cell", "A cell with its controller and what disturbs it.", {**VALUES, **PARTS})
 
-KINDS: tuple[Kind, ...] = (*motions.KINDS, *robots.KINDS, *couplings.KINDS, *controls.KINDS, *plants.KINDS)
+KINDS: tuple[Kind, ...] = (
+    *motions.KINDS, *robots.KINDS, *couplings.KINDS, *controls.KINDS, *plants.KINDS, holding.HOLDS,
+)  # fmt: skip
 #: the kind of every table, by its type
 BY_TABLE: Mapping[type, Kind] = {each.model: each for each in KINDS}
 #: the kind of every part that has one, by the part's type

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from inspect import Parameter, getdoc, signature
 from typing import Annotated, Any, Literal, Union
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, create_model
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, create_model
 
-from .values import PLAIN, plain
+from .values import PLAIN, checked_choice, kept, misfit, plain
 
 #: of what stands in the place of a table
 NAMED, TABLE = "a name", "a table"
@@ -69,7 +69,7 @@ def kind(
     maker: Any = target if make is None else make
     tag = {"kind": (Literal[name], ...)} if name else {}
     text = getdoc(maker if target is None else target) or ""
-    model = table(name or maker.__name__, maker, fields, text, **tag)
+    model = table(name if target is None else target.__name__, maker, fields, text, **tag)
     return Kind(name, target, fields, maker, read or _attributes(tuple(fields)), model)
 
 
@@ -86,8 +86,10 @@ def table(
         further: keys that are no arguments, with type and default.
     """
     meant, known = meanings(text), signature(maker).parameters
-    keys = {key: (kept, _field(known[key], meant.get(key))) for key, kept in fields.items()}
-    made: Any = create_model(_title(name), __base__=Table, __doc__=text.partition("\n")[0], **further, **keys)
+    keys = {key: (each, _field(known[key], meant.get(key))) for key, each in fields.items()}
+    made: Any = create_model(
+        name or maker.__name__, __base__=Table, __doc__=text.partition("\n")[0], **further, **keys
+    )
     return made
 
 
@@ -99,10 +101,8 @@ def one_of(*kinds: Kind, named: Any = None) -> Any:
         named: the type of a text in the place of a table, which then is a name of something else.
     """
     choices: list[Any] = [Annotated[each.model, Tag(each.name)] for each in kinds]
-    choices += [] if named is None else [Annotated[named, Tag(NAMED)]]
-    tag = _tag if named is None else _tag_or_name
-    found = Annotated[Union[tuple(choices)], Discriminator(tag)]  # noqa: UP007
-    return found if named else Annotated[found, BeforeValidator(_with_kind)]
+    choices.append(Annotated[_alone(kinds) if named is None else named, Tag(NAMED)])
+    return Annotated[Union[tuple(choices)], Discriminator(_tag_or_name)]  # noqa: UP007
 
 
 def table_or(whole: Kind, other: Any) -> Any:
@@ -141,21 +141,28 @@ def _attributes(names: tuple[str, ...]) -> Callable[[Any], Mapping[str, Any]]:
     return lambda part: {name: getattr(part, name) for name in names}
 
 
-def _title(name: str) -> str:
-    return "".join(word.capitalize() for word in re.split(r"\W", name))
+def _alone(kinds: tuple[Kind, ...]) -> Any:
+    """A kind by its name alone: one that has to be told nothing."""
+    free = {each.name: each.model for each in kinds if not _needed(each)}
+
+    def read(name: str) -> Table:
+        needed = next((_needed(each) for each in kinds if each.name == name), ())
+        if needed:
+            raise misfit(f"a table, for {name!r} has to be told {', '.join(needed)}", f"{name!r} alone")
+        return free[checked_choice(tuple(each.name for each in kinds), name)](kind=name)
+
+    return kept(read, {"enum": list(free)})
 
 
-def _with_kind(value: Any) -> Any:
-    return {"kind": value} if isinstance(value, str) else value
-
-
-def _tag(value: Any) -> Any:
-    """The kind of a table that was read."""
-    return value.get("kind") if isinstance(value, dict) else getattr(value, "kind", None)
+def _needed(whole: Kind) -> list[str]:
+    fields = whole.model.model_fields
+    return [name for name in whole.fields if fields[name].is_required()]
 
 
 def _tag_or_name(value: Any) -> Any:
-    return NAMED if isinstance(value, str) else _tag(value)
+    if isinstance(value, str):
+        return NAMED
+    return value.get("kind") if isinstance(value, dict) else getattr(value, "kind", None)
 
 
 def _table_or_other(value: Any) -> str:

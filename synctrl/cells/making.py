@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..coupling.cell import Cell, Member
-from ..errors import SynctrlError, near
+from ..errors import InputError, SynctrlError, near
 from ..robots.friction import Friction
 from ..robots.robot import Robot
 from ..simulation.simulate import Experiment
 from .couplings import Told
 from .file import BY_TABLE, MEMBER
 from .folders import below
+from .holding import held_by, with_robots
 from .kinds import Table
 from .problems import Misfit, Place
 from .robots import ARM, Base
@@ -30,6 +32,10 @@ PARTS = {
 OTHERWISE: dict[str, Place] = {
     "name": ("robots",), "disturbance": ("disturbances",), "payload": ("loads",), "payloads": ("loads",), "plant_type": ("plant",),
 }  # fmt: skip
+#: keys of a robot that say the same, or that follow from each other
+APART = (
+    ("known", "estimate"), *(("holds", key) for key in ("motion", "q0", "known", "estimate", "parameters")),
+)  # fmt: skip
 #: what messages call what is said of a robot
 WORDS = {
     "trajectory": "motion", "q0": "q0", "v0": "v0", "theta_hat0": "estimate", "friction": "friction",
@@ -59,10 +65,14 @@ class Maker:
             Misfit: something that its class refuses, with its place.
         """
         file, keys = self._file, self._file.model_fields_set
-        cell = self._cell()
-        gains = self.part(file.gains, ("gains",))
         options = {name: getattr(file, name) for name in VALUES if name in keys}
         made = {PARTS[name]: self.part(getattr(file, name), (name,)) for name in PARTS if name in keys}
+        places = [("robots", i) for i in range(len(file.robots))]
+        arms = [self._robot(table, place) for table, place in zip(file.robots, places, strict=True)]
+        cell = self._cell(arms, made.get("plant_type"))
+        gains = self.part(file.gains, ("gains",))
+        if any(table.holds for table in file.robots):
+            made["plant_type"] = with_robots(made["plant_type"], arms)
         with _placed((), self._meant()):
             return Experiment(cell, gains, file.duration, **options, **made)
 
@@ -135,9 +145,9 @@ class Maker:
         values = {name: (name,) for name in self._file.model_fields_set}
         return {**values, **OTHERWISE, **gains, **robots}
 
-    def _cell(self) -> Cell:
+    def _cell(self, arms: Sequence[Robot], plant: Any) -> Cell:
         file = self._file
-        members = [self._member(robot, ("robots", i)) for i, robot in enumerate(file.robots)]
+        members = [self._member(i, arm, plant) for i, arm in enumerate(arms)]
         told = Told([member.trajectory for member in members], file.duration)
         maker = self.part(file.coupling, ("coupling",))
         with _placed(("coupling",), {"c": ("coupling", "c")}):
@@ -147,20 +157,23 @@ class Maker:
         with _placed((), self._meant()):
             return Cell(members, coupling, space, file.name, **clocks)
 
-    def _member(self, table: Any, place: Place) -> Member:
-        robot, given = self._robot(table, place), table.model_fields_set
-        parts = {name: self.part(getattr(table, name), (*place, name)) for name in MEMBER if name in given}
-        known, estimate = parts.pop("known", None), parts.pop("estimate", None)
-        if known is not None and estimate is not None:
-            raise Misfit((*place, "estimate"), "expected one of `known` and `estimate`, found both")
-        parts["trajectory"] = parts.pop("motion")
+    def _member(self, i: int, robot: Robot, plant: Any) -> Member:
+        table, place = self._file.robots[i], ("robots", i)
+        given = [name for name in MEMBER if name in table.model_fields_set]
+        parts = {name: self.part(getattr(table, name), (*place, name)) for name in given}
+        for first, second in APART:
+            if first in parts and second in parts:
+                raise Misfit((*place, second), f"expected one of `{first}` and `{second}`, found both")
         if parts.get("friction") == "none":
             parts["friction"] = Friction()
-        adapted = parts.pop("parameters", None)
         with _placed(place, {name: (*place, name) for name in given}):
-            parts["parameters"] = None if adapted is None else adapted(robot)
-            member = Member(robot, **parts, theta_hat0=estimate)
-            return member if known is None else Member(robot, **parts, theta_hat0=known * member.theta)
+            if "holds" in parts:
+                return replace(held_by(robot, i, parts.pop("holds"), plant), **parts)
+            if "motion" not in parts:
+                raise InputError(
+                    "expected a desired motion, or what it `holds`, found none", subject="motion"
+                )
+            return _free(robot, **parts)
 
     def _robot(self, table: Any, place: Place) -> Robot:
         """The robot of a member, which is called as the member is."""
@@ -173,6 +186,16 @@ class Maker:
         keys |= {name: (*place, "base", name) for name in ("xyz", "rpy") if base is not None}
         with _placed(place, keys):
             return ARM.make(**values)
+
+
+def _free(
+    robot: Robot, motion: Any, known: float | None = None, estimate: Any = None, **parts: Any
+) -> Member:
+    """A member that holds nothing."""
+    adapted = parts.pop("parameters", None)
+    parts["parameters"] = None if adapted is None else adapted(robot)
+    member = Member(robot, motion, theta_hat0=estimate, **parts)
+    return member if known is None else Member(robot, motion, theta_hat0=known * member.theta, **parts)
 
 
 class _Unfinished:
@@ -189,10 +212,14 @@ def _placed(place: Place, keys: Mapping[str, Place]) -> Iterator[None]:
     """
     try:
         yield
+    except ArithmeticError as error:
+        raise Misfit(
+            place, f"expected numbers with which one can reckon, found some that end in: {error}"
+        ) from error
     except SynctrlError as error:
         subject = error.subject or ""
         words = [subject] if subject in keys else [word.strip() for word in subject.split(",") if subject]
         at = next((keys[word] for word in reversed(words) if word in keys), place)
         left = [word for word in words if word not in keys]
-        problem = (error.problem or str(error)) if not left else f"{', '.join(left)}: {error.problem or error}"
-        raise Misfit(at, problem, error.found) from error
+        said = str(error) if error.file or not error.problem else ": ".join([*left, error.problem])
+        raise Misfit(at, said, error.found) from error

@@ -22,7 +22,7 @@ from ..robots.parameters import (
 from ..robots.payload import Payload, carrying, holding
 from ..robots.robot import Robot
 from .kinds import kind, one_of, table_or
-from .values import ANY_NUMBERS, FILE, NUMBER, NUMBERS, ROTATION, SOURCE, TEXT, TRUTH, VECTOR, choice, scalar
+from .values import ANGLE, ANGLES, ANY_NUMBERS, FILE, NUMBER, NUMBERS, ROTATION, SOURCE, TEXT, TRUTH, VECTOR, choice, scalar
 
 Change = Callable[[Robot], Robot]
 
@@ -42,7 +42,13 @@ class Base(NamedTuple):
 
 
 def inertial(mass: float, com: Any, inertia: Any) -> dict[str, Any]:
-    """Mass, kg, centre of mass, m, and inertia of a link in the place of what its file says."""
+    """Inertia of a link in the place of what its file says.
+
+    Args:
+        mass: kg.
+        com: centre of mass in the link's axes, (3,), m.
+        inertia: about the centre of mass, (3, 3), kg·m^2.
+    """
     return {"mass": mass, "com": com, "inertia": inertia}
 
 
@@ -71,17 +77,29 @@ def load(mass: float, com: Any = (0.0, 0.0, 0.0), inertia: Any = None, frame: st
 
 
 def tip(tip: str) -> Change:
-    """The robot is controlled at another frame of its description."""
+    """The robot is controlled at another frame of its description.
+
+    Args:
+        tip: name of the frame.
+    """
     return lambda robot: robot.with_tip(tip)
 
 
 def bodies(pi: ArrayLike) -> Change:
-    """The robot has other inertial parameters, ten for each body, in Pinocchio's order."""
+    """The robot has other inertial parameters.
+
+    Args:
+        pi: ten for each body, in Pinocchio's order, (10 bodies,).
+    """
     return lambda robot: robot.with_parameters(pi)
 
 
 def rotors(armature: ArrayLike) -> Change:
-    """The robot has rotors that turn with its joints, kg·m^2."""
+    """The robot has rotors that turn with its joints.
+
+    Args:
+        armature: rotor inertia times the square of the gear ratio, one number or one per joint, kg·m^2.
+    """
     return lambda robot: robot.with_armature(armature)
 
 
@@ -91,11 +109,17 @@ def weightless() -> Change:
 
 
 def moved(xyz: Any = (0.0, 0.0, 0.0), rpy: Any = (0.0, 0.0, 0.0), name: str | None = None) -> Change:
-    """The base is moved once more, see `base`."""
+    """The base is moved once more.
+
+    Args:
+        xyz: displacement in the world, (3,), m.
+        rpy: rotation about the fixed world axes x, y, z in that order, (3,), rad.
+        name: of the robot from then on.
+    """
     return lambda robot: robot.placed(xyz, rpy, name)
 
 
-BASE = kind("", Base, xyz=VECTOR, rpy=VECTOR, name=TEXT)
+BASE = kind("", None, Base, xyz=VECTOR, rpy=ANGLES, name=TEXT)
 INERTIAL = kind("", None, inertial, mass=NUMBER, com=VECTOR, inertia=ANY_NUMBERS)
 CHANGES = {
     "holding": kind("tool", None, tool, xyz=VECTOR, rotation=ROTATION, name=TEXT),
@@ -104,7 +128,7 @@ CHANGES = {
     "with_parameters": kind("bodies", None, bodies, pi=VECTOR),
     "with_armature": kind("rotors", None, rotors, armature=NUMBERS),
     "weightless": kind("weightless", None, weightless),
-    "placed": kind("moved", None, moved, xyz=VECTOR, rpy=VECTOR, name=TEXT),
+    "placed": kind("moved", None, moved, xyz=VECTOR, rpy=ANGLES, name=TEXT),
 }
 
 
@@ -149,7 +173,7 @@ def arm(
 ARM_KEYS: dict[str, Any] = {
     "robot": SOURCE,
     "tip": TEXT,
-    "locked": dict[str, NUMBER],
+    "locked": dict[str, ANGLE],
     "packages": list[FILE],
     "inertials": dict[str, INERTIAL.model],
     "strict": TRUTH,

@@ -65,12 +65,21 @@ class AxisRotation:
 
     @classmethod
     def fixed(cls, orientation: ArrayLike) -> Self:
-        """An orientation that does not change."""
+        """An orientation that does not change.
+
+        Args:
+            orientation: a rotation matrix, (3, 3).
+        """
         return cls(orientation, (0, 0, 1), Hold([0.0]))
 
     @classmethod
     def between(cls, start: ArrayLike, end: ArrayLike, duration: float) -> Self:
-        """The shortest way from one orientation to another, as a cubic polynomial from rest to rest."""
+        """The shortest way from one orientation to another, as a cubic polynomial from rest to rest.
+
+        Args:
+            start, end: rotation matrices, (3, 3).
+            duration: s.
+        """
         R0, R1 = rotation_matrix("start", start), rotation_matrix("end", end)
         phi = rotations.log(R1 @ R0.T)
         size = float(np.linalg.norm(phi))
@@ -79,7 +88,13 @@ class AxisRotation:
 
     @classmethod
     def steady(cls, start: ArrayLike, axis: ArrayLike, speed: float) -> Self:
-        """A turn at constant speed, rad/s."""
+        """A turn at constant speed.
+
+        Args:
+            start: orientation at t = 0, (3, 3).
+            axis: any length but 0, (3,).
+            speed: rad/s.
+        """
         return cls(start, axis, SteadyAngle(finite_number("speed", speed)))
 
     def __call__(self, t: ArrayLike) -> Turning:
@@ -88,7 +103,11 @@ class AxisRotation:
 
 
 class SteadyAngle:
-    """The angle of a turn at constant speed, rad/s, from 0 on."""
+    """The angle of a turn at constant speed, from 0 on.
+
+    Args:
+        speed: rad/s.
+    """
 
     dimension, breaks = 1, ()
 
