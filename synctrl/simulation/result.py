@@ -133,21 +133,24 @@ class Result:
         """
         return array_units(self.info, array)
 
-    def plot(self, *names: str, width: float = 6.4) -> Any:
+    def plot(self, *names: str, width: float | None = None, style: str | None = None) -> Any:
         """Figures by name, which a notebook shows: errors, torques with limits, paths and estimates.
 
         Args:
-            names: "tracking_error", "sync_error", "torque", "path", "estimates"; by default all of them.
-            width: of each figure, inches; at least 3.
+            names: "tracking_error", "sync_error", "torque", "path", "estimates", all of which are drawn by
+                default, and if asked for "tip_path", "phase_portrait", "spectrum", "consistency", "lyapunov".
+            width: of each figure, inches; by default that of the style.
+            style: None, 6.4 inches wide; "ieee", a column of a journal, 3.5 inches, that can be read in grey;
+                or "slides", 10 inches, with large words.
 
         Returns:
             A dictionary of matplotlib figures, a `Gallery`: `.save(folder)` writes them, `.missing` says what
             this result does not have.
 
         Raises:
-            InputError: an unknown name, or nothing that can be drawn.
+            InputError: an unknown name or style, too narrow a figure, or nothing that can be drawn.
         """
-        return import_module(FIGURES).gallery(self, *names, width=width)
+        return import_module(FIGURES).gallery(self, *names, width=width, style=style)
 
     def decimated(self, every: int) -> Self:
         """The first of every so many logged instants, and the last; `info["decimated"]` says how many.
