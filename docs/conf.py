@@ -40,6 +40,7 @@ default_role = "py:obj"
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
+autodoc_type_aliases = {name: name for name in ("ArrayLike", "WeightsLike", "GraphLike")}
 python_maximum_signature_line_length = 88
 toc_object_entries_show_parents = "hide"
 

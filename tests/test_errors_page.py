@@ -45,7 +45,9 @@ def test_the_page_has_every_kind_and_no_other():
 @pytest.mark.parametrize("name", [name for name, kind in KINDS.items() if not issubclass(kind, Warning)])
 def test_a_section_says_what_its_kind_derives_from(name):
     (told,) = re.findall(r"(?m)^\*A kind of (.*)\.\*$", SECTIONS[name])
-    assert re.findall(r"`(\w+)`", told) == [base.__name__ for base in KINDS[name].__bases__ if base is not Portable]
+    assert re.findall(r"`(\w+)`", told) == [
+        base.__name__ for base in KINDS[name].__bases__ if base is not Portable
+    ]
 
 
 @pytest.mark.parametrize("name", SECTIONS)
@@ -72,5 +74,5 @@ def test_what_the_first_example_prints_stands_below_it(capsys):
 
 def test_the_table_has_the_data_of_every_error():
     data = re.findall(r"`(\w+)`", " ".join(re.findall(r"(?m)^\| (`.*?) \|", PAGE)))
-    assert data == [name for name in ("subject", "found", "file", "line", "result", "problem")]
+    assert data == ["subject", "found", "file", "line", "result", "problem"]
     assert all(hasattr(SynctrlError("wrong"), name) for name in data)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import posixpath
 import re
 from collections.abc import Mapping
@@ -16,34 +17,45 @@ PIECES = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 
+#: words of a link that are a file's name: on the site it has the title of the page instead
+NAMED = re.compile(r"\[`?[\w./]+\.(?:md|ipynb)`?\]$")
 #: tests that a page names for a statement, in brackets
 TESTS = re.compile(r"\[[^\[\]]*`test_[^\[\]]*\](?!\()")
 
 
-def relinked(text: str, page: str, places: Mapping[str, str]) -> str:
+def relinked(text: str, page: str, places: Mapping[str, str], sources: Mapping[str, str]) -> str:
     """A page's text with the links that it needs at its place on the site.
 
     Args:
         text: Markdown.
         page: its path in the repository.
         places: of every file of the repository that is on the site, its path there.
+        sources: of every module whose source the site shows, its path there.
 
     Returns:
-        The text. Links to files that are on the site lead to their places there; of links to other files of
-        the repository the words are left.
+        The text. Links to files that are on the site lead to their places there, and so do links to modules
+        and their paths in code, which may begin in synctrl/. Of links to other files the words are left.
 
     Raises:
         FileNotFoundError: a picture that is not on the site.
     """
 
+    here = posixpath.dirname(places[page]) or "."
+
     def changed(found: re.Match[str]) -> str:
+        if found["code"]:
+            source = sources.get(found["code"][1:-1]) or sources.get(f"synctrl/{found['code'][1:-1]}")
+            return shown(found["code"][1:-1], posixpath.relpath(source, here)) if source else found[0]
         if found["link"] is None or OUTSIDE.match(found["target"]):
             return found[0]
         path, hash_, anchor = found["target"].partition("#")
-        there = places.get(posixpath.normpath(posixpath.join(posixpath.dirname(page), path)))
+        origin = posixpath.normpath(posixpath.join(posixpath.dirname(page), path))
+        there = places.get(origin)
         if there is not None:
-            here = posixpath.dirname(places[page]) or "."
-            return f"{found['words']}({posixpath.relpath(there, here)}{hash_}{anchor})"
+            words = "[]" if NAMED.match(found["words"]) else found["words"]
+            return f"{words}({posixpath.relpath(there, here)}{hash_}{anchor})"
+        if origin in sources:
+            return shown(found["words"][1:-1].strip("`"), posixpath.relpath(sources[origin], here))
         if found["words"].startswith("!"):
             raise FileNotFoundError(f"{page}: the picture {path} is not on the site")
         return found["words"][1:-1]
@@ -51,14 +63,21 @@ def relinked(text: str, page: str, places: Mapping[str, str]) -> str:
     return TESTS.sub(r"\g<0>{.tests}", PIECES.sub(changed, text))
 
 
+def shown(words: str, target: str) -> str:
+    """Code that leads to where the site shows the source."""
+    return f'<a class="source" href="{target}"><code>{html.escape(words)}</code></a>'
+
+
 def contents(index: str) -> dict[str, list[tuple[str, str]]]:
-    """Sections of the index, each with its links to pages, as (words, path), in the order in which they stand."""
+    """Sections of the index, each with its links to pages, as (words, path), in their order."""
     sections: dict[str, list[tuple[str, str]]] = {}
     for part in re.split(r"(?m)^## ", index)[1:]:
         title, _, body = part.partition("\n")
         links = [(found["words"][1:-1], found["target"]) for found in PIECES.finditer(body) if found["link"]]
         pages = [(words, path) for words, path in links if not OUTSIDE.match(path) and "#" not in path]
-        sections[title.strip()] = list({path: (words, path) for words, path in reversed(pages)}.values())[::-1]
+        sections[title.strip()] = list({path: (words, path) for words, path in reversed(pages)}.values())[
+            ::-1
+        ]
     return sections
 
 

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import re
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from docs_site.stage import keep
 
 ROOT = Path(__file__).resolve().parents[2]
 TIMEOUT = 300  # s, for a cell
+#: what IPython says of every animation
+HUSHED = "ignore:Consider using IPython.display.IFrame instead:UserWarning"
+#: where a cell is while it runs
+PLACE = re.compile(r"(?m)^\S*/ipykernel_\d+/\d+\.py:(?=\d+: )")
 
 
 def executed(path: Path, place: Path, cache: Path) -> Path:
@@ -37,16 +44,21 @@ def run(path: Path) -> str:
     from nbclient import NotebookClient
 
     notebook = nbformat.read(path, as_version=4)
-    resources = {"metadata": {"path": str(path.parent)}}
-    NotebookClient(notebook, timeout=TIMEOUT, kernel_name="python3", resources=resources).execute()
+    with TemporaryDirectory(ignore_cleanup_errors=True) as folder:  # what notebooks write stays there
+        resources = {"metadata": {"path": folder}}
+        client = NotebookClient(notebook, timeout=TIMEOUT, kernel_name="python3", resources=resources)
+        client.execute(env={**os.environ, "PYTHONWARNINGS": HUSHED, "PYTHONPATH": str(ROOT)})
     for cell in notebook.cells:
         cell.metadata.pop("execution", None)  # times, which differ
+        for output in cell.get("outputs", ()):
+            if output.output_type == "stream":
+                output.text = PLACE.sub("line ", output.text)
     return nbformat.writes(notebook)
 
 
 def digest(path: Path) -> str:
-    """What a notebook and all code of the package are, as a short text."""
-    found = hashlib.sha256(path.read_bytes())
+    """What a notebook, this file and all code of the package are, as a short text."""
+    found = hashlib.sha256(path.read_bytes() + Path(__file__).read_bytes())
     for module in sorted((ROOT / "synctrl").rglob("*.py")):
         found.update(module.read_bytes())
     return found.hexdigest()[:16]

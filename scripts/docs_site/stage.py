@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import posixpath
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from docs_site.links import contents, relinked, with_toctrees
@@ -28,13 +28,14 @@ def places(root: Path) -> dict[str, str]:
     return found
 
 
-def stage(root: Path, source: Path, made: Iterable[str] = ()) -> list[Path]:
+def stage(root: Path, source: Path, made: Iterable[str], sources: Mapping[str, str]) -> list[Path]:
     """Write pages and pictures of the repository to the source of the site; notebooks are left to others.
 
     Args:
         root: the repository.
         source: folder of the source; files there that are the same already are left alone.
         made: pages, as paths in the source, that others write.
+        sources: of every module whose source the site shows, its path there.
 
     Returns:
         What was written or is there already.
@@ -46,7 +47,7 @@ def stage(root: Path, source: Path, made: Iterable[str] = ()) -> list[Path]:
         if origin.endswith(".ipynb"):
             continue
         if origin.endswith(".md"):
-            text = relinked((root / origin).read_text("utf-8"), origin, where)
+            text = relinked((root / origin).read_text("utf-8"), origin, where, sources)
             if place == "index.md":
                 text = with_toctrees(text, unnamed(text, [*where.values(), *made]))
             keep(file, text.encode())
@@ -57,7 +58,7 @@ def stage(root: Path, source: Path, made: Iterable[str] = ()) -> list[Path]:
 
 
 def unnamed(index: str, pages: Iterable[str]) -> dict[str, list[str]]:
-    """By section of the index, the pages that it does not name, and that no page of a folder of theirs names."""
+    """By section of the index, the pages that it does not name."""
     named = {path for links in contents(index).values() for _, path in links} | {"index.md"}
     found: dict[str, list[str]] = {}
     for page in pages:
