@@ -38,6 +38,7 @@ ROOMS = (
     "experiments",
     "cells",
     "paper",
+    "cli",
 )
 
 # Imported inside the functions that use them: most users of a robot need neither figures nor a second engine.
@@ -48,7 +49,7 @@ ONLY_INSIDE_FUNCTIONS = {
 }
 
 # Libraries that belong to some rooms alone.
-OWNERS = {"matplotlib": {"show", "paper"}, "meshcat": {"show"}}
+OWNERS = {"matplotlib": {"show", "paper"}, "meshcat": {"show"}, "typer": {"cli"}, "rich": {"cli"}}
 
 # What rooms other than robots/ may use of Pinocchio: types and the rotation group, never its dynamics.
 GEOMETRY = {"SE3", "Quaternion", "exp3", "exp6", "log3", "log6", "Jlog3", "Jlog6"}
@@ -132,8 +133,9 @@ def arrows(package: Path) -> Iterator[tuple[str, str, int]]:
 
 
 def room(module: str) -> str:
-    """ "synctrl.robots.urdf" -> "robots"; "" for the package itself."""
-    return module.split(".")[1] if "." in module else ""
+    """ "synctrl.robots.urdf" -> "robots"; "" for the package itself, and for what `python -m` runs of it."""
+    name = module.split(".")[1] if "." in module else ""
+    return "" if name == "__main__" else name
 
 
 def unknown_rooms(package: Path) -> list[str]:
