@@ -41,6 +41,8 @@ WRONG = [
     ('center = [0.15, 0.35]', 'center = [0.15, 0.35, 0.0]', "robots[1].motion", "0.35, 0.0]"),
     ('center = [0.15, 0.35]', 'centre = [0.15, 0.35]', "robots[1].motion.centre", "centre"),
     ("base = { xyz = [0.35, 0.0, 0.0] }", "base = { xyz = [0.35, 0.0] }", "robots[1].base.xyz", "[0.35, 0.0]"),
+    ("base = { xyz = [0.35, 0.0, 0.0] }", 'base = { rpy = [0, 0, "1 turn"] }', "robots[1].base.rpy", "1 turn"),
+    ("known = 0.7", 'known = "7 deg"', "robots[1].known", "7 deg"),
     ("base = { xyz = [0.35, 0.0, 0.0] }", "base = [0.35, 0.0, 0.0]", "robots[1].base", "base = [0.35"),
     ("known = 0.7\nfriction", "known = 0.7\nestimate = [1.0]\nfriction", "robots[1].estimate", "estimate"),
 ]  # fmt: skip

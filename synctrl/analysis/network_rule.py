@@ -29,7 +29,7 @@ def too_late(case: Case, network: Communication | None) -> Iterator[Change]:
     """
     if not isinstance(network, Network) or not _lost(_frozen(case), network, 1.0):
         return
-    change = coupled(case, "with less of it every constant delay between robots is tolerated")
+    change = coupled(case, "late", "with less of it every constant delay between robots is tolerated")
     if change is not None:
         yield change
         case = replace(case, gains=change.gains)
@@ -59,4 +59,4 @@ def _sooner(case: Case, frozen: Frozen, network: Network) -> Change:
     )
     most = MARGIN * first_loss(lambda share: _lost(frozen, network, share), SHARES)
     why = "between robots that hear each other so late small errors grow"
-    return Change("diverges", f"network {what}", None, None, found, most * found, "s", why, case.gains)
+    return Change("late", f"network {what}", None, None, found, most * found, "s", why, case.gains)

@@ -27,12 +27,24 @@ from ..tasks.spaces import CartesianSpace, JointSpace
 from .kinds import kind, one_of, table_or
 from .motions import BODY
 from .robots import ARM
-from .values import ANY_NUMBERS, MATRIX, NUMBER, NUMBERS, ROBOT, ROTATION, TEXT, VECTOR, choice, numbers
+from .values import (
+    ANY_NUMBERS,
+    MATRIX,
+    NUMBER,
+    NUMBERS,
+    ROBOT,
+    ROTATION,
+    TEXT,
+    VECTOR,
+    angles,
+    choice,
+    numbers,
+)
 
 # -- spaces ------------------------------------------------------------------------------------------------
 
 DAMPING = kind("", Damping, threshold=NUMBER, largest=NUMBER)
-REDUNDANCY = kind("", Redundancy, posture=numbers(1, 2), gain=NUMBER, weights=numbers(0, 1, 2))
+REDUNDANCY = kind("", Redundancy, posture=angles(1, 2), gain=NUMBER, weights=numbers(0, 1, 2))
 
 
 def _tips(space: Any) -> dict[str, Any]:

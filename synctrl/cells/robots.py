@@ -22,7 +22,7 @@ from ..robots.parameters import (
 from ..robots.payload import Payload, carrying, holding
 from ..robots.robot import Robot
 from .kinds import kind, one_of, table_or
-from .values import ANY_NUMBERS, FILE, NUMBER, NUMBERS, ROTATION, SOURCE, TEXT, TRUTH, VECTOR, choice, scalar
+from .values import ANGLE, ANGLES, ANY_NUMBERS, FILE, NUMBER, NUMBERS, ROTATION, SOURCE, TEXT, TRUTH, VECTOR, choice, scalar
 
 Change = Callable[[Robot], Robot]
 
@@ -119,7 +119,7 @@ def moved(xyz: Any = (0.0, 0.0, 0.0), rpy: Any = (0.0, 0.0, 0.0), name: str | No
     return lambda robot: robot.placed(xyz, rpy, name)
 
 
-BASE = kind("", None, Base, xyz=VECTOR, rpy=VECTOR, name=TEXT)
+BASE = kind("", None, Base, xyz=VECTOR, rpy=ANGLES, name=TEXT)
 INERTIAL = kind("", None, inertial, mass=NUMBER, com=VECTOR, inertia=ANY_NUMBERS)
 CHANGES = {
     "holding": kind("tool", None, tool, xyz=VECTOR, rotation=ROTATION, name=TEXT),
@@ -128,7 +128,7 @@ CHANGES = {
     "with_parameters": kind("bodies", None, bodies, pi=VECTOR),
     "with_armature": kind("rotors", None, rotors, armature=NUMBERS),
     "weightless": kind("weightless", None, weightless),
-    "placed": kind("moved", None, moved, xyz=VECTOR, rpy=VECTOR, name=TEXT),
+    "placed": kind("moved", None, moved, xyz=VECTOR, rpy=ANGLES, name=TEXT),
 }
 
 
@@ -173,7 +173,7 @@ def arm(
 ARM_KEYS: dict[str, Any] = {
     "robot": SOURCE,
     "tip": TEXT,
-    "locked": dict[str, NUMBER],
+    "locked": dict[str, ANGLE],
     "packages": list[FILE],
     "inertials": dict[str, INERTIAL.model],
     "strict": TRUTH,

@@ -42,6 +42,9 @@ File = Annotated[
     ),
 ]
 
+#: how runs of the search were made, and not how the cell is to be run
+OF_SEARCH = ("engine", "duration")
+
 
 def tune(
     cell: CellFile,
@@ -143,7 +146,7 @@ def _write_cell(answer: Answer, found: Tuned, file: Path, how: dict[str, Any]) -
     from ..cells import write_cell
 
     try:
-        write_cell(found.experiment, file, run={name: x for name, x in how.items() if name != "engine"})
+        write_cell(found.experiment, file, run={name: x for name, x in how.items() if name not in OF_SEARCH})
     except SynctrlError as error:
         answer.data["not_written"] = str(error)
         answer.show(f"Not written as a cell file: {error}")

@@ -88,7 +88,7 @@ def second_readings(robot: Robot, xacro_args: Mapping[str, object] | None = None
 
 
 def _text(robot: Robot, xacro_args: Mapping[str, object] | None) -> bytes | None:
-    """The URDF of a robot without its shapes, as XML."""
+    """The URDF of a robot as XML, without its shapes; joints that follow others stand where they are held."""
     file = None if robot.document is None else robot.document.file
     if file is None:
         return None
@@ -98,9 +98,9 @@ def _text(robot: Robot, xacro_args: Mapping[str, object] | None) -> bytes | None
         return None
     for child in [each for each in root if each.tag not in ("link", "joint")]:
         root.remove(child)
-    for link in root.findall("link"):
-        for shape in [each for each in link if each.tag != "inertial"]:
-            link.remove(shape)
+    for part in root:
+        for child in [each for each in part if each.tag in ("visual", "collision", "mimic")]:
+            part.remove(child)
     return ElementTree.tostring(root)
 
 
