@@ -27,7 +27,7 @@ export PYTHONDONTWRITEBYTECODE :=
 
 help:
 	@echo "make reproduce   run every experiment of the paper and write out/index.html"
-	@echo "make docs        build the documentation, out/docs/index.html (npm fetches MathJax)"
+	@echo "make docs        build the documentation, out/docs/index.html (npm fetches MathJax; DOCS=--short is quicker)"
 	@echo "make test        run all tests (WORKERS=$(WORKERS) at a time)"
 	@echo "make test-lowest run those that depend on libraries with the oldest versions allowed"
 	@echo "make stress      run the long versions of tests, and print what they found (docs/reliability.md)"
@@ -39,7 +39,7 @@ reproduce: $(VENV)/.installed-core
 	@$(PY) scripts/reproduce.py
 
 docs: $(VENV)/.installed-docs
-	@$(PY) scripts/build_docs.py
+	@$(PY) scripts/build_docs.py $(DOCS)
 
 test: $(VENV)/.installed-test
 	@$(PY) -m pytest -q -n $(WORKERS) --dist loadfile

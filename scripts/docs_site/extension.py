@@ -30,9 +30,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Called by Sphinx."""
     names = reference.public_names(reference.example_sources(ROOT))
     app.add_config_value("public_paths", public_paths(names), "env")
-    app.connect(
-        "config-inited", lambda app, config: config.html_static_path.append(str(app.srcdir / "_static"))
-    )
+    app.connect("config-inited", with_files)
     app.connect("autodoc-process-docstring", markup)
     app.connect("autodoc-process-signature", signed)
     app.connect("autodoc-skip-member", skipped)
@@ -40,6 +38,12 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("doctree-read", with_origins)
     app.connect("env-updated", sources_lead_back)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def with_files(app: Sphinx, config: Any) -> None:
+    """Take files that the site has as they are from beside its source."""
+    config.html_static_path.append(str(app.srcdir / "_static"))
+    config.html_extra_path.append(str(app.srcdir.parent / "extra"))
 
 
 def public_paths(names: list[reference.Public]) -> dict[str, str]:
