@@ -11,7 +11,6 @@ and has not changed, is taken again. With `--short` the examples of the gallery 
 from __future__ import annotations
 
 import argparse
-import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -66,12 +65,24 @@ def written(source: Path, names: list[reference.Public]) -> list[Path]:
     return [*made, *stage(ROOT, source, others, reference.sources(names))]
 
 
+def stale(folder: Path, source: Path, extra: Path) -> list[Path]:
+    """Pages of the site that it had, and whose source is gone."""
+    found = []
+    for page in folder.rglob("*.html"):
+        name = page.relative_to(folder)
+        sources = [source / name.with_suffix(kind) for kind in (".md", ".rst", ".ipynb")]
+        own = name.parts[0].startswith("_") or str(name) in ("search.html", "genindex.html")
+        if not own and not any(path.is_file() for path in [*sources, extra / name]):
+            found.append(page)
+    return found
+
+
 def build(folder: Path, short: bool = False) -> int:
     """Build the site, and give what Sphinx ends with: 0 where it had nothing to complain of."""
     work = folder.with_name(f"{folder.name}-work")
     source = gather(work, short)
-    if (folder / "objects.inv").is_file():
-        shutil.rmtree(folder)  # pages that are gone would stay
+    for page in stale(folder, source, work / "extra"):
+        page.unlink()
     places = ["-c", str(ROOT / "docs"), "-d", str(work / "doctrees"), str(source), str(folder)]
     return subprocess.run([sys.executable, "-m", "sphinx", *OPTIONS, *places]).returncode
 
