@@ -35,7 +35,7 @@ def pixels(path: Path) -> np.ndarray:
     return imread(path)
 
 
-@pytest.mark.filterwarnings("error::synctrl.errors.StepWarning", "error::synctrl.errors.RobotWarning")
+@pytest.mark.filterwarnings("error::synctrl.errors.RobotWarning", "ignore::synctrl.errors.StepWarning")
 @pytest.mark.parametrize("name", NAMES)
 def test_a_script_writes_a_picture_that_shows_something(name, gallery, tmp_path):
     if name in EXTRAS:
