@@ -1,7 +1,7 @@
 """Agents: one controller for each robot, which knows its neighbours by their messages alone.
 
-What goes from one to another are bytes, so each may run on a machine of its own. Together they command what one
-controller for all would.
+What goes from one to another are bytes, so each may run on a machine of its own. Together they command what
+one controller for all would.
 """
 
 import numpy as np

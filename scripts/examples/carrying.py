@@ -1,7 +1,7 @@
 """Two arms carry one thing: bodies that touch, fixtures that give a little, and the force inside.
 
-Neither arm knows the mass of the box, and none feels a force. The arrows of the animation are the internal force:
-what the hands do to the box beyond carrying it.
+Neither arm knows the mass of the box, and none feels a force. The arrows of the animation are the internal
+force: what the hands do to the box beyond carrying it.
 """
 
 from example import arguments

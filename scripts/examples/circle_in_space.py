@@ -1,7 +1,7 @@
 """A circle in Cartesian space: two UR5 whose tips go round on circles that face each other.
 
-Paths are those of the tips, in metres. Both arms start a few centimetres off, where inverse kinematics finds
-joint positions for them, and know different shares of their own masses.
+Paths are those of the tips, in metres. Both arms start a few centimetres off, where inverse kinematics
+finds joint positions for them, and know different shares of their own masses.
 """
 
 import numpy as np

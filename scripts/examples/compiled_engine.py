@@ -1,7 +1,7 @@
 """The compiled engine: the whole closed loop as generated C, and how much faster that is.
 
-It is compared with the reference engine before it is used. The first run of a cell compiles; later ones find
-what was compiled.
+It is compared with the reference engine before it is used. The first run of a cell compiles; later ones
+find what was compiled.
 """
 
 from time import process_time

@@ -1,7 +1,7 @@
 """Integrators: fixed steps of Runge and Kutta, and adaptive methods of SciPy that judge them.
 
-How far a run with fixed steps is from one whose steps are chosen to be exact to ten digits, over the step. It
-falls with the fourth power, until rounding is all that is left.
+How far a run with fixed steps is from one whose steps are chosen to be exact to ten digits, over the step.
+It falls with the fourth power, until rounding is all that is left.
 """
 
 import warnings

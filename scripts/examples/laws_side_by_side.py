@@ -1,7 +1,7 @@
 """The field's laws side by side, at equal peak torque: with more gain every law tracks better.
 
-`compare` turns the free gain of each law until its quiet run takes as much torque as the paper's; then all are
-pushed.
+`compare` turns the free gain of each law until its quiet run takes as much torque as the paper's; then all
+are pushed.
 """
 
 from example import arguments

@@ -1,6 +1,7 @@
 """What beta does, mode by mode: weighted errors of a run inside the bounds of Theorem B.
 
-The modes are those of the coupling. What all robots have in common is left alone; what differs is pressed down.
+The modes are those of the coupling. What all robots have in common is left alone; what differs is pressed
+down.
 """
 
 from example import arguments

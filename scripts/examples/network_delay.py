@@ -1,7 +1,7 @@
 """A network that is late: how much delay a cell takes, and how it then goes.
 
-`delay_margin` looks at small errors of a pair of UR5 that stand still: beyond 21 ms a wrist begins to swing, ever
-so slowly. In motion it is a matter of how long errors live.
+`delay_margin` looks at small errors of a pair of UR5 that stand still: beyond 21 ms a wrist begins to
+swing, ever so slowly. In motion it is a matter of how long errors live.
 """
 
 import numpy as np

@@ -1,6 +1,7 @@
 """An adaptation of your own: one that does not learn from velocity errors small enough to be noise.
 
-Its storage is its part in the proof, and what it adds to V' is named: the certificate then says what it costs.
+Its storage is its part in the proof, and what it adds to V' is named: the certificate then says what it
+costs.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """A law of your own: a class with `bind` and `command`, from errors to a reference motion and a force.
 
-This one tracks, and adds a spring between neighbours that gets soft where they are far apart, so that nobody is
-pulled hard. It is logged, saved, compared and certified as those of the package are.
+This one tracks, and adds a spring between neighbours that gets soft where they are far apart, so that
+nobody is pulled hard. It is logged, saved, compared and certified as those of the package are.
 """
 
 import numpy as np

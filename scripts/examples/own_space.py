@@ -1,15 +1,14 @@
 """A task space of your own: coordinates around a post, in which a logarithmic spiral is a straight line.
 
-They are the logarithm of z = x + iy: how far the tip is, and in which direction. `measure` says where the robots
-are, `to_joints` and `to_torque` are the ways to joint space and back.
+They are the logarithm of z = x + iy: how far the tip is, and in which direction. `measure` says where the
+robots are, `to_joints` and `to_torque` are the ways to joint space and back.
 """
 
 import numpy as np
 from example import arguments
 
-from synctrl import CartesianSpace, Cell, Coupling, Cubic, Gains, Member, load_robot, simulate
+from synctrl import Cell, Coupling, Cubic, Gains, Member, load_robot, simulate
 from synctrl.show.plots import new_figure, save, style
-from synctrl.tasks.inverse_kinematics import reach
 from synctrl.tasks.measurement import Measurement, Tips
 
 
@@ -42,23 +41,16 @@ class AroundThePost:
 
 out, short = arguments(__doc__)
 members = []
-for bearing in (1.0, -1.0):  # rad, of the bases and the spirals, around a post at 0
+for bearing, q0 in ((1.0, [-0.53, -2.21]), (-1.0, [1.45, 2.28])):  # of bases and spirals, around a post at 0
     arm = load_robot("planar2r").placed((0.45 * np.cos(bearing), 0.45 * np.sin(bearing), 0))
     way = Cubic([np.log(0.25), bearing - 0.5], [np.log(0.1), bearing + 1.0], duration=1.5)
-    start = 0.25 * np.exp(1j * (0.95 * bearing - 0.5))  # a little beside the spiral, in opposite senses
-    q0 = reach(arm, np.array([start.real, start.imag]), np.zeros(2), CartesianSpace("xy"))
     members.append(Member(arm, way, q0))
 gains = Gains(Lambda=6, beta=6, K_r=2, K_eps=0.5, Gamma=0.1)
 run = simulate(Cell(members, Coupling.pair(), AroundThePost()), gains, 0.05 if short else 2.0)
-z = np.exp(run.x[..., 0] + 1j * run.x[..., 1])
-wanted = np.exp(run.x_desired[..., 0] + 1j * run.x_desired[..., 1])
+z, wanted = (np.exp(x[..., 0] + 1j * x[..., 1]) for x in (run.x, run.x_desired))
 with style():
-    figure, axes = new_figure(3.4, 1, 2, width=7.5)
-    axes[0, 0].plot(z.real, z.imag, label=run.names)
-    axes[0, 0].plot(wanted.real, wanted.imag, "k-.", lw=1, label=["desired", "_"])
-    axes[0, 0].plot(0, 0, "ko", label="post")
-    axes[0, 1].plot(*run.x.transpose(2, 0, 1))
-    axes[0, 0].set(xlabel="x, m", ylabel="y, m", aspect="equal", title="in the plane")
-    axes[0, 1].set(xlabel="log distance", ylabel="direction, rad", title="in the task space")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    figure, axes = new_figure(4.2)
+    axes[0, 0].plot(z.real, z.imag)
+    axes[0, 0].plot(wanted.real, wanted.imag, "k-.", lw=1)
+    axes[0, 0].set(xlabel="x, m", ylabel="y, m", aspect="equal", title="tips and desired spirals")
 save(figure, out / "own_space")

@@ -1,6 +1,7 @@
-"""How fast errors of motion and of parameters vanish, over Gamma: the best rate, and where more learning harms.
+"""How fast errors vanish, over Gamma: the best rate, and where more learning harms.
 
-Along a motion that repeats small errors are multiplied by a matrix once a period. Its eigenvalues say it all.
+Along a motion that repeats small errors of motion and of parameters are multiplied by a matrix once a
+period. Its eigenvalues say it all.
 """
 
 import numpy as np

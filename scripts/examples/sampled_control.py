@@ -1,7 +1,7 @@
 """Sampled control: a controller that is called once a period, and how long a period a cell takes.
 
-Torque and adaptation are held in between, as on a digital controller. A run that has to stop says which robot
-and joint, when and why, and hands over what there is.
+Torque and adaptation are held in between, as on a digital controller. A run that has to stop says which
+robot and joint, when and why, and hands over what there is.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """A synchronization function: say what must stay true, and the weights follow from it.
 
-The second arm has to be at twice the angles of the first, less a little that changes with time. f = 0 is all
-that is written down; here it is held while the first arm is pushed.
+The second arm has to be at twice the angles of the first, less a little that changes with time. f = 0 is
+all that is written down; here it is held while the first arm is pushed.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """Limits of torque: what is learned while torque is cut off, with and without bounds of the estimates.
 
-A push of 300 N·m is more than the motors of the arm have. An adaptation that goes on learning takes the missing
-torque for mass; bounds keep its estimates where bodies can be.
+A push of 300 N·m is more than the motors of the arm have. An adaptation that goes on learning takes the
+missing torque for mass; bounds keep its estimates where bodies can be.
 """
 
 import warnings
