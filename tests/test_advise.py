@@ -35,6 +35,7 @@ from synctrl.errors import InputError, NonFiniteError, SimulationError, Unreacha
 from synctrl.experiments import a460_pair, planar_four, ur5_payload
 from synctrl.robots.documents import planar_arm, write_urdf
 from synctrl.simulation import diagnosis
+from synctrl.simulation.devices import DeadTime, DifferencedVelocity
 
 UR5, PLANAR, A460 = (load_robot(name) for name in ("ur5", "planar2r", "a460"))
 Q0 = np.array([0.1, -1.2, 1.4, -0.6, 0.5, 0.3])
@@ -329,6 +330,19 @@ def test_messages_that_come_too_seldom_ask_for_a_shorter_period():
     margin = period_margin(ready.cell, late[-1].gains, receiver="filter", omega=200.0)
     assert 0.85 * margin < late[-1].to <= 0.9 * margin * (1 + 1e-3)
     assert "late" not in {c.urgency for c in advise(ready.cell, ready.gains, network=often).changes}
+
+
+def test_sensors_and_actuators_that_lag_ask_for_less_damping_that_cures():
+    cell = moving(A460, A)
+    gains = good(cell, period=PERIOD)
+    late = {"sensors": [DifferencedVelocity(100.0)], "actuators": [DeadTime(0.01)], "control_period": PERIOD}
+    advice = advise(cell, gains, duration=1.0, **late)
+    assert (advice.first.urgency, advice.first.what) == ("late", "K_r")
+    assert fate(cell, gains, **late)[0] == "diverged"
+    assert fate(cell, advice.changed, **late)[0] == "completed"
+    quick = late | {"sensors": [DifferencedVelocity(2000.0)], "actuators": [DeadTime(1e-3)]}
+    assert not advise(cell, gains, duration=1.0, **quick).changes
+    assert fate(cell, gains, **quick)[1] < 5e-3
 
 
 # -- what it says ------------------------------------------------------------------------------------------
