@@ -18,6 +18,7 @@ import pytest
 
 from synctrl import Experiment, Result, load_robot
 from synctrl.analysis import certify, compare
+from synctrl.analysis.advise import advise_run
 from synctrl.analysis.metrics import as_data, metrics
 from synctrl.cli import codes
 from synctrl.cli.laws import named_laws
@@ -128,6 +129,20 @@ def test_a_run_that_has_to_stop_is_written_as_far_as_it_came(folder, tmp_path):
     assert found["error"]["kind"] == "NonFiniteError"
     saved = Result.load(tmp_path / "out" / "run.npz")
     assert saved.status != "completed" and saved.t[-1] == found["end"] < float(DURATION)
+
+
+def test_advice_is_that_of_the_library_and_changes_the_gains_in_a_file(folder, experiment, tmp_path):
+    text = (folder / "cell.toml").read_text("utf-8").replace("K_r = 0.5", "K_r = 5e4")
+    (tmp_path / "stiff.toml").write_text(text, "utf-8")
+    words = ("advise", tmp_path / "stiff.toml", "--write", tmp_path / "advised.toml")
+    found = answer(*words, code=codes.FOUND_WANTING)
+    assert (
+        found["changes"]
+        == plain(advise_run(Experiment.from_file(tmp_path / "stiff.toml")).to_dict())["changes"]
+    )
+    advised = Experiment.from_file(tmp_path / "advised.toml")
+    assert advised.gains.as_dict() == found["changed_gains"] != experiment.gains.as_dict()
+    assert advised.simulate(float(DURATION)).status == "completed"
 
 
 # -- progress and Ctrl-C -----------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ import warnings
 
 import numpy as np
 import pytest
+import typer
 from hypothesis import given
 from hypothesis import strategies as st
 from refusals import refused
@@ -157,7 +158,7 @@ def test_warnings_are_said_once_each_and_leave_python_s_as_they_were(capsys):
 
 
 def test_an_error_is_one_line_that_names_what_it_is_about(capsys):
-    with pytest.raises(Exception) as caught, answering(as_json=False):  # noqa: PT011
+    with pytest.raises(typer.Exit) as caught, answering(as_json=False):
         raise SynctrlError("expected this, found that", subject="dt")
     assert caught.value.exit_code == codes.REFUSED
     assert capsys.readouterr().err == "error: dt: expected this, found that\n"
