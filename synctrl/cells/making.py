@@ -30,7 +30,8 @@ PARTS = {
 }  # fmt: skip
 #: what messages call parts of a file
 OTHERWISE: dict[str, Place] = {
-    "name": ("robots",), "disturbance": ("disturbances",), "payload": ("loads",), "payloads": ("loads",), "plant_type": ("plant",),
+    "name": ("robots",), "disturbance": ("disturbances",), "payload": ("loads",), "payloads": ("loads",),
+    "plant_type": ("plant",),
 }  # fmt: skip
 #: keys of a robot that say the same, or that follow from each other
 APART = (

@@ -1,4 +1,4 @@
-"""Task spaces, and what is beside plain robots in a cell: objects that they carry, joints that others hold."""
+"""Task spaces, and what is beside plain robots: objects that they carry, joints that others hold."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from .kinds import kind, one_of, table_or
 from .motions import BODY
 from .robots import ARM
 from .values import (
-    ANY_NUMBERS,
+    INERTIA,
     MATRIX,
     NUMBER,
     NUMBERS,
@@ -38,6 +38,7 @@ from .values import (
     VECTOR,
     angles,
     choice,
+    list_of,
     numbers,
 )
 
@@ -80,7 +81,7 @@ SPACE = one_of(*SPACES)
 DISTURBANCE = kind("", Disturbance, robot=ROBOT, torque=NUMBERS, start=NUMBER, stop=NUMBER)
 LOAD = kind(
     "", Payload,
-    robot=ROBOT, mass=NUMBER, com=VECTOR, inertia=ANY_NUMBERS, frame=TEXT, start=NUMBER, stop=NUMBER,
+    robot=ROBOT, mass=NUMBER, com=VECTOR, inertia=INERTIA, frame=TEXT, start=NUMBER, stop=NUMBER,
 )  # fmt: skip
 
 # -- objects -----------------------------------------------------------------------------------------------
@@ -99,7 +100,7 @@ def _pin(part: Pin) -> dict[str, Any]:
 OUTLINE = kind("", Outline, points=MATRIX, thickness=NUMBER)
 OBJECT = kind(
     "", CarriedObject, read=_object,
-    mass=NUMBER, com=VECTOR, inertia=ANY_NUMBERS, box=VECTOR, center=VECTOR, name=TEXT, shape=OUTLINE.model,
+    mass=NUMBER, com=VECTOR, inertia=INERTIA, box=VECTOR, center=VECTOR, name=TEXT, shape=OUTLINE.model,
 )  # fmt: skip
 FIXTURES = (
     kind("fixture", Fixture, stiffness=VECTOR, damping=VECTOR),
@@ -190,10 +191,10 @@ def meeting(duration: float) -> MakesPlant:
 
 
 PID = kind("", Pid, P=NUMBERS, I=NUMBERS, D=NUMBERS)
-_ARMS = list[ARM.model]  # type: ignore[name-defined]
+_ARMS = list_of(ARM.model)
 _CARRIED: dict[str, Any] = {
     "body": OBJECT.model,
-    "grasps": list[GRASP.model],  # type: ignore[name-defined]
+    "grasps": list_of(GRASP.model),
     "at": AT.model,
     "robots": _ARMS,
     "desired": BODY,

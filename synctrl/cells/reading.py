@@ -135,8 +135,8 @@ def _said(problem: Any, data: Any) -> tuple[Place, str, Any]:
         return place, f"{words}; known are {', '.join(known)}", loc[-1]
     if kind.startswith("union_tag"):
         return _unknown_kind(place, found, kinds_at(loc))
-    if kind == "cell_value":
-        return place, problem["msg"], found
+    if kind == "value_error":
+        return place, str(problem["ctx"]["error"]), found
     words = {"list_type": "a list", "dict_type": "a table", "model_type": "a table"}.get(kind, kind)
     return place, f"expected {words}, found {shown(found)}", found
 

@@ -1,15 +1,15 @@
-"""Values of a cell file: numbers, words, names of robots and of files, each read strictly and named in words."""
+"""Values of a cell file: numbers, words, names of robots and of files, each read strictly."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
 from functools import partial
+from types import GenericAlias
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import PlainValidator, WithJsonSchema
-from pydantic_core import PydanticCustomError
 
 from ..errors import near
 from ..robots.catalog import is_path
@@ -55,10 +55,9 @@ def shown(value: Any) -> str:
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
 
 
-def misfit(expected: str, found: str) -> PydanticCustomError:
-    """The error of one value."""
-    words = {"problem": f"expected {expected}, found {found}"}
-    return PydanticCustomError("cell_value", "{problem}", words)
+def misfit(expected: str, found: str) -> ValueError:
+    """The error of one value, which pydantic gives a place."""
+    return ValueError(f"expected {expected}, found {found}")
 
 
 def _in_radians(value: Any) -> Any:
@@ -120,6 +119,16 @@ def kept(read: Callable[[Any], Any], schema: dict[str, Any]) -> Any:
 
 def _any_of(schemas: list[dict[str, Any]]) -> dict[str, Any]:
     return schemas[0] if len(schemas) == 1 else {"anyOf": schemas}
+
+
+def list_of(each: Any) -> Any:
+    """A list of values of some type."""
+    return GenericAlias(list, (each,))
+
+
+def by_name(each: Any) -> Any:
+    """A table of values of some type, by names that a user chooses."""
+    return GenericAlias(dict, (str, each))
 
 
 def numbers(*depths: int) -> Any:
@@ -203,6 +212,8 @@ NUMBERS, ANY_NUMBERS = numbers(0, 1), numbers(0, 1, 2, 3)
 INTEGER = kept(partial(_of, int, "a whole number"), {"type": "integer"})
 TEXT = kept(partial(_of, str, "a text"), {"type": "string"})
 TRUTH = kept(partial(_of, bool, "true or false"), {"type": "boolean"})
+#: (3, 3), or its diagonal, (3,)
+INERTIA = numbers(1, 2)
 ANGLE, ANGLES, ANGLE_ROWS = angles(0), angles(1), angles(2)
 ROTATION = kept(_rotation, {"type": "array", "minItems": 3, "maxItems": 3})
 ROBOT = kept(_robot, {"type": ["string", "integer"]})
