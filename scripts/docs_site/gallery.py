@@ -48,7 +48,9 @@ def gallery(source: Path, extra: Path, cache: Path, short: bool) -> list[Path]:
 def _run(folder: Path, options: list[str]) -> None:
     part = folder.with_name("part")
     command = [sys.executable, str(SCRIPT), "--out", str(part), "--workers", "1", *options]
-    done = subprocess.run(command, stdout=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    done = subprocess.run(
+        command, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True
+    )
     if done.returncode:
-        raise SystemExit("An example of the gallery failed, see above.")
+        raise SystemExit(f"The gallery failed:\n{done.stdout}{done.stderr}")
     part.rename(folder)

@@ -16,6 +16,7 @@ TOP, PROJECT = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md"), 
 PICTURES = {".png", ".svg", ".gif", ".webp", ".jpg"}
 #: sections of the index for pages that it does not name, by the folder in which they are; else the last
 SECTIONS = {"start": "Start", "tutorials": "Tutorials", "howto": "How-to", "reference": "Reference"}
+ALONE = {"gallery.md": "Gallery"}
 ELSE = "Explanation"
 
 
@@ -65,7 +66,8 @@ def unnamed(index: str, pages: Iterable[str]) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for page in pages:
         if page not in named and page.endswith((".md", ".rst", ".ipynb")):
-            found.setdefault(SECTIONS.get(posixpath.dirname(page), ELSE), []).append(page)
+            section = ALONE.get(page) or SECTIONS.get(posixpath.dirname(page), ELSE)
+            found.setdefault(section, []).append(page)
     return found
 
 
