@@ -35,6 +35,7 @@ ROOMS = (
     "sweep",
     "tune",
     "show",
+    "export",
     "experiments",
     "cells",
     "paper",
@@ -45,11 +46,19 @@ ROOMS = (
 ONLY_INSIDE_FUNCTIONS = {
     *("matplotlib", "meshcat", "scipy", "networkx", "trimesh", "yourdfpy"),
     *("casadi", "mujoco", "joblib", "dask", "distributed", "pandas", "optuna"),
+    *("xarray", "h5netcdf", "h5py", "mcap", "mcap_protobuf", "foxglove_schemas_protobuf", "google", "rerun"),
     *("xacro", "yaml", "robot_descriptions"),
 }
 
 # Libraries that belong to some rooms alone.
-OWNERS = {"matplotlib": {"show", "paper"}, "meshcat": {"show"}, "typer": {"cli"}, "rich": {"cli"}}
+EXPORTING = ("xarray", "h5netcdf", "mcap", "mcap_protobuf", "foxglove_schemas_protobuf", "rerun")
+OWNERS = {
+    "matplotlib": {"show", "paper"},
+    "meshcat": {"show"},
+    "typer": {"cli"},
+    "rich": {"cli"},
+    **{library: {"export"} for library in EXPORTING},
+}
 
 # What rooms other than robots/ may use of Pinocchio: types and the rotation group, never its dynamics.
 GEOMETRY = {"SE3", "Quaternion", "exp3", "exp6", "log3", "log6", "Jlog3", "Jlog6"}

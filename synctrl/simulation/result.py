@@ -17,6 +17,7 @@ import numpy as np
 from ..checks import count, instance
 from ..errors import InputError, ResultError
 from ..robots.model import TURNS, joined, unit_for
+from .exported import Exported
 from .log_folder import complete, read_folder
 from .result_file import LAYOUT, check_shape, read_result, shapes, unit_of, write_result
 from .schema import FORMAT
@@ -30,7 +31,7 @@ FIGURES = "synctrl.show.run_figures"
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class Result(Exported):
     """A run at T logged instants: n robots, p synchronization errors, m task coordinates, nv joints.
 
     Units are those of joints that turn; joints that slide are in m, m/s and N, see `units`.
