@@ -49,7 +49,7 @@ def to_mcap(result: Result, path: str | Path, *, fps: float = 30.0) -> Path:
         recording.finish()
     beside = Path(path).with_suffix(".layout.json")
     with reported("write the layout", beside):
-        write_whole(beside, json.dumps(layout(found, None if scene is None else scene.box()), indent=1))
+        write_whole(beside, json.dumps(layout(found, scene), indent=1))
     return Path(path)
 
 
