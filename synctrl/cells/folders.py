@@ -42,10 +42,12 @@ def below(folder: Path, name: str, place: Place) -> Path:
 
 
 def _beside(folder: Path, pure: PurePosixPath) -> list[str]:
-    """Names of what there is in the folder in which a file should be."""
+    """Names of what there is in the folder in which a file should be, if that lies below."""
     try:
+        if not (folder / pure.parent).resolve().is_relative_to(folder.resolve()):
+            return []
         return [(pure.parent / each.name).as_posix() for each in (folder / pure.parent).iterdir()]
-    except OSError:
+    except (OSError, RuntimeError):
         return []
 
 
