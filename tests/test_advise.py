@@ -2,29 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from refusals import refused
 
-from synctrl import (
-    CartesianSpace,
-    Cell,
-    Coupling,
-    Cubic,
-    Experiment,
-    Friction,
-    FrictionParameters,
-    Gains,
-    Hold,
-    Member,
-    Redundancy,
-    load_robot,
-    simulate,
-)
+from synctrl import Cell, Coupling, Cubic, Experiment, Friction, FrictionParameters, Gains, Hold, Member
+from synctrl import CartesianSpace, Network, Redundancy, load_robot, simulate
+from synctrl.analysis import advise, advise_run
 from synctrl.analysis.linear_loop import Linearized, Place
-from synctrl.errors import SimulationError
+from synctrl.control.laws import ChungSlotine
+from synctrl.errors import InputError, SimulationError, UnreachableError
+from synctrl.experiments import a460_pair, planar_four, ur5_payload
 
 UR5, PLANAR, A460 = (load_robot(name) for name in ("ur5", "planar2r", "a460"))
 Q0 = np.array([0.1, -1.2, 1.4, -0.6, 0.5, 0.3])
