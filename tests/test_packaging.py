@@ -82,6 +82,8 @@ MODULES = {
     "dask": {"distributed"},
     "drake": {"pydrake"},
     "PyYAML": {"yaml"},
+    "tree-sitter": {"tree_sitter"},
+    "tree-sitter-toml": {"tree_sitter_toml"},
 }
 #: asked for although nothing imports them, and why
 UNIMPORTED = {

@@ -9,12 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..robots.base_parameters import BaseParameters
+from ..robots.base_parameters import parameters_of
 from ..robots.catalog import load_robot
 from ..robots.friction import Friction
 from ..robots.parameters import (
     FrictionParameters,
-    FullParameters,
     LinearParameters,
     Parameters,
     planar_two_link_parameters,
@@ -22,7 +21,24 @@ from ..robots.parameters import (
 from ..robots.payload import Payload, carrying, holding
 from ..robots.robot import Robot
 from .kinds import kind, one_of, table_or
-from .values import ANY_NUMBERS, FILE, NUMBER, NUMBERS, ROTATION, SOURCE, TEXT, TRUTH, VECTOR, choice, scalar
+from .values import (
+    ANGLE,
+    ANGLES,
+    ANY_NUMBERS,
+    FILE,
+    INERTIA,
+    NUMBER,
+    NUMBERS,
+    ROTATION,
+    SOURCE,
+    TEXT,
+    TRUTH,
+    VECTOR,
+    by_name,
+    choice,
+    list_of,
+    scalar,
+)
 
 Change = Callable[[Robot], Robot]
 
@@ -119,16 +135,16 @@ def moved(xyz: Any = (0.0, 0.0, 0.0), rpy: Any = (0.0, 0.0, 0.0), name: str | No
     return lambda robot: robot.placed(xyz, rpy, name)
 
 
-BASE = kind("", None, Base, xyz=VECTOR, rpy=VECTOR, name=TEXT)
-INERTIAL = kind("", None, inertial, mass=NUMBER, com=VECTOR, inertia=ANY_NUMBERS)
+BASE = kind("", None, Base, xyz=VECTOR, rpy=ANGLES, name=TEXT)
+INERTIAL = kind("", None, inertial, mass=NUMBER, com=VECTOR, inertia=INERTIA)
 CHANGES = {
     "holding": kind("tool", None, tool, xyz=VECTOR, rotation=ROTATION, name=TEXT),
-    "carrying": kind("load", None, load, mass=NUMBER, com=VECTOR, inertia=ANY_NUMBERS, frame=TEXT),
+    "carrying": kind("load", None, load, mass=NUMBER, com=VECTOR, inertia=INERTIA, frame=TEXT),
     "with_tip": kind("tip", None, tip, tip=TEXT),
     "with_parameters": kind("bodies", None, bodies, pi=VECTOR),
     "with_armature": kind("rotors", None, rotors, armature=NUMBERS),
     "weightless": kind("weightless", None, weightless),
-    "placed": kind("moved", None, moved, xyz=VECTOR, rpy=VECTOR, name=TEXT),
+    "placed": kind("moved", None, moved, xyz=VECTOR, rpy=ANGLES, name=TEXT),
 }
 
 
@@ -143,6 +159,7 @@ def arm(
     gravity: bool = True,
     base: Base | None = None,
     changes: Sequence[Change] = (),
+    load: Callable[..., Robot] = load_robot,
 ) -> Robot:
     """A robot, its place, and what it holds.
 
@@ -158,11 +175,12 @@ def arm(
         gravity: false for a robot without weight.
         base: where it stands; by default at the origin.
         changes: what it holds and what else is done to it, in that order.
+        load: what loads it.
     """
     given = {"locked": locked, "inertials": inertials, "xacro_args": xacro}
     options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     options |= {"package_dirs": list(packages)} if packages else {}
-    made = load_robot(robot, tip, **options, **({"strict": True} if strict else {}))
+    made = load(robot, tip, **options, **({"strict": True} if strict else {}))
     made = made if gravity else made.weightless()
     made = made if base is None else made.placed(*base)
     for change in changes:
@@ -173,14 +191,14 @@ def arm(
 ARM_KEYS: dict[str, Any] = {
     "robot": SOURCE,
     "tip": TEXT,
-    "locked": dict[str, NUMBER],
-    "packages": list[FILE],
-    "inertials": dict[str, INERTIAL.model],
+    "locked": by_name(ANGLE),
+    "packages": list_of(FILE),
+    "inertials": by_name(INERTIAL.model),
     "strict": TRUTH,
-    "xacro": dict[str, scalar()],
+    "xacro": by_name(scalar()),
     "gravity": TRUTH,
     "base": BASE.model,
-    "changes": list[one_of(*CHANGES.values())],  # type: ignore[misc]
+    "changes": list_of(one_of(*CHANGES.values())),
 }
 ARM = kind("", None, arm, **ARM_KEYS)
 
@@ -191,12 +209,12 @@ Adapted = Callable[[Robot], Parameters | str]
 
 def full() -> Adapted:
     """All inertial parameters of all bodies, ten each."""
-    return FullParameters
+    return lambda robot: "full"
 
 
 def base() -> Adapted:
     """The fewest parameters that give the same torques."""
-    return BaseParameters
+    return lambda robot: "base"
 
 
 def linear(matrix: ArrayLike, theta: ArrayLike, names: Sequence[str]) -> Adapted:
@@ -220,20 +238,26 @@ def planar(masses: ArrayLike = (1.0, 1.0), lengths: ArrayLike = (0.3, 0.3)) -> A
     return lambda robot: planar_two_link_parameters(robot, masses, lengths)
 
 
-def rubbing(base: Adapted = FullParameters, armature: bool = False) -> Adapted:
+def rubbing(base: Adapted | None = None, armature: bool = False) -> Adapted:
     """Friction coefficients beside the parameters of the bodies.
 
     Args:
         base: parameters of the bodies; by default all of them.
         armature: whether the rotors are adapted too.
     """
-    return lambda robot: FrictionParameters(robot, base=base(robot), armature=armature)  # type: ignore[arg-type]
+
+    def made(robot: Robot) -> Parameters:
+        given = "full" if base is None else base(robot)
+        rigid = parameters_of(given, robot) if isinstance(given, str) else given
+        return FrictionParameters(robot, base=rigid, armature=armature)
+
+    return made
 
 
 _RIGID = (
     kind("full", None, full),
     kind("base", None, base),
-    kind("linear", None, linear, matrix=ANY_NUMBERS, theta=VECTOR, names=list[TEXT]),  # type: ignore[valid-type]
+    kind("linear", None, linear, matrix=ANY_NUMBERS, theta=VECTOR, names=list_of(TEXT)),
     kind("planar-two-link", None, planar, masses=VECTOR, lengths=VECTOR),
 )
 RUBBING = kind("friction", None, rubbing, base=one_of(*_RIGID), armature=TRUTH)
