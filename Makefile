@@ -60,8 +60,8 @@ clean:
 	find . -path "./$(VENV)*" -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)/.installed-core: WHAT := .[compiled,mujoco]
-$(VENV)/.installed-test: WHAT := .[test,notebooks,compiled,compiler,mujoco,sweep,tune,xacro,data]
-$(VENV)/.installed-docs: WHAT := .[docs,notebooks,compiled,compiler,mujoco,sweep,tune,xacro,data]
+$(VENV)/.installed-test: WHAT := .[test,notebooks,compiled,compiler,mujoco,sweep,tune,xacro,data,rerun]
+$(VENV)/.installed-docs: WHAT := .[docs,notebooks,compiled,compiler,mujoco,sweep,tune,xacro,data,rerun]
 $(VENV)/.installed-dev:  WHAT := .[dev]
 $(LOWEST)/.installed-lowest: WHAT := .[test,compiled,compiler,mujoco,sweep,tune,data]
 

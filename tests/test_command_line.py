@@ -113,6 +113,22 @@ def test_a_saved_run_shows_the_same_as_when_it_was_made(made, folder):
     assert page == (folder / "out" / "index.html").read_text("utf-8")
 
 
+def test_a_saved_run_is_written_for_other_tools_by_the_endings_of_their_files(made, folder, result, tmp_path):
+    files = [tmp_path / f"run{ending}" for ending in (".csv", ".mat")]
+    words = (
+        "show",
+        folder / "out" / "run.npz",
+        "--no-page",
+        *(x for file in files for x in ("--export", file)),
+    )
+    assert answer(*words)["exported"] == [str(file) for file in files]
+    ours = [result.to_csv(tmp_path / "ours.csv"), result.to_mat(tmp_path / "ours.mat")]
+    assert files[0].read_bytes() == ours[0].read_bytes()
+    assert files[1].stat().st_size == ours[1].stat().st_size
+    refusal = answer("run", folder / "cell.toml", "--export", "run.xlsx", code=codes.REFUSED)["error"]
+    assert refusal["subject"] == "--export" and refusal["found"] == "run.xlsx"
+
+
 def test_without_its_cell_a_saved_run_has_numbers_and_no_certificate(made, folder, tmp_path):
     lonely = tmp_path / "lonely.npz"
     lonely.write_bytes((folder / "out" / "run.npz").read_bytes())

@@ -82,6 +82,21 @@ def test_a_reader_that_refuses_is_quoted_and_does_not_agree():
     assert "inertia" in found["MuJoCo"].refusal and not found["MuJoCo"].differences
 
 
+@pytest.mark.filterwarnings("ignore::synctrl.errors.RobotWarning")
+def test_files_in_other_encodings_and_with_elements_of_other_programs_are_read_too(tmp_path):
+    text = (CASES / "good.urdf").read_text("utf-8")
+    strange = text.replace("</robot>", "<gazebo:plugin ros:file='x'/><link name='腕'/></robot>")
+    strange = strange.replace(
+        "</robot>", "<joint name='j' type='fixed'><parent link='link2'/><child link='腕'/></joint></robot>"
+    )
+    file = tmp_path / "arm.urdf"
+    file.write_bytes(
+        f"<?xml version='1.0' encoding='gb2312'?>\n{strange.partition('?>')[2] or strange}".encode("gb2312")
+    )
+    readings = by_library(load_robot(file, tip="link2"))
+    assert readings["yourdfpy"].agrees, readings
+
+
 def test_a_robot_without_a_file_is_not_read_again():
     robot = load_robot("planar2r")
     document = replace(robot.document, file=None)

@@ -160,6 +160,7 @@ def arm(
     gravity: bool = True,
     base: Base | None = None,
     changes: Sequence[Change] = (),
+    load: Callable[..., Robot] = load_robot,
 ) -> Robot:
     """A robot, its place, and what it holds.
 
@@ -175,11 +176,12 @@ def arm(
         gravity: false for a robot without weight.
         base: where it stands; by default at the origin.
         changes: what it holds and what else is done to it, in that order.
+        load: what loads it.
     """
     given = {"locked": locked, "inertials": inertials, "xacro_args": xacro}
     options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     options |= {"package_dirs": list(packages)} if packages else {}
-    made = load_robot(robot, tip, **options, **({"strict": True} if strict else {}))
+    made = load(robot, tip, **options, **({"strict": True} if strict else {}))
     made = made if gravity else made.weightless()
     made = made if base is None else made.placed(*base)
     for change in changes:

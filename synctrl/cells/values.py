@@ -17,7 +17,7 @@ from ..robots.urdf.document import Pose
 
 #: what arrays of some depth are called
 DEPTHS = ("a number", "a list of numbers", "a list of lists of numbers", "a list of matrices")
-_DEGREES = re.compile(r" *([-+]?[0-9]+(?:\.[0-9]+)?) *deg *", re.ASCII)
+_DEGREES = re.compile(r" *([-+]?[0-9]+(?:\.[0-9]+)?) *(?:deg|°) *", re.ASCII)
 PLAIN = (bool, int, float, str)
 #: how deep arrays go
 DEEPEST = len(DEPTHS)

@@ -61,7 +61,7 @@ WIDEST = 3.4
 
 
 def panel_grid(
-    count: int, least: float, height: float | None, above: float, width: float
+    count: int, least: float, height: float | None, above: float, width: float, together: int = 1
 ) -> tuple[Figure, list[Axes]]:
     """Panels in rows, each with a title and axes of its own; to be called within `look.drawing`.
 
@@ -71,11 +71,13 @@ def panel_grid(
         height: of a panel, inches; None for as much as its width.
         above: room above all of them, inches.
         width: of the figure, inches.
+        together: so many stay in one row, one after another, where there is room.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     columns = min(max(int(width / least), 1), count)
+    columns -= columns % together if columns > together else 0
     own = min(width / columns - GRID_LEFT - GRID_RIGHT, WIDEST)
     tall = own if height is None else height
     cell, rows = TITLE + tall + GRID_BELOW, -(-count // columns)

@@ -22,12 +22,12 @@ from .html import policy
 from .lyapunov_plots import lyapunov_figure
 from .page import (
     Block,
+    Columns,
     Facts,
     Links,
     Picture,
     Points,
     Section,
-    SideBySide,
     Text,
     as_picture,
     number,
@@ -147,7 +147,7 @@ def _figures(result: Result, experiment: Experiment | None, folder: Path) -> Sec
         _add(found, result, experiment)
     except SynctrlError as error:
         return Section("Figures", (Text(f"Nothing can be drawn: {error}", "note"),))
-    pictures = SideBySide(tuple(_picture(name, figure, folder) for name, figure in found.items()))
+    pictures = Columns(tuple(_picture(name, figure, folder) for name, figure in found.items()))
     missing = tuple(f"Not shown: {name}: {reason}" for name, reason in found.missing.items())
     return Section("Figures", (pictures, *([Points(missing)] if missing else [])))
 

@@ -73,7 +73,8 @@ def _grid(result: Result, tips: np.ndarray, wanted: np.ndarray | None, width: fl
     span = (1 + 2 * ROOM) * max(float(np.ptp(drawn, axis=0).max()), 1e-3)
     handles = _handles(wanted is not None)
     count = len(result.names) * len(views)
-    figure, panels = panel_grid(count, LEAST, None, LEGEND * legend_rows(handles, width), width)
+    above = LEGEND * legend_rows(handles, width)
+    figure, panels = panel_grid(count, LEAST, None, above, width, len(views))
     room = 72 * (panels[0].get_position().width * width + GRID_RIGHT + GRID_LEFT / 3)
     for k, panel in enumerate(panels):
         i, view = divmod(k, len(views))
