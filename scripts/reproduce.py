@@ -1,54 +1,18 @@
 """Every experiment of the paper: runs, figures, metrics, claims, animations, and the page that shows them.
 
 python scripts/reproduce.py [--out out] [--workers 2] [--quick]
+
+Where the package is installed, `synctrl reproduce` does the same.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping
-from dataclasses import asdict
-from itertools import chain
 from pathlib import Path
-from typing import Any
 
-from synctrl.analysis import Certificate, Comparison
-from synctrl.analysis.consistency import Consistency
-from synctrl.analysis.metrics import metrics, write_metrics
 from synctrl.errors import SynctrlError
-from synctrl.experiments.a460_pair import DURATION
-from synctrl.paper.bodies import bodies_are_left
-from synctrl.paper.claims import Claim, tally
-from synctrl.paper.claims_of_cells import a460_claims, own_findings, planar_four_claims
-from synctrl.paper.fairness import (
-    FAIR,
-    another_law_does_better,
-    what_parts_do,
-)
-from synctrl.paper.margin_section import margins_told
-from synctrl.paper.page_parts import BODIES, SCENES, TASKS, measured, of_runs, without_runs
-from synctrl.paper.paper_sections import (
-    honesty_section,
-    introduction,
-    trial_section,
-)
-from synctrl.paper.plant_sections import (
-    identification_section,
-    step_section,
-)
-from synctrl.paper.processes import processes
-from synctrl.paper.promises_section import told
-from synctrl.paper.report import Section, write_page
-from synctrl.paper.reproduction import PLANNED, PlannedRun, begun, finished, judge_runs
-from synctrl.paper.saved_runs import SavedRuns
-from synctrl.paper.tasks import planned_runs
-from synctrl.paper.theory import CERTIFIED, certificate_section, examined
-from synctrl.paper.value_grid import grid_section
-from synctrl.show.style import display
-from synctrl.simulation.result import Result
-
-TRIAL = 1.0  # s
+from synctrl.paper.whole import everything, longest_comparison, reproduce
 
 
 def main() -> int:
@@ -57,14 +21,7 @@ def main() -> int:
     parser.add_argument("--workers", type=count, default=2, help="number of processes")
     parser.add_argument("--quick", action="store_true", help="no more than a second of every run, as a trial")
     options = parser.parse_args()
-    planned = {
-        **{name: run.possible() for name, run in PLANNED.items()},
-        **planned_runs(TASKS),
-        **judge_runs(),
-    }
-    if options.quick:
-        planned = {name: run.shortened(TRIAL) for name, run in planned.items()}
-    limit = 0.1 * TRIAL if options.quick else float("inf")
+    planned, limit = everything(options.quick), longest_comparison(options.quick)
     try:
         page = reproduce(options.out, options.workers, planned, limit)
     except SynctrlError as error:
@@ -82,109 +39,6 @@ def count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"expected a number of at least 1, found {text!r}")
     return int(text)
-
-
-def reproduce(out: Path, workers: int, planned: Mapping[str, PlannedRun], limit: float) -> Path:
-    """Run everything and write it into a folder; returns the path of the page.
-
-    Controllers are compared over at most `limit` seconds.
-    """
-    with processes(workers) as pool:
-        making = begun(pool, out / "runs", planned)
-        early = {name: pool.submit(*each) for name, each in without_runs(out, limit).items()}
-        every = finished(pool, making, out / "runs")
-        print("\nchecking the proof along every run, comparing controllers, drawing ...", flush=True)
-        late = {name: pool.submit(*each) for name, each in of_runs(every, out).items()}
-        proofs = {name: pool.submit(examined, name, every, out / "figures") for name in CERTIFIED}
-        data = measured(every)
-        done = {name: future.result() for name, future in (early | late).items()}
-        certificates = {name: future.result() for name, future in proofs.items()}
-    return page_of(out, every, min(DURATION, limit), done, certificates, data)
-
-
-def page_of(
-    out: Path,
-    every: SavedRuns,
-    tried: float,
-    done: Mapping[str, Any],
-    certificates: Mapping[str, Certificate],
-    data: Mapping[str, Any],
-) -> Path:
-    """Write the page, and all of its numbers beside it.
-
-    Args:
-        out: the folder of the page.
-        every: the runs.
-        tried: time over which cases of the grid were run, s.
-        done: what came of `without_runs` and of `of_runs`.
-        certificates: by name of the run.
-        data: the metrics of every run.
-    """
-    runs, fair = every.named(*PLANNED), {name: done[f"fair {name}"] for name in FAIR}
-    (bodies, bodies_drawn), learned = done["bodies"], done["learned"]
-    claims, own = papers_claims(runs), our_findings(runs, bodies[BODIES], fair["planar_four"][0])
-    found, tasks = zip(*(done[f"task {k}"] for k in range(len(TASKS))), strict=True)
-    checked = [*claims, *own, *chain.from_iterable(found)]
-    sections = [
-        introduction(checked, every),
-        *(done[name] for name in (*SCENES, "full", "friction")),
-        *tasks,
-        margins_told(done["margins"], done["map"]),
-        honesty_section(own, what_parts_do(fair["planar_four"][1])),
-        grid_section(done["grid"], tried),
-        bodies_drawn,
-        identification_section(learned),
-        *(section for _, _, section in fair.values()),
-        told(certificates, done["promises"]),
-        certificate_section(certificates, out / "figures"),
-        done["judge"],
-        step_section(runs),
-    ]
-    write_metrics(
-        out / "metrics.json",
-        data,
-        [{**asdict(claim), "ours": claim.ours} for claim in checked],
-        certificates={name: certificate.as_dict() for name, certificate in certificates.items()},
-        comparisons={name: [each.as_dict() for each in pair] for name, (*pair, _) in fair.items()},
-        consistency={name: each.as_dict() for name, each in bodies.items()},
-        identification={
-            title: [robot.as_dict() for robot in each] for title, each in done["learned"].items()
-        },
-    )
-    print_table(runs)
-    print(f"\n{tally(checked)} The page says which do not, and why.")
-    return write(out / "index.html", sections, max(run.t[-1] for run in runs.values()))
-
-
-def write(path: Path, sections: list[Section], longest: float) -> Path:
-    """The page, which says if no run was longer than a trial."""
-    trial = [trial_section(longest)] if longest <= TRIAL else []
-    return write_page(path, "Adaptive synchronized control, reproduced", [*trial, *sections])
-
-
-def papers_claims(runs: SavedRuns) -> list[Claim]:
-    """What the paper claims of its experiments."""
-    return [*a460_claims(runs.under("a460_pair_")), *planar_four_claims(runs.under("planar_four_"))]
-
-
-def our_findings(runs: SavedRuns, bodies: Consistency, laws: Comparison) -> list[Claim]:
-    """What the paper leaves unsaid."""
-    found = own_findings(runs.under("planar_four_"))
-    return [*found, bodies_are_left(BODIES, bodies), another_law_does_better(laws, "ChungSlotine")]
-
-
-def print_table(runs: Mapping[str, Result]) -> None:
-    """The largest errors and torques of all runs."""
-    print(f"\n{'run':36} {'peak e':>14} {'RMS e':>14} {'peak ε':>16} {'RMS ε':>16} {'torque':>10}")
-    for name, run in runs.items():
-        row = metrics(run)
-        cells = []
-        for kind, width in (("tracking_error", 14), ("sync_error", 16)):
-            unit, factor = display(run.unit(kind))
-            for part in ("peak", "rms"):
-                largest = factor * getattr(getattr(row, kind), part).max()
-                cells.append(f"{f'{largest:.4g} {unit}':>{width}}")
-        print(f"{name:36} {' '.join(cells)} {f'{row.peak_torque.max():.3g} N·m':>10}")
 
 
 if __name__ == "__main__":

@@ -24,14 +24,24 @@ def whole_file(path: str | Path) -> Iterator[BinaryIO]:
     Raises:
         OSError: the file cannot be written, its name is none, or there is something that is no regular file.
     """
+    with whole_path(path) as partial, open(partial, "wb") as file:
+        yield file
+
+
+@contextlib.contextmanager
+def whole_path(path: str | Path) -> Iterator[Path]:
+    """The same for whoever opens files itself: a path to write to, of an empty file.
+
+    Raises:
+        OSError: see `whole_file`.
+    """
     target = _target(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     partial, descriptor = _create_beside(target)
+    os.close(descriptor)
     try:
-        with open(descriptor, "wb") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
+        yield partial
+        _keep_content(partial)
         partial.replace(target)
     except BaseException:
         with contextlib.suppress(OSError):
@@ -104,6 +114,19 @@ def _create_beside(target: Path) -> tuple[Path, int]:
         partial = target.with_name(f".synctrl-{secrets.token_hex(8)}.part")
         with contextlib.suppress(FileExistsError):
             return partial, os.open(partial, flags, 0o666)
+
+
+def _keep_content(file: Path) -> None:
+    """Bring what a file holds to the disk.
+
+    Raises:
+        OSError: it cannot be brought there.
+    """
+    descriptor = os.open(file, os.O_RDWR | getattr(os, "O_BINARY", 0))
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _keep_name(folder: Path) -> None:

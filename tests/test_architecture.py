@@ -64,9 +64,9 @@ def test_the_picture_has_the_rooms_from_the_ground_up():
 @pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md"])
 def test_the_way_that_imports_run_is_told_as_it_is(page):
     words = (DOCS.parent / page).read_text("utf-8")
-    told = re.search(r"Imports run one way, from (.*?) to `paper`", words, re.DOTALL)
+    told = re.search(r"Imports run one way, from (.*?) to `cli`", words, re.DOTALL)
     rooms = test_imports.ROOMS[test_imports.ROOMS.index("robots") :]
-    assert told is not None and (*re.findall(r"`(\w+)`", told[1]), "paper") == rooms
+    assert told is not None and (*re.findall(r"`(\w+)`", told[1]), "cli") == rooms
 
 
 def test_the_page_names_every_room():

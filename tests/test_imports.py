@@ -35,19 +35,30 @@ ROOMS = (
     "sweep",
     "tune",
     "show",
+    "export",
     "experiments",
+    "cells",
     "paper",
+    "cli",
 )
 
 # Imported inside the functions that use them: most users of a robot need neither figures nor a second engine.
 ONLY_INSIDE_FUNCTIONS = {
     *("matplotlib", "meshcat", "scipy", "networkx", "trimesh", "yourdfpy"),
     *("casadi", "mujoco", "joblib", "dask", "distributed", "pandas", "optuna"),
+    *("xarray", "h5netcdf", "h5py", "mcap", "mcap_protobuf", "foxglove_schemas_protobuf", "google", "rerun"),
     *("xacro", "yaml", "robot_descriptions"),
 }
 
 # Libraries that belong to some rooms alone.
-OWNERS = {"matplotlib": {"show", "paper"}, "meshcat": {"show"}}
+EXPORTING = ("xarray", "h5netcdf", "mcap", "mcap_protobuf", "foxglove_schemas_protobuf", "rerun")
+OWNERS = {
+    "matplotlib": {"show", "paper"},
+    "meshcat": {"show"},
+    "typer": {"cli"},
+    "rich": {"cli"},
+    **{library: {"export"} for library in EXPORTING},
+}
 
 # What rooms other than robots/ may use of Pinocchio: types and the rotation group, never its dynamics.
 GEOMETRY = {"SE3", "Quaternion", "exp3", "exp6", "log3", "log6", "Jlog3", "Jlog6"}
@@ -131,8 +142,9 @@ def arrows(package: Path) -> Iterator[tuple[str, str, int]]:
 
 
 def room(module: str) -> str:
-    """ "synctrl.robots.urdf" -> "robots"; "" for the package itself."""
-    return module.split(".")[1] if "." in module else ""
+    """ "synctrl.robots.urdf" -> "robots"; "" for the package itself, and for what `python -m` runs of it."""
+    name = module.split(".")[1] if "." in module else ""
+    return "" if name == "__main__" else name
 
 
 def unknown_rooms(package: Path) -> list[str]:

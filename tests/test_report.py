@@ -14,6 +14,7 @@ from browser import open_page, require_browser
 from refusals import refused
 
 from synctrl.errors import InputError, ResultError
+from synctrl.paper import whole
 from synctrl.paper.claims import Claim, Finding
 from synctrl.paper.report import (
     Formulas,
@@ -193,9 +194,9 @@ def section_of(text, title):
     return text[start : text.index("Peak torque", start)]
 
 
-@pytest.mark.parametrize(("longest", "trial"), [(script.TRIAL, True), (1.1 * script.TRIAL, False)])
+@pytest.mark.parametrize(("longest", "trial"), [(whole.TRIAL, True), (1.1 * whole.TRIAL, False)])
 def test_a_page_of_shortened_runs_says_so(tmp_path, longest, trial):
-    text = script.write(tmp_path / "page.html", [], longest).read_text("utf-8")
+    text = whole.write(tmp_path / "page.html", [], longest).read_text("utf-8")
     assert ("This page is a trial" in text) == trial
 
 
@@ -205,9 +206,9 @@ def test_a_trial_shortens_every_run_and_every_comparison(monkeypatch, tmp_path):
     monkeypatch.setattr(sys, "argv", ["reproduce.py", "--out", str(tmp_path), "--quick"])
     assert script.main() == 0
     out, _, planned, limit = asked
-    assert out == tmp_path and limit < script.TRIAL
-    assert len(planned) > len(script.PLANNED)
-    assert all(run.duration <= script.TRIAL for run in planned.values())
+    assert out == tmp_path and limit < whole.TRIAL
+    assert len(planned) > len(whole.PLANNED)
+    assert all(run.duration <= whole.TRIAL for run in planned.values())
 
 
 @pytest.mark.parametrize("workers", ["0", "-1", "two", "1.5"])

@@ -1,5 +1,7 @@
 """How well: metrics, the Lyapunov proof, certificates, bounds and rates, laws side by side."""
 
+from .advice import Advice
+from .advise import advise, advise_run
 from .certify import Certificate, certify
 from .comparison import Comparison, compare, side_by_side
 from .decay import Decay, simulated_decay
@@ -13,6 +15,7 @@ from .resolution import resolution_error
 from .tube import Tube, tube
 
 __all__ = [
+    "Advice",
     "Certificate",
     "Comparison",
     "Decay",
@@ -23,6 +26,8 @@ __all__ = [
     "ModalBounds",
     "RatesOverGamma",
     "Tube",
+    "advise",
+    "advise_run",
     "certify",
     "compare",
     "delay_map",

@@ -104,16 +104,36 @@ def freeze(
     instance("gains", gains, Gains, "Gains")
     controller = Controller(cell, gains.replace(Gamma=0.0), k_r_space=k_r_space)
     place = cell.q0 if q is None else finite_array("q", q, (cell.n, cell.nv))
-    S = cell.coupling.matrix
+    return frozen_with_slips(controller, place, finite_number("t", t))[0]
+
+
+def frozen_with_slips(controller: Controller, q: np.ndarray, t: float) -> tuple[Frozen, np.ndarray]:
+    """The frozen cell of a controller at q, (n, nv), and s_q = s x where nothing is delayed, s of (J, X)."""
+    cell, S = controller.cell, controller.cell.coupling.matrix
     L = S.T @ S
-    arms = _arms(controller, place, finite_number("t", t))
+    arms = _arms(controller, q, t)
     own, heard, sent = _matrices(controller, arms, L)
     least = np.array([arm.least_eigenvalue for arm in arms])
     joints = tuple(robot.nv for robot in cell.robots)
     leak = np.tile(controller.leak, cell.n)
     fastest = float(controller.beta.max() * L.diagonal().max())
     horizon = 1 / fastest if fastest else np.inf
-    return Frozen(own, heard, sent, leak, horizon, joints, least, _proved(controller, least, L))
+    frozen = Frozen(own, heard, sent, leak, horizon, joints, least, _proved(controller, least, L))
+    return frozen, _slips(controller, arms, np.kron(np.eye(3), np.kron(L, np.eye(cell.m))) @ sent)
+
+
+def _slips(controller: Controller, arms: Sequence[Arm], shares: np.ndarray) -> np.ndarray:
+    """Rows of s_q, (J, X), where (E, sigma, sigma') = shares x."""
+    from scipy.linalg import block_diag
+
+    n, N = controller.cell.n, controller.cell.n * controller.cell.m
+    T, P, Z = (block_diag(*(getattr(arm, name) for arm in arms)) for name in ("T", "P", "Z"))
+    Lambda, beta, leak = (np.tile(g, n) for g in (controller.Lambda, controller.beta, controller.leak))
+    J = T.shape[1]
+    s = P * (beta * (Lambda - leak)) @ shares[:N] + P * beta @ shares[N : 2 * N]
+    s[:, N : N + J] += Z + P * Lambda @ T
+    s[:, N + J :] += np.eye(J)
+    return s
 
 
 def _proved(controller: Controller, least: np.ndarray, L: np.ndarray) -> bool:
@@ -131,13 +151,14 @@ def _arms(controller: Controller, q: np.ndarray, t: float) -> list[Arm]:
     towards = [cell.task.to_joints(task, still + row, still)[0] for row in np.eye(cell.m)]
     free = cell.task.to_joints(task, still, still)[0]
     P = np.stack(towards, axis=-1) - free[..., None]  # (n, nv, m)
-    gain = getattr(getattr(cell.space, "redundancy", None), "gain", 0.0)
+    redundancy = getattr(cell.space, "redundancy", None)
+    gain = np.zeros_like(cell.q0) if redundancy is None else redundancy.spread(cell.robots)[2]
     arms = []
     for i, robot in enumerate(cell.robots):
         k, c, c_inv = robot.nv, reference.c[i], reference.c_inv[i]
         J = np.eye(cell.m) if task.J is None else task.J[i, :, :k]
         M = robot.mass_matrix(q[i, :k])
-        Z = gain * (np.eye(k) - P[i, :k] @ J)
+        Z = gain[i, :k, None] * (np.eye(k) - P[i, :k] @ J)
         arms.append(_arm(controller, i, M, c @ J, P[i, :k] @ c_inv, Z, J))
     return arms
 

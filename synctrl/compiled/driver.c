@@ -1,20 +1,16 @@
 /* From step to step: samples, the method of Runge and Kutta, and what is looked at and kept on the way. */
 
-static void combine(vec *out, const vec *y, double h, const vec *slope, int size) {
-    for (int j = 0; j < size; j++) out[j] = y[j] + splat(h) * slope[j];
-}
-
 /* One step of the classical Runge-Kutta method from y, whose first slope is at hand. */
 static void runge_kutta(const Cell *c, Quantities *a, Work *k, const Steps *s, Rate *rate, int step, double h, vec *y) {
     static const int stages[] = { 0, 1, 1, 2 };
     vec *const *slope = k->k;
-    int size = state_size(c);
+    double *at = (double *)y, *const *rate_of = (double *const *)k->k;
+    long size = state_size(c) * LANES;
     for (int i = 1; i < 4; i++) {
-        combine(k->stage, y, i < 3 ? 0.5 * h : h, slope[i - 1], size);
+        combine((double *)k->stage, at, i < 3 ? 0.5 * h : h, rate_of[i - 1], size);
         rate(c, a, k, s, stages[i], step, k->stage, slope[i]);
     }
-    for (int j = 0; j < size; j++)
-        y[j] += splat(h / 6) * (slope[0][j] + splat(2) * (slope[1][j] + slope[2][j]) + slope[3][j]);
+    conclude(at, h / 6, rate_of[0], rate_of[1], rate_of[2], rate_of[3], size);
 }
 
 /* Let adaptations make of their state what they do after a step or a sample, before anything is asked about it. */

@@ -17,6 +17,7 @@ from . import structs
 from .agenda import Agenda
 from .hooks import Hooks
 from .known import check_known
+from .lanes import aligned
 from .program import Program
 from .quantities import LOGS
 from .report import Ending, Worst
@@ -96,6 +97,7 @@ class _Steps(Stepper):
     def __init__(self, program: Program, run: Run, recorder: Recorder):
         super().__init__(program, run)
         self._recorder, self._worst = recorder, Worst(program, run.loop.cell.v0)
+        recorder.state = aligned(recorder.state)
         self._state, self._agenda = run.loop.state(recorder.state), Agenda(program, run)
         self._report = Ending(1)
         self._hooks = Hooks(run, program.quantities, self.steps, self._state, self._agenda)

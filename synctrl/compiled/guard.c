@@ -6,9 +6,12 @@
 
 /* Lanes that have something that is no number. */
 static ivec not_finite(const vec *numbers, int size) {
-    vec sum = splat(0);
-    for (int j = 0; j < size; j++) sum += numbers[j] * splat(0);
-    return is_different(sum, splat(0));
+    vec sum[4] = { splat(0), splat(0), splat(0), splat(0) }; /* which do not wait for each other */
+    int j = 0;
+    for (; j + 4 <= size; j += 4)
+        for (int k = 0; k < 4; k++) sum[k] += numbers[j + k] * splat(0);
+    for (; j < size; j++) sum[0] += numbers[j] * splat(0);
+    return is_different((sum[0] + sum[1]) + (sum[2] + sum[3]), splat(0));
 }
 
 /* Say of lanes what was found there at robot i, unless they have ended before; whether none goes on. */

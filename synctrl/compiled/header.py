@@ -23,15 +23,26 @@ from .structs import STRUCTURES, Mark, Quantities
 #: where the text in C is
 FOLDER = Path(__file__).parent
 #: files of the driver, in an order in which each knows what it calls
-DRIVER = ("network.c", "loop.c", "record.c", "guard.c", "driver.c")
+DRIVER = ("elementwise.h", "network.c", "loop.c", "record.c", "guard.c", "driver.c")
+#: what is done with many numbers one after another, in as many lanes as the machine has
+ELEMENTWISE = ("elementwise.h", "elementwise.c")
 
 _WRITTEN: dict[Any, str] = {ctypes.c_int: "int ", ctypes.c_long: "long ", ctypes.c_double: "double "}
 
 
 def vectors(width: int) -> str:
     """The C text about numbers of so many lanes."""
-    parts = [(FOLDER / name).read_text(encoding="utf-8") for name in ("vectors.h", "elementary.h")]
-    return "".join([f"#define LANES {width}\n", *parts])
+    return "".join([f"#define LANES {width}\n", *texts("vectors.h", "elementary.h")])
+
+
+def texts(*names: str) -> list[str]:
+    """Files in C."""
+    return [(FOLDER / name).read_text(encoding="utf-8") for name in names]
+
+
+def elementwise(width: int) -> str:
+    """The C text of what is done with many numbers one after another, so many at a time."""
+    return "".join([vectors(width), *texts(*ELEMENTWISE)])
 
 
 def prelude(kinds: list[Kind], width: int) -> str:
@@ -41,8 +52,7 @@ def prelude(kinds: list[Kind], width: int) -> str:
 
 def driver(kinds: list[Kind], width: int) -> str:
     """The C text for a cell of robots of these kinds, with as many lanes."""
-    parts = [(FOLDER / name).read_text(encoding="utf-8") for name in DRIVER]
-    return "".join([header(kinds, width), *parts])
+    return "".join([header(kinds, width), *texts(*DRIVER)])
 
 
 def header(kinds: list[Kind], width: int = 1) -> str:

@@ -24,9 +24,9 @@ COSTS: Mapping[int, float] = {1: 1.0, 2: 1.1, 4: 1.2, 8: 1.9}
 
 
 def room(*shape: int) -> np.ndarray:
-    """Zeros that begin where the widest vectors may begin."""
+    """Zeros that begin where the widest vectors may begin, with room for one of them behind their end."""
     size = prod(shape)
-    whole = np.zeros(size + ALIGNED // 8)
+    whole = np.zeros(size + 2 * ALIGNED // 8)
     skipped = -whole.ctypes.data % ALIGNED // 8
     return whole[skipped : skipped + size].reshape(shape)
 

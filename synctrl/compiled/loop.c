@@ -65,7 +65,7 @@ static vec applied(vec tau, vec limit) {
 
 /* Sines and cosines, on which all else depends. */
 static void turn(const Cell *c, Quantities *a) {
-    for (int j = 0; j < c->n * nv; j++) v_sincos(a->q[j], a->sine + j, a->cosine + j);
+    sines((const double *)a->q, (double *)a->sine, (double *)a->cosine, (long)c->n * nv * LANES);
 }
 
 /* Add the wrench of one hand to what all of them do: of every robot in a lane, one after another. */
@@ -108,12 +108,14 @@ static void drive(const Cell *c, Quantities *a, double t) {
 /* v' under a torque that is asked for, where sine and cosine are known, and q' = v */
 static void move(const Cell *c, Quantities *a, const vec *tau) {
     int joints = c->n * nv;
-    memcpy(a->q_dot, a->v, sizeof(vec) * joints);
+    for (int j = 0; j < joints; j++) a->q_dot[j] = a->v[j];
     for (int j = 0; j < joints; j++)
         a->moving[j] = (c->saturates ? applied(tau[j], a->limits[j]) : tau[j]) + a->disturbance[j];
-    if (c->rubs)
-        for (int j = 0; j < joints; j++)
-            a->moving[j] -= a->viscous[j] * a->v[j] + a->coulomb[j] * v_tanh(a->v[j] / a->smoothing[j]);
+    if (c->rubs) {
+        const vec *rows[] = { a->v, a->viscous, a->coulomb, a->smoothing };
+        const double *const *of = (const double *const *)rows;
+        rub((double *)a->moving, of[0], of[1], of[2], of[3], (long)joints * LANES);
+    }
     if (c->o) hold(c, a);
     for (int i = 0; i < c->n; i++) call_plant(c, a, i);
 }
@@ -136,7 +138,8 @@ static void evaluate(const Cell *c, Quantities *a, Work *k, const Steps *s, int 
     (void)k;
     place(c, a, y, y_dot);
     look_up(a, s, stage, step);
-    if (c->o) { turn(c, a); feel(c, a); }
+    turn(c, a);
+    if (c->o) feel(c, a);
     command(c, a, instant(s, stage, step));
     move(c, a, a->tau);
 }
@@ -173,6 +176,7 @@ static int perceive(const Cell *c, Quantities *a, Work *k, const Steps *s, int s
     place(c, a, k->stage, k->k[0]);
     memcpy(a->q, a->measured_q, joints);
     memcpy(a->v, a->measured_v, joints);
+    turn(c, a);
     command(c, a, s->t[step]);
     sample(c, a, k, s);
     return 0;

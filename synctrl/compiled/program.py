@@ -16,7 +16,7 @@ from .arrays import CompiledLoop
 from .build import cached_library, content_key, require_casadi
 from .carrying import object_function
 from .emit import written
-from .header import driver, prelude
+from .header import driver, elementwise, prelude
 from .kind import Classified, Kind, classify, standing
 from .known import check_known, check_untouched
 from .lanes import narrowest
@@ -28,13 +28,14 @@ AGREEMENT = 1e-9
 
 
 def generate(kinds: list[Kind], width: int) -> Iterator[str]:
-    """C sources one after another: one per function of each kind of robot and of objects, and the driver."""
+    """C sources one after another: of functions of kinds of robots and of objects, then the driver's two."""
     before = prelude(kinds, width)
     for k, kind in enumerate(kinds):
         for function in Trace(kind, f"kind{k}").functions():
             yield before + written(function)
     if any(kind.holds for kind in kinds):
         yield before + written(object_function(f"kind{len(kinds)}_object"))
+    yield elementwise(max(width, processor.widest()))
     yield driver(kinds, width)
 
 

@@ -179,11 +179,11 @@ FUNCTIONS: Mapping[str, Signature] = MappingProxyType(
         ),
         "measure": Signature(
             (
-                "q", "v", "tool", "base", *DESIRED, *SLIDE, "weights", "W_inv", "posture", "gain",
-                "z", "body", "wrench", "lift", "share", "giving",
+                "q", "v", "sine", "cosine", "tool", "base", *DESIRED, *SLIDE, "weights", "W_inv", "posture",
+                "gain", "z", "body", "wrench", "lift", "share", "giving",
             ),
             (
-                "x", "e", "e_dot", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot", "sine", "cosine", "J", "J_dot",
+                "x", "e", "e_dot", "x_dot", "xd_dot", "xd_ddot", "w", "w_dot", "J", "J_dot",
                 "J_inv", "G", "zeta", "zeta_dot", "damping", "damping_rate", "felt",
             ),
         ),

@@ -8,15 +8,22 @@ static void know(const Cell *c, Quantities *a) {
     if (c->exchange.hearing != IDEAL) compare(c, a->memory, a->integral); /* S W */
 }
 
+/* The rows of some lanes, one after another. */
+INSIDE void turn_over(const vec *rows, int lanes, int length, double *numbers) {
+    const double *from = (const double *)rows;
+    for (int l = 0; l < lanes; l++, from++, numbers += length) {
+        int j = 0;
+        for (; j + LANES <= length; j += LANES) store(numbers + j, strided(from + j * LANES));
+        for (; j < length; j++) numbers[j] = from[j * LANES];
+    }
+}
+
 /* Rows of robots or pairs out of their lanes, one after another. */
 INSIDE void take_out(const Cell *c, const vec *rows, int count, int length, double *numbers) {
     if (!c->scattered) { for (int j = 0; j < count * length; j++) numbers[j] = lane(rows[j], 0); return; }
-    for (int i = 0; i < count; i += LANES, rows += length) {
-        const double *from = (const double *)rows;
-        int lanes = count - i < LANES ? count - i : LANES;
-        for (int l = 0; l < lanes; l++, numbers += length)
-            for (int j = 0; j < length; j++) numbers[j] = from[j * LANES + l];
-    }
+    for (; count >= LANES; count -= LANES, rows += length, numbers += LANES * length)
+        turn_over(rows, LANES, length, numbers);
+    turn_over(rows, count, length, numbers);
 }
 
 /* One row of the log: of robots and pairs that of each, of what network and plant remember that of the first lane. */

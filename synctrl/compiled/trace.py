@@ -74,7 +74,7 @@ class Trace:
         self.given = {key: self.ca.SX.sym(key, columns(key, kind.sizes)) for key in QUANTITIES}
         self.q, self.v = self.given["q"], self.given["v"]
         still = Symbols(
-            compact(self._tooled(kind.fixed, "tool")), self.q, self.ca.sin(self.q), self.ca.cos(self.q)
+            compact(self._tooled(kind.fixed, "tool")), self.q, self.given["sine"], self.given["cosine"]
         )
         posture = self._row("W_inv"), self._row("posture"), self._row("gain")
         self.space: Any = kind.bound(TracedTip(still, self._base()), posture, SYMBOLS)
@@ -103,8 +103,7 @@ class Trace:
         return self._function(
             "measure",
             x=task.x, e=task.e, e_dot=task.e_dot, x_dot=task.x_dot, xd_dot=task.xd_dot, xd_ddot=task.xd_ddot,
-            w=w, w_dot=w_dot, sine=np.sin(motion[0]), cosine=np.cos(motion[0]), J=task.J, J_dot=task.J_dot,
-            felt=felt, **way,
+            w=w, w_dot=w_dot, J=task.J, J_dot=task.J_dot, felt=felt, **way,
         )  # fmt: skip
 
     def _given_way(self, task: Measurement, desired: np.ndarray) -> tuple[Measurement, np.ndarray | None]:

@@ -59,6 +59,33 @@ VECTOR vec gather(const double *base, const int *index) { /* written out: a loop
 #undef FOUND
 }
 
+/* Lanes of x, those with these numbers: as `gather` of x alone, in one register. */
+VECTOR vec permuted(vec x, const int *index) {
+#if LANES > 1 && !defined(__clang__)
+    typedef int narrow __attribute__((vector_size(4 * LANES)));
+    narrow found;
+    memcpy(&found, index, sizeof found);
+    return __builtin_shuffle(x, __builtin_convertvector(found, ivec));
+#else
+    return gather((const double *)&x, index);
+#endif
+}
+
+/* Every LANES-th number from one on. */
+VECTOR vec strided(const double *from) {
+#define NEXT(l) from[l * LANES]
+#if LANES == 1
+    return NEXT(0);
+#elif LANES == 2
+    return (vec){NEXT(0), NEXT(1)};
+#elif LANES == 4
+    return (vec){NEXT(0), NEXT(1), NEXT(2), NEXT(3)};
+#else
+    return (vec){NEXT(0), NEXT(1), NEXT(2), NEXT(3), NEXT(4), NEXT(5), NEXT(6), NEXT(7)};
+#endif
+#undef NEXT
+}
+
 /* -- masks: all bits of a lane, or none -------------------------------------------------------------------------- */
 
 VECTOR ivec bits(vec x) { return ((Lanes){.all = x}).whole; }

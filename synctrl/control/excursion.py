@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..coupling.cell import Cell
+from ..coupling.cell import Cell, Reference
 from ..errors import InputError
 from ..tasks.inverse_kinematics import reach
 
@@ -39,14 +39,44 @@ def excursion(cell: Cell, duration: float) -> Excursion:
         InputError: a space that does not say which joint positions are on a path.
         UnreachableError: there are none.
     """
-    times = np.linspace(0.0, duration, POINTS)
-    table = cell.reference_table(times)
-    q = _follow(cell, table.xd)
+    table = cell.reference_table(np.linspace(0.0, duration, POINTS))
     at = np.arange(POINTS + AROUND) % POINTS
-    motion = np.array([_joint_motion(cell, *row) for row in zip(q, table.desired, strict=True)])[at]
-    near = q[at] + _shifts(cell)
-    rows = zip(near, motion[:, 0], table.desired[at], table.weights.c[at], strict=True)
-    return Excursion(near, motion[:, 0], motion[:, 1], np.array([_weighted(cell, *row) for row in rows]))
+    on = _on_path(cell, table)
+    return _weigh(cell, on.q[at] + _shifts(cell), on.v[at], on.a[at], table, at)
+
+
+def path(cell: Cell, times: np.ndarray) -> Excursion:
+    """States on the desired motions of a cell at ascending times, (K,), s; raises what `excursion` does."""
+    table = cell.reference_table(times)
+    return _weigh(cell, *_on_path(cell, table), table, np.arange(len(times)))
+
+
+def at_start(cell: Cell) -> Excursion:
+    """The one state in which a cell starts, with the velocities and accelerations that are desired there."""
+    table, q = cell.reference_table(np.zeros(1)), cell.q0[None]
+    v, a = _joint_motion(cell, cell.q0, table.desired[0])
+    return _weigh(cell, q, v[None], a[None], table, np.zeros(1, int))
+
+
+class _OnPath(NamedTuple):
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+
+
+def _on_path(cell: Cell, table: Reference) -> _OnPath:
+    """Joint positions of what is desired, and velocities and accelerations there, (T, n, nv)."""
+    q = _follow(cell, table.xd)
+    motion = np.array([_joint_motion(cell, *row) for row in zip(q, table.desired, strict=True)])
+    return _OnPath(q, motion[:, 0], motion[:, 1])
+
+
+def _weigh(
+    cell: Cell, q: np.ndarray, v: np.ndarray, a: np.ndarray, table: Reference, at: np.ndarray
+) -> Excursion:
+    """States with what weighs their errors, of the instants `at` of a table, (K,)."""
+    rows = zip(q, v, table.desired[at], table.weights.c[at], strict=True)
+    return Excursion(q, v, a, np.array([_weighted(cell, *row) for row in rows]))
 
 
 def _follow(cell: Cell, xd: np.ndarray) -> np.ndarray:

@@ -88,9 +88,9 @@ def suggested(
     """The gains of `Gains.suggest`, by their names."""
     instance("cell", cell, Cell, "a Cell")
     omega = positive_number("bandwidth", bandwidth)
-    rates = choose_rates(cell, omega, _fastest(period, dt))
+    rates = choose_rates(cell, omega, fastest(period, dt))
     states = excursion(cell, positive_number("duration", duration))
-    arms = [Arm(cell, i, states, _load(robot, payload)) for i, robot in enumerate(cell.robots)]
+    arms = [Arm(cell, i, states, usual_load(robot, payload)) for i, robot in enumerate(cell.robots)]
     K_r = [damping(arm, omega, rates) for arm in arms]
     _warn_of_slow_modes(omega, rates, arms, K_r)
     _warn_of_sag(rates, arms, K_r)
@@ -111,21 +111,29 @@ def choose_rates(cell: Cell, omega: float, top: float) -> Rates:
 
 
 def damping(arm: Arm, omega: float, rates: Rates) -> np.ndarray:
-    """K_r, (nv,): what bandwidth and gravity ask for, cut at the joints that are too light for it.
+    """K_r, (nv,): what bandwidth and gravity ask for, cut at the joints that are too light for it."""
+    return cut(arm, wished(arm, omega, rates.Lambda), rates.room)
 
-    Light joints are those with K_j > kappa room / (M^-1)_jj; kappa is the largest up to 1 with which all
-    modes of M^-1 K_r are below the room.
-    """
+
+def wished(arm: Arm, omega: float, Lambda: float) -> np.ndarray:
+    """K_r that bandwidth and gravity ask for, whatever the joints can take, (nv,)."""
     inertia = np.einsum("kjj->kj", arm.M_loaded).mean(axis=0)
-    wish = np.maximum(DAMPING * omega * inertia, arm.unknown / (SAG * rates.Lambda))
+    return np.maximum(DAMPING * omega * inertia, arm.unknown / (SAG * Lambda))
+
+
+def cut(arm: Arm, K_r: np.ndarray, room: float) -> np.ndarray:
+    """K_r, (nv,), cut at light joints, so that all modes of M^-1 K_r are below the room, 1/s.
+
+    Light joints are those with K_j > kappa room / (M^-1)_jj; kappa is the largest up to 1 that does.
+    """
     M_inv = np.linalg.inv(arm.M)
-    ceiling = rates.room / np.einsum("kjj->kj", M_inv).max(axis=0)
+    ceiling = room / np.einsum("kjj->kj", M_inv).max(axis=0)
     low, high = 0.0, 2.0  # the first kappa is 1
     while low < 1 and high - low > 1e-9 * high:
         kappa = (low + high) / 2
-        good = _largest_mode(M_inv, np.minimum(wish, kappa * ceiling)) <= rates.room
+        good = largest_mode(M_inv, np.minimum(K_r, kappa * ceiling)) <= room
         low, high = (kappa, high) if good else (low, kappa)
-    return np.minimum(wish, low * ceiling)
+    return np.minimum(K_r, low * ceiling)
 
 
 def stiffness(arm: Arm, K_r: np.ndarray, cell: Cell, rates: Rates) -> np.ndarray:
@@ -144,45 +152,51 @@ def stiffness(arm: Arm, K_r: np.ndarray, cell: Cell, rates: Rates) -> np.ndarray
 def learning(arm: Arm, K_r: np.ndarray, omega: float, rates: Rates) -> np.ndarray:
     """Gamma, (P,), with Y Gamma Y^T <= (T_a K_r^-1 + K_r^-1 M K_r^-1/6)^-1 along the path, T_a = .5/omega."""
     scale = learning_scale(arm.parameters, arm.loaded, arm.q)
+    return scale / learning_share(arm, K_r, omega, rates.Lambda, scale)
+
+
+def learning_share(arm: Arm, K_r: np.ndarray, omega: float, Lambda: float, Gamma: np.ndarray) -> float:
+    """How many times Y Gamma Y^T, Gamma of (P,), is what `learning` allows at most."""
     R_inv = SETTLING / omega * np.diag(1 / K_r) + arm.M / K_r[:, None] / K_r / 6
     rng, largest = np.random.default_rng(0), 0.0
     for k, (q, v, a) in enumerate(zip(arm.q, arm.v, arm.a, strict=True)):
-        jolts = TRANSIENT * rng.choice((-1.0, 1.0), (2, 2, len(q))) * rates.Lambda
+        jolts = TRANSIENT * rng.choice((-1.0, 1.0), (2, 2, len(q))) * Lambda
         for e_dot, e_ddot in ((0.0, 0.0), *jolts):
-            Y = arm.parameters.regressor(q, v, v + e_dot, a + rates.Lambda * e_ddot) * np.sqrt(scale)
+            Y = arm.parameters.regressor(q, v, v + e_dot, a + Lambda * e_ddot) * np.sqrt(Gamma)
             largest = max(largest, np.linalg.eigvals(R_inv[k] @ Y @ Y.T).real.max())
-    return scale / largest
+    return largest
 
 
 # -- parts -------------------------------------------------------------------------------------------------
 
 
-def _fastest(period: float | None, dt: float) -> float:
+def fastest(period: float | None, dt: float) -> float:
     """The largest rate, 1/s, that the step of RK4, or the period of sampled control, can follow."""
     if period is None:
         return RK4_SHARE / positive_number("dt", dt)
     return SAMPLED_SHARE / positive_number("period", period)
 
 
-def _load(robot: Robot, payload: float | None) -> float:
+def usual_load(robot: Robot, payload: float | None = None) -> float:
+    """What a robot may carry without being told of, kg: what is given, or what `Gains.suggest` says."""
     mass = robot.inertial_parameters[::10].sum()
     return min(LOAD, LOAD_SHARE * mass) if payload is None else non_negative_number("payload", payload)
 
 
-def _largest_mode(M_inv: np.ndarray, K_r: np.ndarray) -> float:
+def largest_mode(M_inv: np.ndarray, K_r: np.ndarray) -> float:
     """Largest eigenvalue of M^-1 K_r, 1/s."""
     root = np.sqrt(K_r)
     return float(np.linalg.eigvalsh(root[:, None] * M_inv * root).max())
 
 
-def _slowest_mode(M: np.ndarray, K_r: np.ndarray) -> float:
+def slowest_mode(M: np.ndarray, K_r: np.ndarray) -> float:
     """Least eigenvalue of M^-1 K_r, 1/s."""
     root = 1 / np.sqrt(K_r)
     return float(1 / np.linalg.eigvalsh(root[:, None] * M * root).max())
 
 
 def _warn_of_slow_modes(omega: float, rates: Rates, arms: list[Arm], K_r: list[np.ndarray]) -> None:
-    slowest = {arm.name: _slowest_mode(arm.M_loaded, K) for arm, K in zip(arms, K_r, strict=True)}
+    slowest = {arm.name: slowest_mode(arm.M_loaded, K) for arm, K in zip(arms, K_r, strict=True)}
     modes = {"Lambda": rates.Lambda, "beta": rates.synchronized}
     modes |= {f"K_r of {name}": mode for name, mode in slowest.items()}
     slow = [f"{name} gives {mode:.3g} 1/s" for name, mode in modes.items() if mode < (1 - 1e-9) * omega]

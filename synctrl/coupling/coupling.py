@@ -42,6 +42,7 @@ class Coupling:
 
     Attributes:
         degree: a, the largest entry of the diagonal of S^T S.
+        task: the `SynchronizationFunction` that it comes from, and for how long, s; or None.
 
     Raises:
         CouplingError: a robot compared with itself or outside the cell, an entry that is zero, or a graph
@@ -51,6 +52,8 @@ class Coupling:
         CouplingWarning: two rows that compare the same pair, or a graph on which all synchronization errors
             vanish only if all tracking errors do.
     """
+
+    task: tuple[Any, float] | None = None
 
     def __init__(
         self,
@@ -190,7 +193,7 @@ class Coupling:
     def _again(self, signs: np.ndarray, source: WeightSource, unit: str) -> Self:
         """A copy with other entries and weights; what there is to warn of was said of the first one."""
         again = copy(self)
-        again.signs, again._source, again.unit = finite_array("signs", signs), source, unit
+        again.signs, again._source, again.unit, again.task = finite_array("signs", signs), source, unit, None
         again._set_sums()
         return again
 
@@ -276,10 +279,7 @@ class Coupling:
             self._S, self._S_T = partial(np.matmul, S), partial(np.matmul, S.T)
         else:
             S = self._entries()
-            self._S, self._S_T = (
-                partial(graphs.sparse_product, S),
-                partial(graphs.sparse_product, S.T.tocsr()),
-            )
+            self._S, self._S_T = (partial(graphs.sparse_product, each) for each in (S, S.T.tocsr()))
 
     def _entries(self) -> Any:
         """S as the list of its entries."""

@@ -180,6 +180,7 @@ class SynchronizationFunction:
         except CouplingError as error:
             raise SynchronizationError(str(error)).about(**vars(error)) from error
         self._check_satisfied(xd, times, source)
+        coupling.task = self, float(duration)
         return coupling
 
     def _couple(self, source: WeightSource, graph: GraphLike | None) -> Coupling:

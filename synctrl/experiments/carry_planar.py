@@ -32,10 +32,10 @@ from ..robots.robot import Robot
 from ..simulation.schedules import Disturbance
 from ..simulation.simulate import Experiment
 from ..tasks.inverse_kinematics import inverse_kinematics
-from ..tasks.poses import Attached, AxisRotation, PoseTrajectory
+from ..tasks.poses import AxisRotation, InPlane, PoseTrajectory
 from ..tasks.rotations import exp
 from ..tasks.spaces import CartesianSpace
-from ..tasks.trajectories import Motion
+from ..tasks.swings import Sway
 from .parts import ControllerParts, error_of_geometry, giving_way, leaking, ready_experiment
 
 MASS, EDGE = 2.0, 0.24  # kg, m
@@ -106,38 +106,8 @@ def carry_planar(
 
 def plate_motion() -> PoseTrajectory:
     """Desired motion of the plate: to and fro along x, away and back along y while it turns."""
-    way = Swing([SWING[0], 0.0, 0.0], [0.0, SWING[1], 0.0])
-    return PoseTrajectory(way, AxisRotation(np.eye(3), (0, 0, 1), Swing([0.0], [TURN])))
-
-
-class Swing:
-    """to sin(W t) + away (1 - cos(W t)), with W of `SPEED`; one number per component."""
-
-    breaks = ()
-
-    def __init__(self, to: ArrayLike, away: ArrayLike):
-        self.to, self.away = np.array(to, float), np.array(away, float)
-        self.dimension = self.to.size
-
-    def __call__(self, t: ArrayLike) -> Motion:
-        to, away, W = self.to, self.away, SPEED
-        sine, cosine = (f(W * np.asarray(t, float)[..., None]) for f in (np.sin, np.cos))
-        position, acceleration = to * sine + away * (1 - cosine), away * cosine - to * sine
-        return Motion(position, W * (to * cosine + away * sine), W * W * acceleration)
-
-
-class InPlane:
-    """The motion of a place on a body along x and y; the body turns about z."""
-
-    dimension = 2
-
-    def __init__(self, body: PoseTrajectory, place: np.ndarray):
-        self._motion = Attached(body, (*place, 0.0))
-        self.breaks = body.breaks
-
-    def __call__(self, t: ArrayLike) -> Motion:
-        x, x_dot, x_ddot = self._motion(t)
-        return Motion(x[..., :2], x_dot[..., :2], x_ddot[..., :2])
+    way = Sway([SWING[0], 0.0, 0.0], [0.0, SWING[1], 0.0], SPEED)
+    return PoseTrajectory(way, AxisRotation(np.eye(3), (0, 0, 1), Sway([0.0], [TURN], SPEED)))
 
 
 def _places(given: bool | ArrayLike, tare: bool) -> np.ndarray:
@@ -170,7 +140,7 @@ def _member(arm: Robot, i: int, place: np.ndarray, friction: Friction) -> Member
     q0 = inverse_kinematics(arm, pin, np.array([heading - 0.7, 1.4]), SPACE)
     known = ARMS_KNOWN * arm.inertial_parameters
     share = SHARES_KNOWN[i] * (loaded.inertial_parameters - arm.inertial_parameters)
-    motion = InPlane(plate_motion(), place)
+    motion = InPlane(plate_motion(), (*place, 0.0))
     return Member(loaded, motion, q0, theta_hat0=known + share, friction=friction, name=arm.name)
 
 

@@ -83,14 +83,20 @@ class WheelPath:
         return Motion(*(part[..., None] / WHEEL_RADIUS for part in (angle, angle_dot, angle_ddot)))
 
 
-def wheel_synchronization() -> SynchronizationFunction:
+class WheelSynchronization(SynchronizationFunction):
     """f = R_2(t) x_1 - R_1(t) x_2, so that c_1 = -R_2 and c_2 = R_1."""
-    return SynchronizationFunction(
-        lambda x_1, x_2, t: radius(t, 1)[0] * x_1 - radius(t, 0)[0] * x_2,
-        robots=2,
-        dimension=1,
-        unit="m",
-    )
+
+    def __init__(self) -> None:
+        super().__init__(_apart, robots=2, dimension=1, unit="m")
+
+
+def wheel_synchronization() -> SynchronizationFunction:
+    """The synchronization function of the wheels."""
+    return WheelSynchronization()
+
+
+def _apart(x_1: np.ndarray, x_2: np.ndarray, t: float) -> np.ndarray:
+    return radius(t, 1)[0] * x_1 - radius(t, 0)[0] * x_2
 
 
 def mobile_robot(

@@ -21,7 +21,7 @@ from ..tasks.inverse_kinematics import reach
 from ..tasks.pose import PoseSpace
 from ..tasks.poses import Attached, AxisRotation, PoseTrajectory
 from ..tasks.rotations import exp
-from ..tasks.trajectories import FunctionTrajectory
+from ..tasks.swings import Swing
 from .parts import ControllerParts, ready_experiment
 
 DISTANCE = 0.65  # m, of each base from the middle
@@ -98,12 +98,6 @@ def _start(robot: Robot, pose: np.ndarray, offset: np.ndarray) -> np.ndarray:
     return q + np.linalg.solve(PoseSpace().miss(robot, pose, q)[1], offset)
 
 
-def swing(amplitude: np.ndarray, offset: np.ndarray | float = 0.0) -> FunctionTrajectory:
-    """offset + amplitude (1 - cos(w t)) / 2, at rest at t = 0; every second component at twice the speed."""
-    w = 2 * np.pi / PERIOD * np.where(np.arange(amplitude.size) % 2, 2.0, 1.0)
-    half = 0.5 * amplitude
-    return FunctionTrajectory(
-        lambda t: offset + half * (1 - np.cos(w * t)),
-        lambda t: half * w * np.sin(w * t),
-        lambda t: half * w * w * np.cos(w * t),
-    )
+def swing(amplitude: np.ndarray, offset: np.ndarray | float = 0.0) -> Swing:
+    """The swing of this cell, at rest at t = 0 and back after its period."""
+    return Swing(amplitude, PERIOD, offset)

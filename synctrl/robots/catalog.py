@@ -18,6 +18,7 @@ from typing import Any
 
 from ..checks import instance
 from ..errors import MissingDependencyError, RobotError, near
+from .origin import Origin
 from .robot import Robot
 from .urdf.description import Description, read_urdf, urdf_folder
 from .urdf.document import Inertial
@@ -102,7 +103,15 @@ def load_robot(source: str | Path, tip: str | None = None, **options: Any) -> Ro
         name=found.name,
         document=found.document,
         report=found.report,
+        origin=_origin(source, tip=tip, **options),
     )
+
+
+def _origin(source: str | Path, **options: Any) -> Origin:
+    """Where a robot comes from: a name as it is, or a path that stays true when the folder changes."""
+    if isinstance(source, Path) or (is_path(source) and not source.startswith(PREFIX)):
+        return Origin.loaded(Path(source).absolute(), **options)
+    return Origin.loaded(source, **options)
 
 
 def load_description(
@@ -141,7 +150,7 @@ def load_description(
         source, folders, own_args = downloaded(source.removeprefix(PREFIX))
         options["package_dirs"] = (*named_folders(package_dirs), *folders)
         options["xacro_args"] = xacro_args if own_args is None else {**own_args, **(xacro_args or {})}
-    if isinstance(source, Path) or _looks_like_path(source):
+    if isinstance(source, Path) or is_path(source):
         return read_urdf(source, tip=tip, locked=locked, **options)
     found = _load(source, locked or {}, options)
     return found if tip is None else found.with_tip(tip)
@@ -153,7 +162,8 @@ def _check_kinds(tip: object, locked: object, xacro_args: object) -> None:
     instance("xacro_args", xacro_args, (Mapping, NoneType), "values by the names of arguments")
 
 
-def _looks_like_path(text: str) -> bool:
+def is_path(text: str) -> bool:
+    """Whether a text that says where a robot comes from is a path, and no name."""
     return "/" in text or "\\" in text or text.lower().endswith((".urdf", ".xml", ".xacro"))
 
 

@@ -114,7 +114,8 @@ def carrying(robot: Robot, load: Payload) -> Robot:
     body = pin.Inertia(load.mass, np.array(load.com), np.array(load.inertia))
     model.appendBodyToJoint(frame.parentJoint, body, frame.placement)
     document = _welded(robot.document, name, load)
-    kept = partial(Robot, visual=robot.visual, name=robot.name, report=robot.report)
+    origin = robot.origin.then("carrying", mass=load.mass, com=load.com, inertia=load.inertia, frame=name)
+    kept = partial(Robot, visual=robot.visual, name=robot.name, report=robot.report, origin=origin)
     return kept(model, robot.tip, document=document)
 
 
@@ -139,7 +140,8 @@ def holding(robot: Robot, xyz: ArrayLike, rotation: ArrayLike, name: str = "held
     if document is not None and robot.tip in {link.name for link in document.links}:
         mount = Joint(f"{name}_mount", "fixed", robot.tip, name, Pose.of(at))
         document = replace(document, links=(*document.links, Link(name)), joints=(*document.joints, mount))
-    kept = partial(Robot, visual=robot.visual, name=robot.name, report=robot.report)
+    origin = robot.origin.then("holding", xyz=at.translation, rotation=at.rotation, name=name)
+    kept = partial(Robot, visual=robot.visual, name=robot.name, report=robot.report, origin=origin)
     return kept(model, name, document=document)
 
 

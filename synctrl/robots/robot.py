@@ -15,6 +15,7 @@ from ..renamed import names_elsewhere
 from .friction import Friction
 from .model import PerThread, check_inertia, check_joints, check_numbering, frame_id, joint_units
 from .model import moved_shapes as _moved
+from .origin import UNKNOWN, Origin
 from .urdf.changes import with_bodies
 from .urdf.document import Document, Pose
 from .urdf.report import NOTHING, Report
@@ -39,6 +40,7 @@ class Robot:
         name: what error messages and legends call it.
         document: the URDF that describes it, base and all; None if there is none.
         report: what was left out, assumed or held when its description was read, and what is suspicious.
+        origin: how it was loaded and changed since; by default nobody knows.
 
     Raises:
         FrameNotFound: `tip` is not a frame of the model.
@@ -54,13 +56,12 @@ class Robot:
         name: str | None = None,
         document: Document | None = None,
         report: Report = NOTHING,
+        origin: Origin = UNKNOWN,
     ):
         instance("model", model, pin.Model, "a Pinocchio model, for example from load_robot")
-        self.model = model
+        self.model, self.visual = model, visual
         self.name = name or model.name
-        self.visual = visual
-        self.document = document
-        self.report = report
+        self.document, self.report, self.origin = document, report, origin
         self.kept: dict[str, Any] = {}  #: what was computed from it once, by name: a robot does not change
         self.alike: dict[str, Any] = {}  #: the same of what it has in common with those placed elsewhere
         check_joints(self.name, model)
@@ -96,13 +97,14 @@ class Robot:
                 frame.placement = base * frame.placement
         document = None if self.document is None else self.document.placed(Pose(tuple(shift), tuple(angles)))
         visual = _moved(self.visual, base)
-        robot = self._with(model, visual=visual, name=name or self.name, document=document)
+        origin = self.origin.then("placed", xyz=shift, rpy=angles, name=name)
+        robot = self._with(model, visual=visual, name=name or self.name, document=document, origin=origin)
         robot.alike, robot._data, robot._weightless_data = self.alike, self._data, self._weightless_data
         return robot
 
     def with_tip(self, tip: str) -> Self:
         """This robot controlled at another frame."""
-        return self._with(self.model, tip)
+        return self._with(self.model, tip, origin=self.origin.then("with_tip", tip=tip))
 
     def with_parameters(self, pi: ArrayLike) -> Self:
         """This robot with other true inertial parameters.
@@ -120,7 +122,8 @@ class Robot:
             model.inertias[joint] = pin.Inertia.FromDynamicParameters(np.array(row))
         rows_by_joint = dict(zip(self.joint_names, rows, strict=True))
         document = None if self.document is None else with_bodies(self.document, rows_by_joint)
-        return self._with(model, document=document)
+        origin = self.origin.then("with_parameters", pi=rows.ravel())
+        return self._with(model, document=document, origin=origin)
 
     def with_armature(self, armature: ArrayLike) -> Self:
         """This robot with rotors that turn with its joints: a diagonal added to M.
@@ -136,11 +139,11 @@ class Robot:
             raise InputError.expected("at least 0 kg·m^2", values.min(), "armature")
         model = pin.Model(self.model)
         model.armature = values.copy()
-        return self._with(model)
+        return self._with(model, origin=self.origin.then("with_armature", armature=values))
 
     def weightless(self) -> Self:
         """This robot where there is no gravity."""
-        return self._with(self._weightless)
+        return self._with(self._weightless, origin=self.origin.then("weightless"))
 
     @cached_property
     def _weightless(self) -> pin.Model:
@@ -287,7 +290,7 @@ class Robot:
 
     def __reduce__(self) -> tuple:
         """Copies and other processes make the scratch memory anew."""
-        own = partial(type(self), visual=self.visual, name=self.name)
+        own = partial(type(self), visual=self.visual, name=self.name, origin=self.origin)
         return partial(own, document=self.document, report=self.report), (self.model, self.tip)
 
     def __repr__(self) -> str:

@@ -13,7 +13,6 @@ from ..assembly.body import place_of
 from ..simulation.result import Result
 from ..tasks.rotations import log
 from .curves import Curves, curves_figure
-from .panels import WIDTH
 from .runs import check_output
 from .style import display
 
@@ -76,13 +75,28 @@ CURVES: Mapping[str, tuple[str, Callable[[Result], Sequence[Curves]]]] = Mapping
 )
 
 
-def assembly_figure(result: Result, *, name: str, width: float = WIDTH) -> Figure:
+def assembly_figure(
+    result: Result, *, name: str, width: float | None = None, style: str | None = None
+) -> Figure:
     """One of the figures of `CURVES`.
 
     Raises:
         InputError: the run does not have what is drawn in it.
     """
-    return curves_figure(result, CURVES[name][1](result), width)
+    return curves_figure(result, CURVES[name][1](result), width, style)
+
+
+def internal_forces(result: Result, *, width: float | None = None, style: str | None = None) -> Figure:
+    """Size of the internal force at each hand of what several hands carry, and of the moment.
+
+    Args:
+        result: the run.
+        width, style: of the figure, see `look.look_of`.
+
+    Raises:
+        InputError: nothing is carried.
+    """
+    return assembly_figure(result, name="internal_force", width=width, style=style)
 
 
 def has(result: Result, name: str) -> bool:

@@ -6,7 +6,7 @@ import base64
 import gzip
 import hashlib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from importlib.util import find_spec
@@ -59,7 +59,7 @@ def page(title: str, *panes: Pane) -> str:
         [
             "<!DOCTYPE html>",
             '<html lang="en"><head><meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{_policy([library, PLAYER])}">',
+            f'<meta http-equiv="Content-Security-Policy" content="{policy()}">',
             '<meta name="viewport" content="width=device-width"><link rel="icon" href="data:,">',
             f"<title>{escape(title) or 'Scene'}</title><style>{STYLE}</style></head><body>",
             f'<script type="text/plain" id="licences">{licences}</script>',
@@ -101,8 +101,13 @@ def _words(pane: Pane) -> str:
     return f'{heading}{text}<p class="time"></p><p class="failure"></p>'
 
 
-def _policy(scripts: Iterable[str]) -> str:
-    """Content security policy: these scripts and nothing else, and no requests."""
+def policy() -> str:
+    """Content security policy of a page with scenes: what plays them and nothing else, and no requests.
+
+    Raises:
+        MissingDependencyError: MeshCat's viewer is not installed.
+    """
+    scripts = _viewer_source("dist/main.min.js"), PLAYER
     hashes = (base64.b64encode(hashlib.sha256(s.encode()).digest()).decode() for s in scripts)
     allowed = " ".join(f"'sha256-{h}'" for h in hashes)
     return (

@@ -6,24 +6,23 @@ from typing import TYPE_CHECKING
 
 from ..simulation.result import Result
 from .curves import Curves, curves_figure
-from .panels import WIDTH
 from .runs import check_output
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def traffic(result: Result, *, width: float = WIDTH) -> Figure:
+def traffic(result: Result, *, width: float | None = None, style: str | None = None) -> Figure:
     """Messages that robots sent and links brought until then, and the age of what is known on every link.
 
     Args:
         result: the run.
-        width: of the figure, inches.
+        width, style: of the figure, see `look.look_of`.
 
     Raises:
         InputError: a run whose network has no messages.
     """
-    return curves_figure(result, traffic_curves(result), width)
+    return curves_figure(result, traffic_curves(result), width, style)
 
 
 def traffic_curves(result: Result) -> list[Curves]:

@@ -6,24 +6,19 @@ it as PNG and SVG, the same bytes every time.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from functools import cache
-from pathlib import Path
-from threading import RLock
-from typing import TYPE_CHECKING, Any, NamedTuple
-
-import numpy as np
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..analysis.metrics import ERRORS
 from ..checks import choice, finite_array, index
-from ..errors import InputError, ResultError
-from ..files import whole_file
+from ..errors import InputError
 from ..renamed import names_elsewhere
 from ..simulation.result import Result
 from . import legends
 from .legends import plain
-from .panels import DPI, GAP, LEFT, LEGEND, RIGHT, TITLE, WIDTH, stacked_panels
+from .look import LABEL_SIZE, TITLE_SIZE, in_look, new_figure, save, save_svg, style
+from .panels import GAP, LEFT, LEGEND, RIGHT, TITLE, stacked_panels
 from .runs import check_run
 from .style import ACCENT, DESIRED, display, line_style, robot_color
 
@@ -31,120 +26,57 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: of titles and of labels of axes, points
-TITLE_SIZE, LABEL_SIZE = 10, 9
-_SIZES: Any = {"axes.titlesize": TITLE_SIZE, "axes.labelsize": LABEL_SIZE, "legend.fontsize": legends.SIZE}
-#: the next levels take twice the time and more for files that are a few kB smaller
-_PNG = {"compress_level": 2}
-_SVG: Any = {"Date": None, "Creator": None}
-
-
-#: held while a thread draws
-_drawing = RLock()
-
-
-@contextmanager
-def style() -> Iterator[None]:
-    """This package's look, for the figures made inside; what was set before comes back after.
-
-    Threads draw one after another, for what matplotlib looks up holds for the whole process.
-    """
-    from matplotlib import rc_context
-
-    with _drawing, rc_context({**_look(), **_SIZES}):
-        yield
-
-
-@cache
-def _look() -> Any:
-    """The package's own settings, and matplotlib's own for all else."""
-    from matplotlib import rc_params_from_file, rcParamsDefault
-
-    ours = rc_params_from_file(Path(__file__).with_name("figures.mplstyle"), use_default_template=False)
-    return {**{k: v for k, v in rcParamsDefault.items() if k != "backend"}, **ours}
-
-
-def new_figure(
-    height: float, rows: int = 1, columns: int = 1, *, width: float = WIDTH, **options: Any
-) -> tuple[Figure, np.ndarray]:
-    """A figure, its size in inches, and its axes, (rows, columns); to be called within `style`.
-
-    It arranges itself around its labels, for which it measures all of them: `stacked_panels` need not.
-    """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure, figure.subplots(rows, columns, squeeze=False, **options)
-
-
-def save(figure: Figure, stem: str | Path) -> tuple[Path, Path]:
-    """Write a figure as `<stem>.png` and `<stem>.svg`; the same figure gives the same bytes.
-
-    Raises:
-        ResultError: a file cannot be written.
-    """
-    png, svg = Path(f"{stem}.png"), Path(f"{stem}.svg")
-    with _writing(figure, stem), whole_file(svg) as vectors, whole_file(png) as pixels:
-        figure.savefig(vectors, format="svg", metadata=_SVG)
-        figure.savefig(pixels, format="png", metadata={"Software": None}, pil_kwargs=_PNG)
-    return png, svg
-
-
-def save_svg(figure: Figure, stem: str | Path) -> Path:
-    """Write a figure as `<stem>.svg` alone, for a page; otherwise as `save`."""
-    svg = Path(f"{stem}.svg")
-    with _writing(figure, stem), whole_file(svg) as vectors:
-        figure.savefig(vectors, format="svg", metadata=_SVG)
-    return svg
-
-
-@contextmanager
-def _writing(figure: Figure, stem: str | Path) -> Iterator[None]:
-    """Arrange a figure once for all of its files, and name them if they cannot be written."""
-    try:
-        with style():
-            if engine := figure.get_layout_engine():
-                engine.execute(figure)
-                figure.set_layout_engine("none")
-            yield
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise ResultError(f"cannot write the figure '{stem}': {reason}", file=stem, found=reason) from error
-
+__all__ = [
+    "common_limits",
+    "joint_trajectories",
+    "new_figure",
+    "save",
+    "save_svg",
+    "style",
+    "sync_errors",
+    "tracking_errors",
+]
 
 # -- figures of the paper ---------------------------------------------------------------------------------
 
 
-def joint_trajectories(result: Result, robot: int, *, width: float = WIDTH) -> Figure:
+def joint_trajectories(
+    result: Result, robot: int, *, width: float | None = None, style: str | None = None
+) -> Figure:
     """Actual (solid) and desired (dash-dot) coordinates of one robot, a panel per axis.
 
     Args:
         result: the run; in joint space its coordinates are those of the joints.
         robot: which robot, counted from 0.
-        width: of the figure, inches.
+        width, style: of the figure, see `look.look_of`.
 
     Raises:
         InputError: there is no such robot.
     """
     check_run(result, "x", "x_desired")
     index("robot", robot, len(result.names))
+    return in_look(style, width, partial(_joints, result, robot))
+
+
+def _joints(result: Result, robot: int, width: float) -> Figure:
     names = result.info["axes"]
-    with style():
-        above = [LEGEND + TITLE, *[GAP] * (len(names) - 1)]
-        figure, panels = stacked_panels([COORDINATE] * len(names), above, width)
-        for k, panel in enumerate(panels):
-            unit = draw_coordinate(panel, result, [robot], k)
-            room = 72 * COORDINATE - legends.text_width(f", {unit}", LABEL_SIZE)
-            panel.set_ylabel(f"{legends.shortened(plain(names[k]), room, LABEL_SIZE)}, {unit}")
-        panels[0].set_title(titled(result.names[robot], width), loc="left")
-        legends.legend(figure, panels[0].get_lines())
+    above = [LEGEND + TITLE, *[GAP] * (len(names) - 1)]
+    figure, panels = stacked_panels([COORDINATE] * len(names), above, width)
+    for k, panel in enumerate(panels):
+        unit = draw_coordinate(panel, result, [robot], k)
+        room = 72 * COORDINATE - legends.text_width(f", {unit}", LABEL_SIZE)
+        panel.set_ylabel(f"{legends.shortened(plain(names[k]), room, LABEL_SIZE)}, {unit}")
+    panels[0].set_title(titled(result.names[robot], width), loc="left")
+    legends.legend(figure, panels[0].get_lines())
     return figure
 
 
 def tracking_errors(
-    result: Result, limits: tuple[float, float] | None = None, *, width: float = WIDTH
+    result: Result,
+    limits: tuple[float, float] | None = None,
+    *,
+    width: float | None = None,
+    style: str | None = None,
 ) -> Figure:
     """Tracking errors of all robots, in one panel for each unit.
 
@@ -154,17 +86,24 @@ def tracking_errors(
         result: the run.
         limits: lowest and highest value shown, in the unit of the errors; by default what the run needs.
             Figures that are compared share them, see `common_limits`.
-        width: of the figure, inches.
+        width, style: of the figure, see `look.look_of`.
     """
-    return _errors(result, "tracking_error", "tracking error e", limits, width)
+    return in_look(style, width, partial(_errors, result, "tracking_error", "tracking error e", limits))
 
 
-def sync_errors(result: Result, limits: tuple[float, float] | None = None, *, width: float = WIDTH) -> Figure:
+def sync_errors(
+    result: Result,
+    limits: tuple[float, float] | None = None,
+    *,
+    width: float | None = None,
+    style: str | None = None,
+) -> Figure:
     """Synchronization errors of all pairs, in one panel for each unit; see `pair_colors`.
 
-    `limits` and `width` are as for `tracking_errors`.
+    `limits`, `width` and `style` are as for `tracking_errors`.
     """
-    return _errors(result, "sync_error", "synchronization error ε", limits, width)
+    what = "synchronization error ε"
+    return in_look(style, width, partial(_errors, result, "sync_error", what, limits))
 
 
 def common_limits(kind: str, *results: Result) -> tuple[float, float]:
@@ -207,16 +146,15 @@ class _Part(NamedTuple):
 
 def _errors(result: Result, kind: str, what: str, limits: tuple[float, float] | None, width: float) -> Figure:
     parts = _parts(result, kind, limits)
-    with style():
-        handles = [*legends.row_handles(result, kind), *legends.axis_handles(result)]
-        handles += legends.disturbance_handles(result)
-        room = [GAP if part.times == 1 else TITLE for part in parts]
-        above = [LEGEND * legends.legend_rows(handles, width) + GAP, *room[1:]]
-        heights = [PANEL if part.times == 1 else MAGNIFIED for part in parts]
-        figure, panels = stacked_panels(heights, above, width)
-        for panel, part in zip(panels, parts, strict=True):
-            _draw_errors(panel, result, kind, what, part)
-        legends.legend(figure, handles)
+    handles = [*legends.row_handles(result, kind), *legends.axis_handles(result)]
+    handles += legends.disturbance_handles(result)
+    room = [GAP if part.times == 1 else TITLE for part in parts]
+    above = [LEGEND * legends.legend_rows(handles, width) + GAP, *room[1:]]
+    heights = [PANEL if part.times == 1 else MAGNIFIED for part in parts]
+    figure, panels = stacked_panels(heights, above, width)
+    for panel, part in zip(panels, parts, strict=True):
+        _draw_errors(panel, result, kind, what, part)
+    legends.legend(figure, handles)
     return figure
 
 

@@ -13,20 +13,39 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..checks import choice, finite_number
+from ..checks import choice
 from ..errors import InputError, SynctrlError
 from ..simulation.result import Result
 from . import plots
 from .assembly_figures import CURVES, assembly_figure, has
+from .consistency_plots import consistency
 from .curves import Curves, curves_figure
 from .legends import legend, legend_rows, plain
+from .look import NARROWEST, in_look, look_of
+from .lyapunov_plots import lyapunov_terms
 from .network_figures import traffic
-from .panels import LEGEND, TITLE, WIDTH, stacked_panels
+from .panels import LEGEND, TITLE, stacked_panels
+from .phase_figures import phase_portraits
 from .runs import check_run
+from .spectrum_figures import spectra
 from .style import DESIRED, robot_color
+from .tip_figures import tip_paths
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+__all__ = [
+    "FIGURES",
+    "NARROWEST",
+    "OF_TASKS",
+    "ON_REQUEST",
+    "Gallery",
+    "estimates",
+    "gallery",
+    "paths",
+    "torque_curves",
+    "torques",
+]
 
 #: height of a panel, inches
 COORDINATE = 1.1
@@ -36,15 +55,20 @@ NEAR = 0.5
 MOST_ESTIMATES = 6
 
 
-def torques(result: Result, *, width: float = WIDTH) -> Figure:
+def torques(result: Result, *, width: float | None = None, style: str | None = None) -> Figure:
     """Torques that the controller asks for: a panel for each robot and unit, a colour for each joint.
 
     The legend has the limits of the robots' descriptions; they are drawn, dashed, where torques come near.
 
     Args:
         result: the run.
-        width: of the figure, inches.
+        width, style: of the figure, see `look.look_of`.
     """
+    return curves_figure(result, torque_curves(result), width, style)
+
+
+def torque_curves(result: Result) -> list[Curves]:
+    """The panels of `torques`, for one run."""
     check_run(result, "tau")
     curves = []
     for i, robot in enumerate(result.info["robots"]):
@@ -59,15 +83,15 @@ def torques(result: Result, *, width: float = WIDTH) -> Figure:
                     [_near(result.tau[:, i, k], limits[k]) for k in columns],
                 )
             )
-    return curves_figure(result, curves, width)
+    return curves
 
 
-def estimates(result: Result, *, width: float = WIDTH) -> Figure:
+def estimates(result: Result, *, width: float | None = None, style: str | None = None) -> Figure:
     """Estimates that move most, a panel for each robot, with true values dashed that are not far off.
 
     Args:
         result: the run.
-        width: of the figure, inches.
+        width, style: of the figure, see `look.look_of`.
 
     Raises:
         InputError: nothing is estimated.
@@ -84,32 +108,35 @@ def estimates(result: Result, *, width: float = WIDTH) -> Figure:
         names, true = ([robot[key][k] for k in moved] for key in ("parameters", "theta"))
         levels = _within_reach(theta_hat[:, moved], true)
         curves.append(Curves(title, "SI units", theta_hat[:, moved], names, levels))
-    return curves_figure(result, curves, width)
+    return curves_figure(result, curves, width, style)
 
 
-def paths(result: Result, *, width: float = WIDTH) -> Figure:
+def paths(result: Result, *, width: float | None = None, style: str | None = None) -> Figure:
     """Coordinates of all robots over time, a panel for each: actual, and desired as dark dash-dot lines.
 
     Args:
         result: the run.
-        width: of the figure, inches.
+        width, style: of the figure, see `look.look_of`.
     """
+    check_run(result, "x", "x_desired")
+    return in_look(style, width, partial(_coordinates, result))
+
+
+def _coordinates(result: Result, width: float) -> Figure:
     from matplotlib.lines import Line2D
 
-    check_run(result, "x", "x_desired")
     names = result.info["axes"]
-    with plots.style():
-        handles: list[Any] = [
-            Line2D([], [], color=robot_color(i), label=plain(name)) for i, name in enumerate(result.names)
-        ]
-        handles.append(Line2D([], [], color=DESIRED, linestyle="-.", linewidth=1.1, label="desired"))
-        above = [LEGEND * legend_rows(handles, width) + TITLE, *[TITLE] * (len(names) - 1)]
-        figure, panels = stacked_panels([COORDINATE] * len(names), above, width)
-        for k, panel in enumerate(panels):
-            panel.set_title(plots.titled(names[k], width), loc="left")
-            panel.set_ylabel(plots.draw_coordinate(panel, result, range(len(result.names)), k))
-            plots.shade_disturbances(panel, result)
-        legend(figure, handles)
+    handles: list[Any] = [
+        Line2D([], [], color=robot_color(i), label=plain(name)) for i, name in enumerate(result.names)
+    ]
+    handles.append(Line2D([], [], color=DESIRED, linestyle="-.", linewidth=1.1, label="desired"))
+    above = [LEGEND * legend_rows(handles, width) + TITLE, *[TITLE] * (len(names) - 1)]
+    figure, panels = stacked_panels([COORDINATE] * len(names), above, width)
+    for k, panel in enumerate(panels):
+        panel.set_title(plots.titled(names[k], width), loc="left")
+        panel.set_ylabel(plots.draw_coordinate(panel, result, range(len(result.names)), k))
+        plots.shade_disturbances(panel, result)
+    legend(figure, handles)
     return figure
 
 
@@ -144,8 +171,16 @@ FIGURES: Mapping[str, Callable[..., Figure]] = MappingProxyType(
 OF_TASKS: Mapping[str, Callable[..., Figure]] = MappingProxyType(
     {"traffic": traffic, **{name: partial(assembly_figure, name=name) for name in CURVES}}
 )
-#: the narrowest figure in which all words have their place, inches
-NARROWEST = 3.0
+#: those that are drawn when they are asked for by name, for they take long or are not always wanted
+ON_REQUEST: Mapping[str, Callable[..., Figure]] = MappingProxyType(
+    {
+        "tip_path": tip_paths,
+        "phase_portrait": phase_portraits,
+        "spectrum": spectra,
+        "consistency": consistency,
+        "lyapunov": lyapunov_terms,
+    }
+)
 
 
 class Gallery(dict[str, "Figure"]):
@@ -153,20 +188,30 @@ class Gallery(dict[str, "Figure"]):
 
     Attributes:
         missing: what is not shown, by name, and why.
+        formats: in which they are written.
     """
 
-    def __init__(self, title: str) -> None:
+    def __init__(self, title: str, formats: Sequence[str] = ("png", "svg")) -> None:
         super().__init__()
         self.title = title
+        self.formats = tuple(formats)
         self.missing: dict[str, str] = {}
 
-    def save(self, folder: str | Path) -> list[Path]:
-        """Write every figure as `<name>.png` and `<name>.svg` into a folder, which is made.
+    def save(self, folder: str | Path, formats: Sequence[str] | None = None) -> list[Path]:
+        """Write every figure as `<name>.png` and so on into a folder, which is made.
+
+        Args:
+            folder: where.
+            formats: "png", "svg", "pdf"; by default PNG and SVG, and of the style "ieee" PDF and PNG.
 
         Raises:
+            InputError: an unknown format.
             ResultError: a file cannot be written.
         """
-        return [file for name, figure in self.items() for file in plots.save(figure, Path(folder) / name)]
+        formats = self.formats if formats is None else formats
+        return [
+            file for name, figure in self.items() for file in plots.save(figure, Path(folder) / name, formats)
+        ]
 
     def _repr_html_(self) -> str:
         """All figures for a notebook, and what is missing."""
@@ -184,27 +229,26 @@ class Gallery(dict[str, "Figure"]):
         return "\n".join([f"Figures of '{self.title}': {', '.join(self)}", *self._missing_lines()])
 
 
-def gallery(result: Result, *names: str, width: float = WIDTH) -> Gallery:
+def gallery(result: Result, *names: str, width: float | None = None, style: str | None = None) -> Gallery:
     """The figures of a run.
 
     Args:
         result: the run.
-        names: which ones, see `FIGURES` and `OF_TASKS`; by default all of the first, and of the others those
-            that the run has. Of the first, what a run does not have is left out and named in `missing`.
-        width: of all figures, inches.
+        names: which ones, see `FIGURES`, `OF_TASKS` and `ON_REQUEST`; by default all of the first, and of the
+            second those that the run has. Of the first, what a run does not have is left out and named in
+            `missing`.
+        width, style: of all figures, see `look.look_of`.
 
     Raises:
         InputError: an unknown name, a figure that was asked for by name and cannot be drawn, none that can,
-            or a width below `NARROWEST`.
+            an unknown style, or a width in which words have no place.
     """
-    if not finite_number("width", width) >= NARROWEST:
-        raise InputError.expected(f"at least {NARROWEST:g} inches", width, "width")
-    found = Gallery(str(result.info["title"]))
-    known = {**FIGURES, **OF_TASKS}
+    found = Gallery(str(result.info["title"]), look_of(style, width).formats)
+    known = {**FIGURES, **OF_TASKS, **ON_REQUEST}
     asked = names or (*FIGURES, *(name for name in OF_TASKS if _shows(result, name)))
     for name in asked:
         try:
-            found[name] = known[choice("figure", name, tuple(known))](result, width=width)
+            found[name] = known[choice("figure", name, tuple(known))](result, width=width, style=style)
         except SynctrlError as error:
             if names or (len(found.missing) + 1 == len(FIGURES)):
                 raise
@@ -222,6 +266,5 @@ def _shows(result: Result, name: str) -> bool:
 
 def _png(figure: Figure) -> str:
     pixels = BytesIO()
-    with plots.style():
-        figure.savefig(pixels, format="png")
+    figure.savefig(pixels, format="png")
     return base64.b64encode(pixels.getvalue()).decode()

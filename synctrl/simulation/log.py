@@ -7,6 +7,7 @@ passed on and filled anew: then at most `AHEAD` + `OFTEN` rows are in memory.
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,9 +22,11 @@ from .log_folder import DTYPES, FolderWriter
 from .memory import check_fits, check_fits_disk
 
 #: rows that an engine may fill before it counts them, at most
-AHEAD = 1024
+AHEAD = 4096
 #: rows that are passed on together where they come one by one
 OFTEN = 64
+#: doubles in a piece of memory: the allocator of Linux gives up to 32 MB out again without asking the system
+PIECE = 2**22 - 2**13
 
 Shapes = Mapping[str, tuple[int, ...]]
 """Shape of one row of every array."""
@@ -122,7 +125,7 @@ class WholeLog:
     """Arrays for all rows of a run; the system gives memory to those that are filled."""
 
     def __init__(self, shapes: Shapes, rows: int):
-        self.rows = {name: np.empty((rows, *shape)) for name, shape in shapes.items()}
+        self.rows = _side_by_side(shapes, rows)
         self.count = 0
 
     @property
@@ -217,6 +220,29 @@ def make_log(shapes: Shapes, rows: int, kept: Keeping) -> Log:
     if kept.folder is None:
         return PassedLog(shapes, rows, MemoryTarget(shapes, rows, kept.dtype))
     return PassedLog(shapes, rows, FolderWriter(kept.folder, shapes, kept.dtype))
+
+
+def _side_by_side(shapes: Shapes, rows: int) -> dict[str, np.ndarray]:
+    """Arrays in few pieces of memory, which come in large pages, and are used again if they are freed."""
+    found: dict[str, np.ndarray] = {}
+    for names in _pieces({name: rows * math.prod(shape) for name, shape in shapes.items()}):
+        ends = np.cumsum([rows * math.prod(shapes[name]) for name in names])
+        parts = np.split(np.empty(ends[-1]), ends[:-1])
+        found |= {name: part.reshape(rows, *shapes[name]) for name, part in zip(names, parts, strict=True)}
+    return found
+
+
+def _pieces(sizes: Mapping[str, int]) -> list[list[str]]:
+    """Names one after another, such that no piece of several is larger than `PIECE`."""
+    pieces: list[list[str]] = []
+    room = 0
+    for name, size in sizes.items():
+        if size > room:
+            pieces.append([])
+            room = PIECE
+        pieces[-1].append(name)
+        room -= size
+    return pieces
 
 
 def _taken(array: np.ndarray, count: int) -> np.ndarray:

@@ -171,7 +171,7 @@ def _springs(
     """What pulls a robot back, (nv, nv) each, by the name of its gain."""
     cJ = reference.c[i] @ J
     coupling = loop.cell.largest_share * cJ.T @ np.diag(np.minimum(loop.controller.K_eps, HUGE)) @ cJ
-    found = [("K_eps", coupling), ("Gamma", _learned(loop, i, Y))]
+    found = [("K_eps", coupling), ("Gamma", learned(loop, i, Y))]
     if type(loop.controller.law) is not BoundSunMills:
         found.append(("law", J.T @ _answers(loop, reference, i)[1] @ J))
     return found
@@ -199,7 +199,7 @@ def _answers(loop: ClosedLoop, reference: Reference, i: int) -> tuple[np.ndarray
     return damping, spring
 
 
-def _learned(loop: ClosedLoop, i: int, Y: np.ndarray) -> np.ndarray:
+def learned(loop: ClosedLoop, i: int, Y: np.ndarray) -> np.ndarray:
     """The spring that adaptation is, (nv, nv): Y theta_hat' per velocity error, Y Gamma Y^T with (14)."""
     cell, adaptation = loop.cell, loop.controller.adaptation
     z, still = adaptation.start(), np.zeros((cell.n, cell.nv))

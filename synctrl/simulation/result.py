@@ -17,6 +17,7 @@ import numpy as np
 from ..checks import count, instance
 from ..errors import InputError, ResultError
 from ..robots.model import TURNS, joined, unit_for
+from .exported import Exported
 from .log_folder import complete, read_folder
 from .result_file import LAYOUT, check_shape, read_result, shapes, unit_of, write_result
 from .schema import FORMAT
@@ -30,7 +31,7 @@ FIGURES = "synctrl.show.run_figures"
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class Result(Exported):
     """A run at T logged instants: n robots, p synchronization errors, m task coordinates, nv joints.
 
     Units are those of joints that turn; joints that slide are in m, m/s and N, see `units`.
@@ -133,21 +134,24 @@ class Result:
         """
         return array_units(self.info, array)
 
-    def plot(self, *names: str, width: float = 6.4) -> Any:
+    def plot(self, *names: str, width: float | None = None, style: str | None = None) -> Any:
         """Figures by name, which a notebook shows: errors, torques with limits, paths and estimates.
 
         Args:
-            names: "tracking_error", "sync_error", "torque", "path", "estimates"; by default all of them.
-            width: of each figure, inches; at least 3.
+            names: "tracking_error", "sync_error", "torque", "path", "estimates", all of which are drawn by
+                default, and if asked for "tip_path", "phase_portrait", "spectrum", "consistency", "lyapunov".
+            width: of each figure, inches; by default that of the style.
+            style: None, 6.4 inches wide; "ieee", a column of a journal, 3.5 inches, that can be read in grey;
+                or "slides", 10 inches, with large words.
 
         Returns:
             A dictionary of matplotlib figures, a `Gallery`: `.save(folder)` writes them, `.missing` says what
             this result does not have.
 
         Raises:
-            InputError: an unknown name, or nothing that can be drawn.
+            InputError: an unknown name or style, too narrow a figure, or nothing that can be drawn.
         """
-        return import_module(FIGURES).gallery(self, *names, width=width)
+        return import_module(FIGURES).gallery(self, *names, width=width, style=style)
 
     def decimated(self, every: int) -> Self:
         """The first of every so many logged instants, and the last; `info["decimated"]` says how many.

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,9 @@ from .plant import PHYSICS, Plant, torque_limits
 from .result import Result
 from .schedules import Disturbance, DisturbanceSchedule, Payload
 from .step_error import StepError
+
+#: the room of cell files, which is above this one
+CELLS = "synctrl.cells"
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,6 +197,15 @@ class Experiment:
     def agents(self, period: float, **options: Any) -> tuple[Agent, ...]:
         """The same as one agent per robot, see `agents_of`; arguments and errors as of `controller`."""
         return agents_of(self.controller(period, **options))
+
+    @classmethod
+    def from_file(cls, path: str | Path) -> Experiment:
+        """The experiment of a cell file, see `synctrl.cells.read_cell`, which says what is raised."""
+        return import_module(CELLS).read_cell(path)
+
+    def to_file(self, path: str | Path) -> Path:
+        """Write this as a cell file, see `synctrl.cells.write_cell`, which says what is raised."""
+        return import_module(CELLS).write_cell(self, path)
 
     def plan(
         self,

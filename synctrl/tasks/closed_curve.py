@@ -54,11 +54,13 @@ class ClosedCurve:
             after another.
 
     Attributes:
+        points: as given.
         length: m.
     """
 
     def __init__(self, points: ArrayLike):
-        p, self._u = _closed(points)
+        self.points, self._u = _closed(points)
+        p = self.points
         self._spline = _periodic(self._u, p)
         self._s = np.append(0.0, np.cumsum(arc_lengths(self._spline, self._u[:-1], self._u[1:])))
         self.length = float(self._s[-1])

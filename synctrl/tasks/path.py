@@ -65,11 +65,12 @@ class Path:
         TrajectoryError: a sharp bend, or a path that goes along `up` somewhere.
 
     Attributes:
+        points, up: as given.
         length: m.
     """
 
     def __init__(self, points: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.0)):
-        through = finite_array("points", points, (None, 3))
+        self.points = through = finite_array("points", points, (None, 3))
         count("number of points", len(through), DEGREE + 1)
         self.up = finite_array("up", up, (3,))
         by_length, lengths = _by_length(through)

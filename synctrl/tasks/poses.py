@@ -47,12 +47,17 @@ class AxisRotation:
         axis: any length but 0, (3,).
         angle: trajectory of one number, the angle, rad.
 
+    Attributes:
+        start, angle: as given.
+        axis, given_axis: of length 1, and as given.
+
     Raises:
         InputError: `start` is no rotation matrix, the axis is zero, or `angle` no trajectory of one number.
     """
 
     def __init__(self, start: ArrayLike, axis: ArrayLike, angle: Trajectory):
         self.start = rotation_matrix("start", start)
+        self.given_axis = finite_array("axis", axis, (3,))
         self.axis = _unit("axis", axis)
         check_dimension("angle", angle, 1)
         self.angle = angle
@@ -60,12 +65,21 @@ class AxisRotation:
 
     @classmethod
     def fixed(cls, orientation: ArrayLike) -> Self:
-        """An orientation that does not change."""
+        """An orientation that does not change.
+
+        Args:
+            orientation: a rotation matrix, (3, 3).
+        """
         return cls(orientation, (0, 0, 1), Hold([0.0]))
 
     @classmethod
     def between(cls, start: ArrayLike, end: ArrayLike, duration: float) -> Self:
-        """The shortest way from one orientation to another, as a cubic polynomial from rest to rest."""
+        """The shortest way from one orientation to another, as a cubic polynomial from rest to rest.
+
+        Args:
+            start, end: rotation matrices, (3, 3).
+            duration: s.
+        """
         R0, R1 = rotation_matrix("start", start), rotation_matrix("end", end)
         phi = rotations.log(R1 @ R0.T)
         size = float(np.linalg.norm(phi))
@@ -74,16 +88,26 @@ class AxisRotation:
 
     @classmethod
     def steady(cls, start: ArrayLike, axis: ArrayLike, speed: float) -> Self:
-        """A turn at constant speed, rad/s."""
-        return cls(start, axis, _SteadyAngle(finite_number("speed", speed)))
+        """A turn at constant speed.
+
+        Args:
+            start: orientation at t = 0, (3, 3).
+            axis: any length but 0, (3,).
+            speed: rad/s.
+        """
+        return cls(start, axis, SteadyAngle(finite_number("speed", speed)))
 
     def __call__(self, t: ArrayLike) -> Turning:
         angle, speed, growth = self.angle(t)
         return Turning(rotations.exp(angle * self.axis) @ self.start, speed * self.axis, growth * self.axis)
 
 
-class _SteadyAngle:
-    """The angle of a turn at constant speed, rad/s, from 0 on."""
+class SteadyAngle:
+    """The angle of a turn at constant speed, from 0 on.
+
+    Args:
+        speed: rad/s.
+    """
 
     dimension, breaks = 1, ()
 
@@ -207,6 +231,24 @@ class Attached:
         speed = np.cross(w, arm)
         position = Motion(p + arm, p_dot + speed, p_ddot + np.cross(w_dot, arm) + np.cross(w, speed))
         return pose_motion(position, Turning(R @ self.rotation, w, w_dot))
+
+
+class InPlane:
+    """Desired motion along x and y of a place on a moving body.
+
+    Args:
+        body: desired motion of the body.
+        xyz: the place in the body's axes, (3,), m.
+    """
+
+    dimension = 2
+
+    def __init__(self, body: PoseTrajectory, xyz: ArrayLike):
+        self._motion = Attached(body, xyz)
+        self.body, self.xyz, self.breaks = body, self._motion.xyz, body.breaks
+
+    def __call__(self, t: ArrayLike) -> Motion:
+        return Motion(*(part[..., :2] for part in self._motion(t)))
 
 
 def pose_motion(position: Motion, turning: Turning) -> Motion:

@@ -47,7 +47,7 @@ class Carrier(PoseTrajectory):
     def __init__(self, body: PoseTrajectory, frame: PoseTrajectory):
         _check_both(body, frame)
         super().__init__(body.position, body.orientation)
-        self.frame = frame
+        self.body, self.frame = body, frame
         self.breaks = tuple(sorted({*body.breaks, *frame.breaks}))
 
 

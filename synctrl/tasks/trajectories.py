@@ -64,7 +64,11 @@ class _PointToPoint:
 
 
 class Hold(_PointToPoint):
-    """A fixed desired position."""
+    """A fixed desired position.
+
+    Args:
+        position: (m,), in rad or m.
+    """
 
     def __init__(self, position: ArrayLike):
         super().__init__(position, position)

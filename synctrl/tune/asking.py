@@ -85,7 +85,9 @@ def need_optuna() -> Any:
         MissingDependencyError: it is not installed.
     """
     try:
-        import optuna
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of its progress bar, in notebooks that have no widgets
+            import optuna
     except ImportError as error:
         raise MissingDependencyError(
             "searching for several goals needs Optuna: pip install 'synctrl[tune]'", subject="optuna"

@@ -34,7 +34,11 @@ class Rate(Protocol):
 
 
 class Sigma(NamedTuple):
-    """A constant rate sigma, 1/s: everything stays bounded; without disturbance it costs convergence."""
+    """A constant rate sigma: everything stays bounded; without disturbance it costs convergence.
+
+    Args:
+        sigma: 1/s.
+    """
 
     sigma: float
 
@@ -49,7 +53,10 @@ class Switching(NamedTuple):
     """nu = sigma clip(far/radius - 1, 0, 1): no leakage within the radius.
 
     If theta is within the radius of theta_hat0, the power of the leakage is at most 0 and the theorem stays.
-    `sigma` is in 1/s, `radius` in sqrt(N·m).
+
+    Args:
+        sigma: 1/s.
+        radius: sqrt(N·m).
     """
 
     sigma: float
@@ -63,7 +70,11 @@ class Switching(NamedTuple):
 
 
 class EModification(NamedTuple):
-    """nu = sigma |s_q| with sigma in 1/rad: bounded; without disturbance it converges only to a set."""
+    """nu = sigma |s_q|: bounded; without disturbance it converges only to a set.
+
+    Args:
+        sigma: 1/rad.
+    """
 
     sigma: float
 

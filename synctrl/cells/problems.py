@@ -1,0 +1,64 @@
+"""What is wrong with a cell file, or with a cell that cannot be written as one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..errors import InputError
+
+#: a place in a file: keys and indices from the top
+Place = tuple[str | int, ...]
+#: problems that a message has in full
+SHOWN = 10
+
+
+class CellFileError(InputError):
+    """A cell file that cannot be read, or a cell that cannot be written as one.
+
+    The message begins with the file and the line. The subject is the key, "robots[0].motion.duration" for
+    example: arrays are counted from 0.
+
+    Attributes:
+        others: what else is wrong with the file, each an error of this kind; the message has the first ten.
+    """
+
+    others: tuple[CellFileError, ...] = ()
+
+    def _whole(self, message: str) -> str:
+        place = f"{self.file}:{self.line}" if self.line else self.file
+        message = super()._whole(message)
+        return message if place is None else f"{place}: {message}"
+
+    @classmethod
+    def of_all(cls, found: Sequence[CellFileError]) -> CellFileError:
+        """The first of some problems, which has the others."""
+        first, *others = found
+        if not others:
+            return first
+        more = [f"and {len(others) - SHOWN} more"] * (len(others) > SHOWN)
+        words = "\n".join([first.problem, *map(str, others[:SHOWN]), *more])
+        whole = cls(words, subject=first.subject, found=first.found, file=first.file, line=first.line)
+        whole.others = tuple(others)
+        return whole
+
+
+class Misfit(Exception):
+    """Something that does not fit at a place of a file, before it is known which line that is.
+
+    Args:
+        place: where.
+        problem: what is expected, and what was found.
+        found: what was found, as data.
+    """
+
+    def __init__(self, place: Place, problem: str, found: object = None):
+        super().__init__(problem)
+        self.place, self.problem, self.found = place, problem, found
+
+
+def key_of(place: Place) -> str:
+    """A place as it is written: robots[0].motion.duration."""
+    text = ""
+    for step in place:
+        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+    return text
