@@ -1,4 +1,4 @@
-"""The picture in motion in README: a bead of adhesive on an edge that another arm moves, and its error over time.
+"""The picture in motion in README: a bead of adhesive on an edge that another arm moves, and its error.
 
 python scripts/readme_motion.py [docs/motion.gif]
 
