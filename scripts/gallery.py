@@ -161,9 +161,9 @@ def listing() -> str:
     lines = [
         "# Gallery",
         "",
-        "Small scripts, one idea each; `python scripts/examples/NAME.py` writes its picture to `out/gallery/`,",
-        "and `python scripts/gallery.py` runs them all. The site that `make docs` builds has this page with all",
-        "pictures.",
+        "Small scripts, one idea each; `python scripts/examples/NAME.py` writes its picture to",
+        "`out/gallery/`, and `python scripts/gallery.py` runs them all. The site that `make docs` builds",
+        "has this page with all pictures.",
     ]
     for heading, examples in sections():
         lines += ["", f"## {heading}", ""]
