@@ -1,4 +1,4 @@
-"""The picture in motion in README: a bead of adhesive on an edge that another arm moves, and its error over time.
+"""The picture in motion in README: a bead of adhesive on an edge that another arm moves, and its error.
 
 python scripts/readme_motion.py [docs/motion.gif]
 
@@ -33,8 +33,8 @@ from browser import open_page
 DURATION, FPS, REST = 4.8, 12, 1.5
 #: size of the scenes and of the curves below them, pixels; they are drawn at SCALE times that
 WIDTH, SCENES, CURVES, SCALE = 840, 330, 150, 2
-CAMERA = (-0.05, -0.85, 1.3), (0.04, 0.0, 0.4)
-COLORS = 96
+CAMERA = (-0.03, -0.67, 1.12), (0.05, 0.0, 0.4)
+COLORS = 128
 #: the page draws no more by itself, on plain ground
 STILL = """window.requestAnimationFrame = () => 0; viewer.animator.pause();
 viewers.forEach(each => {
@@ -139,22 +139,18 @@ def joined(above: Image.Image, below: Image.Image) -> Image.Image:
 
 def write(pictures: list[Image.Image], file: Any) -> None:
     """An animated GIF whose frames have one palette, so that what stands still takes no room."""
-    every = Image.new("RGB", (WIDTH, 4 * (SCENES + CURVES)))
-    for k, picture in enumerate(pictures[:: len(pictures) // 4][:4]):
-        every.paste(picture, (0, k * picture.height))
-    palette = every.quantize(COLORS, Image.Quantize.MEDIANCUT)
+    palette = palette_of(pictures[:: max(1, len(pictures) // 6)])
     flat = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     lengths = [round(1000 / FPS)] * (len(flat) - 1) + [round(1000 * REST)]
-    flat[0].save(
-        file,
-        "GIF",
-        save_all=True,
-        append_images=flat[1:],
-        duration=lengths,
-        loop=0,
-        optimize=True,
-        disposal=1,
-    )
+    options = {"duration": lengths, "loop": 0, "optimize": False, "disposal": 1}
+    flat[0].save(file, "GIF", save_all=True, append_images=flat[1:], **options)
+
+
+def palette_of(pictures: list[Image.Image]) -> Image.Image:
+    """Colours that come near all that are in the pictures, the rare ones too."""
+    found = np.unique(np.concatenate([np.asarray(each).reshape(-1, 3) // 8 for each in pictures]), axis=0)
+    every = Image.fromarray((8 * found + 4)[None].astype(np.uint8))
+    return every.quantize(COLORS, Image.Quantize.MEDIANCUT, kmeans=2)
 
 
 if __name__ == "__main__":
