@@ -112,7 +112,9 @@ def photograph(folder: Path) -> None:
         return
     for path in moved:
         with open_page(path, SCREEN) as page:
-            page.check_plays()
+            page.wait_for("typeof viewer === 'object' && viewer.animator !== undefined")
+            if page.evaluate("viewer.animator.duration > 0"):  # a short run may have one frame
+                page.check_plays()
             page.evaluate(BARE)
             page.evaluate("new Promise(done => setTimeout(done, 800))")
             page.screenshot(folder / f"{path.stem}_scene.png")
