@@ -97,7 +97,7 @@ CELLS: list[Variant] = [
 _P = 30
 #: one cell with every part that has a name
 PARTS: list[dict[str, Any]] = [
-    {"law": SunMills(reference_acceleration="paper", k_r_space="task", diffusion=(0.1, 0.2, 0.3)), "network": Network()},
+    {"law": SunMills("paper", "task", diffusion=(0.1, 0.2, 0.3)), "network": Network()},
     {"law": SlotineLi()},
     {"law": ComputedTorque()},
     {"law": PDGravity(50.0)},
@@ -119,6 +119,6 @@ PARTS: list[dict[str, Any]] = [
     {"network": Network(delay=[[0.0, 0.01], [0.02, 0.0]], offset=(0.0, 0.001))},
     {"network": Network(period=0.01, jitter=0.002, loss=0.1, burst=(0.1, 0.5), seed=3)},
     {"network": Network(period=0.01, event=0.01, heartbeat=0.1, receiver="extrapolate", horizon=0.05)},
-    {"sensors": [Quantisation(1e-4), Noise(1e-5, 1e-3, seed=2), Bias((0.0, 1e-3, 0.0)), DifferencedVelocity(200.0)]},
-    {"actuators": [TorqueQuantisation(0.01), RateLimit(5e3), DeadTime(0.002), Lag(0.004), Ripple(0.02, 6.0, 0.3)]},
+    {"sensors": [Quantisation(1e-4), Noise(1e-5, 1e-3, 2), Bias((0.0, 1e-3, 0.0)), DifferencedVelocity(9.0)]},
+    {"actuators": [TorqueQuantisation(0.01), RateLimit(5e3), DeadTime(0.002), Lag(0.004), Ripple(0.02, 6.0)]},
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""What is wrong with a cell file is said with file, line and key, with what was found and what is expected."""
+"""What is wrong with a cell file is said with file, line and key, what was found and what is expected."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from refusals import refused
 
 from synctrl.cells import STARTER, CellFileError, read_cell
 
-#: what is changed in the starter, and where the error then is: line by a text that only this line has, and key
+CIRCLE = '{ kind = "circle", center = [0.15, 0.35], radius = 0.08, speed = "90 deg" }'
+#: what is changed in the starter, and the key and a text of the line at which the error then is
 WRONG = [
     ("duration = 4.0  ", "duration = -4.0  ", "duration", "duration = -4.0"),
     ("duration = 4.0  ", 'duration = "4 s"', "duration", 'duration = "4 s"'),
@@ -33,15 +34,24 @@ WRONG = [
     ('robot = "left"', 'robot = "lft"', "disturbances[0].robot", '"lft"'),
     ('robot = "left"', "robot = 2", "disturbances[0].robot", "robot = 2"),
     ("start = 2.0  ", "start = 3.0  ", "disturbances[0]", "[[disturbances]]"),
-    ("torque = 1.0", "torque = [1.0, 2.0, 3.0]", "disturbances", "[[disturbances]]"),
-    ('[0.15, 0.35], radius = 0.08', '[0.15, 0.35], radius = -0.08', "robots[1].motion.radius", "radius = -0.08"),
+    ("torque = 1.0", "torque = [1.0, 2.0, 3.0]", "disturbances[0].torque", "torque"),
+    ('[0.15, 0.35], radius = 0.08', '[0.15, 0.35], radius = -0.08', "robots[1].motion.radius", "-0.08"),
     ('[0.15, 0.35], radius = 0.08', '[0.15, 0.35]', "robots[1].motion.radius", "[0.15, 0.35]"),
     ('center = [0.15, 0.35]', 'center = [0.15, 9.35]', "robots[1].motion", "9.35"),
     ('center = [0.15, 0.35]', 'center = [0.15]', "robots[1].motion.center", "center = [0.15]"),
     ('center = [0.15, 0.35]', 'center = [0.15, 0.35, 0.0]', "robots[1].motion", "0.35, 0.0]"),
     ('center = [0.15, 0.35]', 'centre = [0.15, 0.35]', "robots[1].motion.centre", "centre"),
-    ("base = { xyz = [0.35, 0.0, 0.0] }", "base = { xyz = [0.35, 0.0] }", "robots[1].base.xyz", "[0.35, 0.0]"),
+    ("base = { xyz = [0.35, 0.0, 0.0] }", "base = { xyz = [0.35, 0.0] }", "robots[1].base.xyz", "[0.35,"),
+    ("base = { xyz = [0.35, 0.0, 0.0] }", 'base = { rpy = [0, 0, "1 turn"] }', "robots[1].base.rpy", "turn"),
+    ("known = 0.7", 'known = "7 deg"', "robots[1].known", "7 deg"),
     ("base = { xyz = [0.35, 0.0, 0.0] }", "base = [0.35, 0.0, 0.0]", "robots[1].base", "base = [0.35"),
+    ("beta = 20.0", "beta = 20.0\nduration = 4.0", "gains.duration", "duration"),
+    ("[coupling]", '[adaptation]\nkind = "natural"\ngamma = 1.0\n[coupling]', "gains.Gamma", "Gamma"),
+    ("[coupling]", 'law = "pd-gravity"\n[coupling]', "robots[1].law", "pd-gravity"),
+    ("[[disturbances]]", "[disturbances]", "disturbances", "[disturbances]"),
+    ("[[disturbances]]", '[[sensors]]\nkind = "bias"\nq = [1.0]\n[[disturbances]]', "sensors[0].q", "q ="),
+    ("[[disturbances]]", '[[loads]]\nrobot = 0\nmass = -1\n[[disturbances]]', "loads[0].mass", "mass = -1"),
+    (CIRCLE, '"circle"', "robots[1].motion", '"circle"'),
     ("known = 0.7\nfriction", "known = 0.7\nestimate = [1.0]\nfriction", "robots[1].estimate", "estimate"),
 ]  # fmt: skip
 

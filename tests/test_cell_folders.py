@@ -32,6 +32,14 @@ from synctrl.robots.urdf import urdf_folder
 from synctrl.simulation.plant import Plant
 
 
+def line_of(text: str) -> int:
+    """The first line of the starter that begins with a text."""
+    return next(k for k, line in enumerate(STARTER.splitlines(), 1) if line.startswith(text))
+
+
+ROBOT, MOTION = line_of("robot ="), line_of("motion =")
+
+
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A folder with a robot, inside of another one that has a robot too."""
@@ -78,7 +86,7 @@ def outside(folder: Path) -> list[str]:
 
 @pytest.mark.parametrize("k", range(7))
 def test_a_path_that_leaves_the_folder_is_refused(k: int, folder: Path) -> None:
-    with refused(CellFileError, "robots[0].robot", line=14):
+    with refused(CellFileError, "robots[0].robot", line=ROBOT):
         read_cell(cell_with(folder, outside(folder)[k]))
 
 
@@ -89,7 +97,7 @@ def test_a_link_that_stays_below_is_followed(folder: Path) -> None:
 
 @pytest.mark.parametrize("name", ["arms/none.urdf", "arms/plana2r.urdf", "none/", "arms/none.xacro"])
 def test_a_file_that_is_not_there_is_refused(name: str, folder: Path) -> None:
-    with refused(CellFileError, "robots[0].robot", line=14, found=name):
+    with refused(CellFileError, "robots[0].robot", line=ROBOT, found=name):
         read_cell(cell_with(folder, name))
 
 
@@ -109,7 +117,7 @@ def test_samples_and_packages_stay_below_too(name: str, folder: Path) -> None:
     motion = text.replace(
         'kind = "circle", center = [-0.15, 0.35], radius = 0.08', f'kind = "samples", file = "{name}"'
     )
-    path.write_text(motion.replace(", speed = 1.5707963267948966 }", " }", 1), "utf-8")
+    path.write_text(motion.replace(', speed = "90 deg" }', " }", 1), "utf-8")
     with refused(CellFileError, "robots[0].motion.file"):
         read_cell(path)
     path.write_text(text.replace("known = 0.7", f'known = 0.7\npackages = ["{name}"]', 1), "utf-8")
@@ -124,7 +132,7 @@ def test_samples_are_a_motion_through_all_of_them(folder: Path) -> None:
     (folder / "way.csv").write_text("t,x,y\n" + "\n".join(rows) + "\n\n", "utf-8")
     path = cell_with(folder, "planar2r")
     text = path.read_text("utf-8").replace(
-        '{ kind = "circle", center = [-0.15, 0.35], radius = 0.08, speed = 1.5707963267948966 }',
+        '{ kind = "circle", center = [-0.15, 0.35], radius = 0.08, speed = "90 deg" }',
         '{ kind = "samples", file = "way.csv" }',
     )
     path.write_text(text, "utf-8")
@@ -143,12 +151,12 @@ def test_samples_that_are_none_are_refused(text: str | bytes, folder: Path) -> N
     path = cell_with(folder, "planar2r")
     path.write_text(
         path.read_text("utf-8").replace(
-            'kind = "circle", center = [-0.15, 0.35], radius = 0.08, speed = 1.5707963267948966',
+            'kind = "circle", center = [-0.15, 0.35], radius = 0.08, speed = "90 deg"',
             'kind = "samples", file = "way.csv"',
         ),
         "utf-8",
     )
-    with refused(CellFileError, line=18):
+    with refused(CellFileError, line=MOTION):
         read_cell(path)
 
 
@@ -177,7 +185,7 @@ def test_no_file_is_refused(tmp_path: Path) -> None:
 def test_all_that_is_wrong_is_said_at_once(tmp_path: Path) -> None:
     text = STARTER.replace("duration = 4.0", "duratoin = 4.0").replace("Gamma = 2.0", 'Gamma = "2"')
     (tmp_path / "cell.toml").write_text(text, "utf-8")
-    with refused(CellFileError, "duratoin", line=5) as caught:
+    with refused(CellFileError, "duratoin", line=line_of("duration")) as caught:
         read_cell(tmp_path / "cell.toml")
     (other,) = caught.value.others
     assert (other.subject, other.found) == ("gains.Gamma", "2")
@@ -189,7 +197,7 @@ def test_motions_that_go_round_in_circles_are_refused(tmp_path: Path) -> None:
         STARTER + '[motions.a]\nkind = "attached"\nbody = "b"\n[motions]\nb = "a"\n', "utf-8"
     )
     text = (tmp_path / "cell.toml").read_text("utf-8")
-    circle = '{ kind = "circle", center = [0.15, 0.35], radius = 0.08, speed = 1.5707963267948966 }'
+    circle = '{ kind = "circle", center = [0.15, 0.35], radius = 0.08, speed = "90 deg" }'
     (tmp_path / "cell.toml").write_text(text.replace(circle, '"a"'), "utf-8")
     with refused(CellFileError, "motions.b"):
         read_cell(tmp_path / "cell.toml")

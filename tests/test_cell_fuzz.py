@@ -20,9 +20,10 @@ from synctrl.experiments import a460_pair, carry_planar, mobile_robot, planar_fo
 
 #: values that are wrong nearly everywhere, each right somewhere
 VALUES: list[Any] = [
-    0, -1, 2, 0.5, 1e300, -1e300, 1e-300, math.inf, math.nan, 2**70, True, "", "x", "left", "pair", "joint", "a\nb",
-    "../../etc/passwd", "é\u0000", "arm.urdf", [], [[]], {}, [{}], [1, "a"], [1.0, 2.0, 3.0], [[1.0, 2.0], [3.0]],
-    [[[[[1.0]]]]], [1.0, [2.0]], {"kind": 3}, {"kind": []}, {"kind": "hold", "position": [0.0]}, {"a": {"b": 1}},
+    0, -1, 2, 0.5, 1e300, -1e300, 1e-300, math.inf, math.nan, 2**70, True, "", "x", "left", "pair", "joint",
+    "a\nb", "../../etc/passwd", "é\u0000", "arm.urdf", "90 deg", [], [[]], {}, [{}], [1, "a"],
+    [1.0, 2.0, 3.0], [[1.0, 2.0], [3.0]], [[[[[1.0]]]]], [1.0, [2.0]], {"kind": 3}, {"kind": []},
+    {"a": {"b": 1}}, {"kind": "hold", "position": [0.0]},
 ]  # fmt: skip
 plain = st.recursive(
     st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=12),

@@ -82,6 +82,8 @@ MODULES = {
     "dask": {"distributed"},
     "drake": {"pydrake"},
     "PyYAML": {"yaml"},
+    "tree-sitter": {"tree_sitter"},
+    "tree-sitter-toml": {"tree_sitter_toml"},
 }
 #: asked for although nothing imports them, and why
 UNIMPORTED = {
@@ -89,7 +91,6 @@ UNIMPORTED = {
     "meshcat": "pages hold its viewer, which is read from its folder",
     "example-robot-data": "a folder of URDF files and meshes",
     "pycollada": "trimesh reads DAE files with it",
-    "yourdfpy": "a second reader of URDF beside this package, for users and for tests",
     "xarray": "pandas makes datasets with it",
     "pytest-xdist": "the Makefile starts tests with it",
     "hatchling": "builds the package",

@@ -17,7 +17,7 @@ from ..coupling.weights import ConstantWeights
 from ..errors import CouplingWarning, InputError
 from ..experiments.mobile_robot import WheelSynchronization
 from .kinds import kind, one_of, table_or
-from .values import ANY_NUMBERS, MATRIX, NUMBER, NUMBERS, ROBOT, TEXT, VECTOR, choice
+from .values import ANY_NUMBERS, MATRIX, NUMBER, NUMBERS, ROBOT, TEXT, VECTOR, choice, list_of
 
 
 class Told(NamedTuple):
@@ -146,7 +146,7 @@ def rows(
 
 
 def function(A: ArrayLike, b: ArrayLike = 0.0, unit: str = "", graph: str | None = None) -> Maker:
-    """The task f = sum_i A_i x_i + b = 0, which the desired motion has to satisfy; its weights are c_i = -A_i.
+    """The task f = sum_i A_i x_i + b = 0, which the desired motion has to satisfy; weights are c_i = -A_i.
 
     Args:
         A: numbers, (n,), diagonals, (n, m), or matrices, (n, m, m).
@@ -175,7 +175,7 @@ GATE = kind("", Gate, gap=NUMBER, reach=NUMBER)
 PATH_WEIGHTS = kind("path", None, path_weights, a=VECTOR, gate=GATE.model)
 WEIGHTS = table_or(PATH_WEIGHTS, ANY_NUMBERS)
 _C: dict[str, Any] = {"c": WEIGHTS, "unit": TEXT}
-ROWS = kind("rows", None, rows, edges=list[list[ROBOT]], signs=MATRIX, name=TEXT, **_C)  # type: ignore[valid-type]
+ROWS = kind("rows", None, rows, edges=list_of(list_of(ROBOT)), signs=MATRIX, name=TEXT, **_C)
 #: those that are found again when a coupling is written, with what makes them of n and c
 PATTERNS: dict[str, Any] = {
     "pair": (pair, lambda n, c: Coupling.pair(c)),
@@ -211,8 +211,7 @@ def coupling_keys(coupling: Coupling, motions: Sequence[Any]) -> dict[str, Any]:
         if (name, given.signs.tolist(), given.edges.tolist()) == _rows_of(coupling):
             return {"kind": name, **weights}
     name, signs, edges = _rows_of(coupling)
-    leaders = {i for i in range(coupling.robots)}
-    for leader in sorted(leaders) if coupling.name == "star" else ():
+    for leader in range(coupling.robots) if coupling.name == "star" else ():
         if edges == Coupling.star(coupling.robots, leader).edges.tolist():
             return {"kind": "star", "leader": leader, **weights}
     return {"kind": "rows", "edges": edges, "signs": signs, "name": coupling.name, **weights}

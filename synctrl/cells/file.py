@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import Field, create_model
+from pydantic import Field
 
 from . import controls, couplings, holding, motions, plants, robots
-from .kinds import Kind, Table
-from .values import NUMBER, NUMBERS, TEXT, TRUTH, VECTOR, choice
+from .kinds import Kind, make_table
+from .values import ANGLES, NUMBER, NUMBERS, TEXT, TRUTH, VECTOR, by_name, choice, list_of
 
 #: version of the form of these files
 FORM = "1"
@@ -26,11 +26,11 @@ def _optional(kept: Any, meaning: str) -> _Key:
 
 
 def _listed(kept: Any, meaning: str) -> _Key:
-    return _key(list[kept], meaning, [])
+    return _key(list_of(kept), meaning, [])
 
 
 def _named(kept: Any, meaning: str) -> _Key:
-    return _key(dict[str, kept], meaning, {})
+    return _key(by_name(kept), meaning, {})
 
 
 #: what is said of a robot beside the robot itself
@@ -38,8 +38,8 @@ MEMBER: dict[str, Any] = {
     "name": _optional(TEXT, "of the robot, for legends and messages"),
     "motion": _optional(motions.MOTION, "desired motion in the cell's space, unless it `holds` an object"),
     "holds": _optional(holding.HOLDS.model, "its share of the object in [plant] that it carries with others"),
-    "q0": _optional(VECTOR, "joint positions at t = 0, rad; by default on the path"),
-    "v0": _optional(VECTOR, "joint velocities at t = 0, rad/s; by default at rest"),
+    "q0": _optional(ANGLES, "joint positions at t = 0, rad; by default on the path"),
+    "v0": _optional(ANGLES, "joint velocities at t = 0, rad/s; by default at rest"),
     "parameters": _optional(robots.PARAMETERS, 'what is adapted; by default "full"'),
     "known": _optional(NUMBER, "share of the true parameters with which the estimate begins"),
     "estimate": _optional(VECTOR, "the estimate at t = 0, in the place of `known`; by default zeros"),
@@ -61,16 +61,11 @@ RUN: dict[str, Any] = {
 }
 
 
-def _table(name: str, text: str, keys: Mapping[str, Any], base: type[Table] = Table) -> Any:
-    made: Any = create_model(name, __base__=base, __doc__=text, **keys)
-    return made
-
-
-RobotTable = _table("Robot", "A robot of the cell and its desired motion.", MEMBER, robots.ARM.model)
-RunTable = _table("Run", "How the cell is run unless told otherwise.", RUN)
+RobotTable = make_table("Robot", "A robot of the cell and its desired motion.", MEMBER, robots.ARM.model)
+RunTable = make_table("Run", "How the cell is run unless told otherwise.", RUN)
 #: parts of an experiment, in the order in which they are written
 PARTS: dict[str, Any] = {
-    "robots": _key(list[RobotTable], "the robots, at least two"),
+    "robots": _key(list_of(RobotTable), "the robots, at least two"),
     "motions": _named(motions.MOTION, "motions to which robots and others refer by name"),
     "paths": _named(motions.PATH.model, "paths to which motions refer by name"),
     "coupling": _key(couplings.COUPLING, "which robots are compared, and how"),
@@ -99,7 +94,7 @@ VALUES: dict[str, Any] = {
     "reference_acceleration": _optional(choice("exact", "paper"), 'option of the law "sun-mills"'),
     "k_r_space": _optional(choice("joint", "task"), "where the damping K_r acts"),
 }
-CellTable = _table("Cell", "A cell with its controller and what disturbs it.", {**VALUES, **PARTS})
+CellTable = make_table("Cell", "A cell with its controller and what disturbs it.", {**VALUES, **PARTS})
 
 KINDS: tuple[Kind, ...] = (
     *motions.KINDS, *robots.KINDS, *couplings.KINDS, *controls.KINDS, *plants.KINDS, holding.HOLDS,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
+from ..errors import near
 from .problems import Misfit, Place
 
 
@@ -33,8 +34,17 @@ def below(folder: Path, name: str, place: Place) -> Path:
         )
         raise Misfit(place, words, name)
     if not exists:
-        raise Misfit(place, f"expected a file below the folder of this file, found none at {name!r}", name)
+        words = f"expected a file below the folder of this file, found none at {name!r}"
+        raise Misfit(place, f"{words}{near(name, _beside(folder, pure))}", name)
     return found
+
+
+def _beside(folder: Path, pure: PurePosixPath) -> list[str]:
+    """Names of what there is in the folder in which a file should be."""
+    try:
+        return [(pure.parent / each.name).as_posix() for each in (folder / pure.parent).iterdir()]
+    except OSError:
+        return []
 
 
 def from_folder(folder: Path, path: Path) -> str | None:

@@ -11,7 +11,7 @@ from ..coupling.cell import Member
 from ..errors import InputError
 from ..robots.robot import Robot
 from .kinds import kind
-from .values import NUMBER, VECTOR
+from .values import ANGLES, NUMBER, VECTOR
 
 
 class Holds(NamedTuple):
@@ -32,7 +32,7 @@ class Holds(NamedTuple):
     near: Any = None
 
 
-HOLDS = kind("", None, Holds, share=NUMBER, known=NUMBER, error=VECTOR, near=VECTOR)
+HOLDS = kind("", None, Holds, share=NUMBER, known=NUMBER, error=VECTOR, near=ANGLES)
 
 
 def held_by(robot: Robot, index: int, holds: Holds, plant: Any) -> Member:

@@ -45,7 +45,7 @@ class Kind:
     fields: Mapping[str, Any]
     make: Callable[..., Any]
     read: Callable[[Any], Mapping[str, Any]]
-    model: type[Table]
+    model: Any
 
     def told(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The keys and values that a file has to say: those that are not what they are by default."""
@@ -73,9 +73,7 @@ def kind(
     return Kind(name, target, fields, maker, read or _attributes(tuple(fields)), model)
 
 
-def table(
-    name: str, maker: Callable[..., Any], fields: Mapping[str, Any], text: str, **further: Any
-) -> type[Table]:
+def table(name: str, maker: Callable[..., Any], fields: Mapping[str, Any], text: str, **further: Any) -> Any:
     """A table whose keys are arguments of a function.
 
     Args:
@@ -87,10 +85,13 @@ def table(
     """
     meant, known = meanings(text), signature(maker).parameters
     keys = {key: (each, _field(known[key], meant.get(key))) for key, each in fields.items()}
-    made: Any = create_model(
-        name or maker.__name__, __base__=Table, __doc__=text.partition("\n")[0], **further, **keys
-    )
-    return made
+    return make_table(name or maker.__name__, text.partition("\n")[0], {**further, **keys})
+
+
+def make_table(name: str, text: str, keys: Mapping[str, Any], base: type[Table] = Table) -> Any:
+    """A table of these keys, each with its type and what pydantic's `Field` says of it."""
+    make: Any = create_model
+    return make(name, __base__=base, __doc__=text, **keys)
 
 
 def one_of(*kinds: Kind, named: Any = None) -> Any:
@@ -107,8 +108,8 @@ def one_of(*kinds: Kind, named: Any = None) -> Any:
 
 def table_or(whole: Kind, other: Any) -> Any:
     """The table of one kind, or something of another type that is no table."""
-    choices = Union[Annotated[whole.model, Tag(TABLE)], Annotated[other, Tag(NAMED)]]  # noqa: UP007
-    return Annotated[choices, Discriminator(_table_or_other)]
+    choices: Any = (Annotated[whole.model, Tag(TABLE)], Annotated[other, Tag(NAMED)])
+    return Annotated[Union[choices], Discriminator(_table_or_other)]  # noqa: UP007
 
 
 def meanings(text: str) -> dict[str, str]:

@@ -10,14 +10,18 @@ from typing import Any
 
 from ..coupling.cell import Cell, Member
 from ..errors import InputError, SynctrlError, near
+from ..robots.catalog import load_robot
 from ..robots.friction import Friction
 from ..robots.robot import Robot
+from ..simulation.devices import Devices
+from ..simulation.schedules import DisturbanceSchedule, PayloadSchedule
 from ..simulation.simulate import Experiment
 from .couplings import Told
 from .file import BY_TABLE, MEMBER
 from .folders import below
 from .holding import held_by, with_robots
 from .kinds import Table
+from .motions import MOTIONS
 from .problems import Misfit, Place
 from .robots import ARM, Base
 from .values import FileName, MotionName, PathName, RobotName, RobotNumber
@@ -30,12 +34,20 @@ PARTS = {
 }  # fmt: skip
 #: what messages call parts of a file
 OTHERWISE: dict[str, Place] = {
-    "name": ("robots",), "disturbance": ("disturbances",), "payload": ("loads",), "payloads": ("loads",), "plant_type": ("plant",),
+    "name": ("robots",), "disturbance": ("disturbances",), "payload": ("loads",), "payloads": ("loads",),
+    "plant_type": ("plant",),
 }  # fmt: skip
 #: keys of a robot that say the same, or that follow from each other
 APART = (
     ("known", "estimate"), *(("holds", key) for key in ("motion", "q0", "known", "estimate", "parameters")),
 )  # fmt: skip
+#: what looks at each of several parts by itself
+FITS: dict[str, Callable[[Cell, Any], Any]] = {
+    "sensors": lambda cell, part: Devices(cell, [part]),
+    "actuators": lambda cell, part: Devices(cell, (), [part]),
+    "disturbances": lambda cell, part: DisturbanceSchedule(cell, [part]),
+    "loads": lambda cell, part: PayloadSchedule(cell.robots, [part]),
+}
 #: what messages call what is said of a robot
 WORDS = {
     "trajectory": "motion", "q0": "q0", "v0": "v0", "theta_hat0": "estimate", "friction": "friction",
@@ -71,6 +83,7 @@ class Maker:
         arms = [self._robot(table, place) for table, place in zip(file.robots, places, strict=True)]
         cell = self._cell(arms, made.get("plant_type"))
         gains = self.part(file.gains, ("gains",))
+        self._check(cell, made)
         if any(table.holds for table in file.robots):
             made["plant_type"] = with_robots(made["plant_type"], arms)
         with _placed((), self._meant()):
@@ -101,6 +114,17 @@ class Maker:
             PathName: lambda name, place: self._shared("paths", "a path", name, place),
         }
 
+    def _check(self, cell: Cell, made: Mapping[str, Any]) -> None:
+        """Refuse what does not go with the cell where it stands, and not with the whole."""
+        if "adaptation" in made and self._file.gains.Gamma is not None:
+            words = "expected none, for [adaptation] says how the controller learns, found one"
+            raise Misfit(("gains", "Gamma"), words)
+        for name, fits in FITS.items():
+            for k, part in enumerate(made.get(PARTS[name], ())):
+                keys = {key: (name, k, key) for key in getattr(self._file, name)[k].model_fields_set}
+                with _placed((name, k), keys):
+                    fits(cell, part)
+
     def _of_table(self, table: Table, place: Place) -> Any:
         kind = BY_TABLE[type(table)]
         given = [name for name in kind.fields if name in table.model_fields_set]
@@ -112,7 +136,9 @@ class Maker:
         """A motion or a path of the file, made once."""
         known, key = getattr(self._file, table), (table, str(name))
         if name not in known:
-            found = f"{name!r}{near(name, known)}"
+            kinds = [each.name for each in MOTIONS]
+            is_kind = f'; for a kind write {{ kind = "{name}", ... }}' if name in kinds else near(name, known)
+            found = f"{str(name)!r}{is_kind}"
             raise Misfit(place, f"expected the name of {words} in [{table}], found {found}", str(name))
         if key not in self._made:
             self._made[key] = _Unfinished
@@ -175,6 +201,13 @@ class Maker:
                 )
             return _free(robot, **parts)
 
+    def _load(self, *source: Any, **options: Any) -> Robot:
+        """A robot that is loaded once, for however many robots of the file."""
+        key = ("loaded", repr((source, options)))
+        if key not in self._made:
+            self._made[key] = load_robot(*source, **options)
+        return self._made[key]
+
     def _robot(self, table: Any, place: Place) -> Robot:
         """The robot of a member, which is called as the member is."""
         given = [name for name in ARM.fields if name in table.model_fields_set]
@@ -185,7 +218,7 @@ class Maker:
         keys = {name: (*place, name) for name in given}
         keys |= {name: (*place, "base", name) for name in ("xyz", "rpy") if base is not None}
         with _placed(place, keys):
-            return ARM.make(**values)
+            return ARM.make(**values, load=self._load)
 
 
 def _free(

@@ -16,15 +16,18 @@ from ..tasks.ways import Ramped, RampUp
 from .kinds import kind, one_of, table_or
 from .samples import samples
 from .values import (
+    ANGLE,
+    ANGLE_ROWS,
+    ANGLES,
     FILE,
     INTEGER,
     MATRIX,
     MOTION_NAME,
     NUMBER,
-    NUMBERS,
     PATH_NAME,
     ROTATION,
     VECTOR,
+    angles,
     choice,
 )
 
@@ -37,27 +40,27 @@ def _turned(part: AxisRotation) -> dict[str, Any]:
     return {"start": part.start, "axis": part.given_axis, "angle": part.angle}
 
 
-_POINTS: dict[str, Any] = {"start": VECTOR, "end": VECTOR}
+_POINTS: dict[str, Any] = {"start": ANGLES, "end": ANGLES}
 _AXES: dict[str, Any] = {"first": VECTOR, "second": VECTOR}
-_ROUND: dict[str, Any] = {"speed": NUMBER, "phase": NUMBER, **_AXES}
+_ROUND: dict[str, Any] = {"speed": ANGLE, "phase": ANGLE, **_AXES}
 
 PATH = kind("", Path, points=MATRIX, up=VECTOR)
-EDGE = kind("", Edge, points=MATRIX, tilt=NUMBER, stand_off=NUMBER)
+EDGE = kind("", Edge, points=MATRIX, tilt=ANGLE, stand_off=NUMBER)
 
 #: motions of any numbers
 BASIC = (
-    kind("hold", Hold, read=_held, position=VECTOR),
+    kind("hold", Hold, read=_held, position=ANGLES),
     kind("cubic", Cubic, **_POINTS, duration=NUMBER),
     kind("exponential", ExponentialApproach, **_POINTS, rate=NUMBER),
     kind("circle", Circle, center=VECTOR, radius=NUMBER, **_ROUND),
     kind("figure-eight", FigureEight, center=VECTOR, along=NUMBER, across=NUMBER, **_ROUND),
-    kind("spline", Spline, times=VECTOR, points=MATRIX, ends=choice(*ENDS)),
+    kind("spline", Spline, times=VECTOR, points=ANGLE_ROWS, ends=choice(*ENDS)),
     kind("samples", None, samples, file=FILE, ends=choice(*ENDS)),
-    kind("swing", Swing, amplitude=VECTOR, period=NUMBER, offset=NUMBERS),
-    kind("sway", Sway, to=VECTOR, away=VECTOR, speed=NUMBER),
+    kind("swing", Swing, amplitude=ANGLES, period=NUMBER, offset=angles(0, 1)),
+    kind("sway", Sway, to=ANGLES, away=ANGLES, speed=ANGLE),
     kind("ramp-up", RampUp, speed=NUMBER, ramp=NUMBER),
     kind("ramp", Ramped, start=NUMBER, end=NUMBER, duration=NUMBER, ramp=NUMBER),
-    kind("steady-angle", SteadyAngle, speed=NUMBER),
+    kind("steady-angle", SteadyAngle, speed=ANGLE),
     kind("wheel", WheelPath, wheel=INTEGER),
 )
 WAY = one_of(*BASIC, named=MOTION_NAME)
@@ -68,7 +71,7 @@ ORIENTATIONS = (
     kind("axis", AxisRotation, read=_turned, start=ROTATION, axis=VECTOR, angle=WAY),
     kind("fixed", None, AxisRotation.fixed, orientation=ROTATION),
     kind("between", None, AxisRotation.between, start=ROTATION, end=ROTATION, duration=NUMBER),
-    kind("steady", None, AxisRotation.steady, start=ROTATION, axis=VECTOR, speed=NUMBER),
+    kind("steady", None, AxisRotation.steady, start=ROTATION, axis=VECTOR, speed=ANGLE),
 )
 BODIES = (
     kind("pose", PoseTrajectory, position=POSITION, orientation=one_of(*ORIENTATIONS)),

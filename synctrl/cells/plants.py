@@ -1,4 +1,4 @@
-"""Task spaces, and what is beside plain robots in a cell: objects that they carry, joints that others hold."""
+"""Task spaces, and what is beside plain robots: objects that they carry, joints that others hold."""
 
 from __future__ import annotations
 
@@ -27,12 +27,25 @@ from ..tasks.spaces import CartesianSpace, JointSpace
 from .kinds import kind, one_of, table_or
 from .motions import BODY
 from .robots import ARM
-from .values import ANY_NUMBERS, MATRIX, NUMBER, NUMBERS, ROBOT, ROTATION, TEXT, VECTOR, choice, numbers
+from .values import (
+    INERTIA,
+    MATRIX,
+    NUMBER,
+    NUMBERS,
+    ROBOT,
+    ROTATION,
+    TEXT,
+    VECTOR,
+    angles,
+    choice,
+    list_of,
+    numbers,
+)
 
 # -- spaces ------------------------------------------------------------------------------------------------
 
 DAMPING = kind("", Damping, threshold=NUMBER, largest=NUMBER)
-REDUNDANCY = kind("", Redundancy, posture=numbers(1, 2), gain=NUMBER, weights=numbers(0, 1, 2))
+REDUNDANCY = kind("", Redundancy, posture=angles(1, 2), gain=NUMBER, weights=numbers(0, 1, 2))
 
 
 def _tips(space: Any) -> dict[str, Any]:
@@ -68,7 +81,7 @@ SPACE = one_of(*SPACES)
 DISTURBANCE = kind("", Disturbance, robot=ROBOT, torque=NUMBERS, start=NUMBER, stop=NUMBER)
 LOAD = kind(
     "", Payload,
-    robot=ROBOT, mass=NUMBER, com=VECTOR, inertia=ANY_NUMBERS, frame=TEXT, start=NUMBER, stop=NUMBER,
+    robot=ROBOT, mass=NUMBER, com=VECTOR, inertia=INERTIA, frame=TEXT, start=NUMBER, stop=NUMBER,
 )  # fmt: skip
 
 # -- objects -----------------------------------------------------------------------------------------------
@@ -87,7 +100,7 @@ def _pin(part: Pin) -> dict[str, Any]:
 OUTLINE = kind("", Outline, points=MATRIX, thickness=NUMBER)
 OBJECT = kind(
     "", CarriedObject, read=_object,
-    mass=NUMBER, com=VECTOR, inertia=ANY_NUMBERS, box=VECTOR, center=VECTOR, name=TEXT, shape=OUTLINE.model,
+    mass=NUMBER, com=VECTOR, inertia=INERTIA, box=VECTOR, center=VECTOR, name=TEXT, shape=OUTLINE.model,
 )  # fmt: skip
 FIXTURES = (
     kind("fixture", Fixture, stiffness=VECTOR, damping=VECTOR),
@@ -178,10 +191,10 @@ def meeting(duration: float) -> MakesPlant:
 
 
 PID = kind("", Pid, P=NUMBERS, I=NUMBERS, D=NUMBERS)
-_ARMS = list[ARM.model]  # type: ignore[name-defined]
+_ARMS = list_of(ARM.model)
 _CARRIED: dict[str, Any] = {
     "body": OBJECT.model,
-    "grasps": list[GRASP.model],  # type: ignore[name-defined]
+    "grasps": list_of(GRASP.model),
     "at": AT.model,
     "robots": _ARMS,
     "desired": BODY,

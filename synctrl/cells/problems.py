@@ -15,8 +15,8 @@ SHOWN = 10
 class CellFileError(InputError):
     """A cell file that cannot be read, or a cell that cannot be written as one.
 
-    The message begins with the file and the line. The subject is the key, such as "robots[0].motion.duration":
-    arrays are counted from 0.
+    The message begins with the file and the line. The subject is the key, "robots[0].motion.duration" for
+    example: arrays are counted from 0.
 
     Attributes:
         others: what else is wrong with the file, each an error of this kind; the message has the first ten.

@@ -132,13 +132,21 @@ def _said(problem: Any, data: Any) -> tuple[Place, str, Any]:
     if kind == "extra_forbidden":
         known = keys_at(loc[:-1])
         words = f"expected no key of this name{near(str(loc[-1]), known)}"
-        return place, f"{words}; known are {', '.join(known)}", loc[-1]
+        return place, f"{words}; {_whereabouts(loc)}known are {', '.join(known)}", loc[-1]
     if kind.startswith("union_tag"):
         return _unknown_kind(place, found, kinds_at(loc))
-    if kind == "cell_value":
-        return place, problem["msg"], found
+    if kind == "value_error":
+        return place, str(problem["ctx"]["error"]), found
+    if kind == "list_type" and isinstance(found, dict):
+        return place, f"expected [[{place[-1]}]] before each of them, found [{place[-1]}]", None
     words = {"list_type": "a list", "dict_type": "a table", "model_type": "a table"}.get(kind, kind)
     return place, f"expected {words}, found {shown(found)}", found
+
+
+def _whereabouts(loc: Loc) -> str:
+    """Where a key should stand that is one of the file itself."""
+    is_of_file = len(loc) > 1 and loc[-1] in keys_at(())
+    return "a key of the whole file stands before the first [table]; " if is_of_file else ""
 
 
 def _unknown_kind(place: Place, found: Any, known: list[str]) -> tuple[Place, str, Any]:

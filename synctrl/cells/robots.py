@@ -22,7 +22,24 @@ from ..robots.parameters import (
 from ..robots.payload import Payload, carrying, holding
 from ..robots.robot import Robot
 from .kinds import kind, one_of, table_or
-from .values import ANY_NUMBERS, FILE, NUMBER, NUMBERS, ROTATION, SOURCE, TEXT, TRUTH, VECTOR, choice, scalar
+from .values import (
+    ANGLE,
+    ANGLES,
+    ANY_NUMBERS,
+    FILE,
+    INERTIA,
+    NUMBER,
+    NUMBERS,
+    ROTATION,
+    SOURCE,
+    TEXT,
+    TRUTH,
+    VECTOR,
+    by_name,
+    choice,
+    list_of,
+    scalar,
+)
 
 Change = Callable[[Robot], Robot]
 
@@ -119,16 +136,16 @@ def moved(xyz: Any = (0.0, 0.0, 0.0), rpy: Any = (0.0, 0.0, 0.0), name: str | No
     return lambda robot: robot.placed(xyz, rpy, name)
 
 
-BASE = kind("", None, Base, xyz=VECTOR, rpy=VECTOR, name=TEXT)
-INERTIAL = kind("", None, inertial, mass=NUMBER, com=VECTOR, inertia=ANY_NUMBERS)
+BASE = kind("", None, Base, xyz=VECTOR, rpy=ANGLES, name=TEXT)
+INERTIAL = kind("", None, inertial, mass=NUMBER, com=VECTOR, inertia=INERTIA)
 CHANGES = {
     "holding": kind("tool", None, tool, xyz=VECTOR, rotation=ROTATION, name=TEXT),
-    "carrying": kind("load", None, load, mass=NUMBER, com=VECTOR, inertia=ANY_NUMBERS, frame=TEXT),
+    "carrying": kind("load", None, load, mass=NUMBER, com=VECTOR, inertia=INERTIA, frame=TEXT),
     "with_tip": kind("tip", None, tip, tip=TEXT),
     "with_parameters": kind("bodies", None, bodies, pi=VECTOR),
     "with_armature": kind("rotors", None, rotors, armature=NUMBERS),
     "weightless": kind("weightless", None, weightless),
-    "placed": kind("moved", None, moved, xyz=VECTOR, rpy=VECTOR, name=TEXT),
+    "placed": kind("moved", None, moved, xyz=VECTOR, rpy=ANGLES, name=TEXT),
 }
 
 
@@ -143,6 +160,7 @@ def arm(
     gravity: bool = True,
     base: Base | None = None,
     changes: Sequence[Change] = (),
+    load: Callable[..., Robot] = load_robot,
 ) -> Robot:
     """A robot, its place, and what it holds.
 
@@ -158,11 +176,12 @@ def arm(
         gravity: false for a robot without weight.
         base: where it stands; by default at the origin.
         changes: what it holds and what else is done to it, in that order.
+        load: what loads it.
     """
     given = {"locked": locked, "inertials": inertials, "xacro_args": xacro}
     options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     options |= {"package_dirs": list(packages)} if packages else {}
-    made = load_robot(robot, tip, **options, **({"strict": True} if strict else {}))
+    made = load(robot, tip, **options, **({"strict": True} if strict else {}))
     made = made if gravity else made.weightless()
     made = made if base is None else made.placed(*base)
     for change in changes:
@@ -173,14 +192,14 @@ def arm(
 ARM_KEYS: dict[str, Any] = {
     "robot": SOURCE,
     "tip": TEXT,
-    "locked": dict[str, NUMBER],
-    "packages": list[FILE],
-    "inertials": dict[str, INERTIAL.model],
+    "locked": by_name(ANGLE),
+    "packages": list_of(FILE),
+    "inertials": by_name(INERTIAL.model),
     "strict": TRUTH,
-    "xacro": dict[str, scalar()],
+    "xacro": by_name(scalar()),
     "gravity": TRUTH,
     "base": BASE.model,
-    "changes": list[one_of(*CHANGES.values())],  # type: ignore[misc]
+    "changes": list_of(one_of(*CHANGES.values())),
 }
 ARM = kind("", None, arm, **ARM_KEYS)
 
@@ -233,7 +252,7 @@ def rubbing(base: Adapted = FullParameters, armature: bool = False) -> Adapted:
 _RIGID = (
     kind("full", None, full),
     kind("base", None, base),
-    kind("linear", None, linear, matrix=ANY_NUMBERS, theta=VECTOR, names=list[TEXT]),  # type: ignore[valid-type]
+    kind("linear", None, linear, matrix=ANY_NUMBERS, theta=VECTOR, names=list_of(TEXT)),
     kind("planar-two-link", None, planar, masses=VECTOR, lengths=VECTOR),
 )
 RUBBING = kind("friction", None, rubbing, base=one_of(*_RIGID), armature=TRUTH)

@@ -38,7 +38,8 @@ def _table(name: str, rows: list[tuple[int, list[str]]]) -> np.ndarray:
     for number, row in rows:
         values = _numbers(row)
         if values is None or len(values) < 2 or len(values) != len(rows[0][1]):
-            what = f"a time and {max(len(rows[0][1]) - 1, 1)} coordinates in line {number} of {name}"
+            count = max(len(rows[0][1]), 2)
+            what = f"{count} numbers, a time and coordinates, in line {number} of {name}"
             raise InputError.expected(what, ",".join(row), "file")
         found.append(values)
     return np.array(found).reshape(len(found), -1) if found else np.zeros((0, 2))

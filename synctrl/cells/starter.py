@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 STARTER = """\
-# A cell of two planar arms that move together. All numbers are in SI units, angles in rad.
+# A cell of two planar arms that move together. All numbers are in SI units: m, kg, s, N·m, rad. Angles may
+# also be texts in degrees, such as "90 deg".
 # Run it:  synctrl run cell.toml -o out/          What may stand here: docs/cell_files.md
 
 name = "my first cell"
@@ -17,10 +18,10 @@ space = { kind = "cartesian", axes = "xy" }
 [[robots]]
 name = "left"
 robot = "planar2r"                                # a name, or a file beside this one: "arm.urdf", "arm.xacro"
-base = { xyz = [-0.35, 0.0, 0.0] }                # where it stands, m; rpy = [...] turns it
+base = { xyz = [-0.35, 0.0, 0.0] }                # where it stands; rpy = [0.0, 0.0, "90 deg"] turns it
 known = 0.7                                       # how much of its masses the controller knows at the start
 friction = { viscous = 0.02, coulomb = 0.02 }     # which the controller does not know
-motion = { kind = "circle", center = [-0.15, 0.35], radius = 0.08, speed = 1.5707963267948966 }
+motion = { kind = "circle", center = [-0.15, 0.35], radius = 0.08, speed = "90 deg" }
 
 [[robots]]
 name = "right"
@@ -28,7 +29,7 @@ robot = "planar2r"
 base = { xyz = [0.35, 0.0, 0.0] }
 known = 0.7
 friction = { viscous = 0.02, coulomb = 0.02 }
-motion = { kind = "circle", center = [0.15, 0.35], radius = 0.08, speed = 1.5707963267948966 }
+motion = { kind = "circle", center = [0.15, 0.35], radius = 0.08, speed = "90 deg" }
 
 # ---- control ---------------------------------------------------------------------------------------------
 

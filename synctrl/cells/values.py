@@ -1,14 +1,15 @@
-"""Values of a cell file: numbers, words, names of robots and of files, each read strictly and named in words."""
+"""Values of a cell file: numbers, words, names of robots and of files, each read strictly."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import partial
+from types import GenericAlias
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import PlainValidator, WithJsonSchema
-from pydantic_core import PydanticCustomError
 
 from ..errors import near
 from ..robots.catalog import is_path
@@ -16,6 +17,7 @@ from ..robots.urdf.document import Pose
 
 #: what arrays of some depth are called
 DEPTHS = ("a number", "a list of numbers", "a list of lists of numbers", "a list of matrices")
+_DEGREES = re.compile(r" *([-+]?[0-9]+(?:\.[0-9]+)?) *(?:deg|°) *", re.ASCII)
 PLAIN = (bool, int, float, str)
 #: how deep arrays go
 DEEPEST = len(DEPTHS)
@@ -53,10 +55,21 @@ def shown(value: Any) -> str:
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
 
 
-def misfit(expected: str, found: str) -> PydanticCustomError:
-    """The error of one value."""
-    words = {"problem": f"expected {expected}, found {found}"}
-    return PydanticCustomError("cell_value", "{problem}", words)
+def misfit(expected: str, found: str) -> ValueError:
+    """The error of one value, which pydantic gives a place."""
+    return ValueError(f"expected {expected}, found {found}")
+
+
+def _in_radians(value: Any) -> Any:
+    """Numbers in lists, of which texts such as "90 deg" become angles in rad."""
+    if isinstance(value, list):
+        return [_in_radians(each) for each in value]
+    angle = _DEGREES.fullmatch(value) if isinstance(value, str) else None
+    return value if angle is None else float(np.deg2rad(float(angle.group(1))))
+
+
+def _angles(depths: tuple[int, ...], value: Any) -> Any:
+    return _numbers(depths, _in_radians(value))
 
 
 def _depth(value: Any, level: int = 0) -> int:
@@ -75,7 +88,7 @@ def _depth(value: Any, level: int = 0) -> int:
 
 def _numbers(depths: tuple[int, ...], value: Any) -> Any:
     if not isinstance(value, (int, float, list)) or isinstance(value, bool):
-        raise misfit(_words(depths), shown(value))
+        raise misfit(_words(depths) if len(depths) < 3 else "numbers", shown(value))
     found = _depth(value)
     if found not in depths:
         raise misfit(_words(depths), DEPTHS[found] if found < DEEPEST else "deeper lists")
@@ -95,8 +108,8 @@ def _words(depths: tuple[int, ...]) -> str:
     return " or ".join(DEPTHS[depth] for depth in depths)
 
 
-def _number_schema(depth: int) -> dict[str, Any]:
-    return {"type": "number"} if depth == 0 else {"type": "array", "items": _number_schema(depth - 1)}
+def _schema(depth: int, number: dict[str, Any]) -> dict[str, Any]:
+    return number if depth == 0 else {"type": "array", "items": _schema(depth - 1, number)}
 
 
 def kept(read: Callable[[Any], Any], schema: dict[str, Any]) -> Any:
@@ -104,11 +117,30 @@ def kept(read: Callable[[Any], Any], schema: dict[str, Any]) -> Any:
     return Annotated[Any, PlainValidator(read), WithJsonSchema(schema)]
 
 
+def _any_of(schemas: list[dict[str, Any]]) -> dict[str, Any]:
+    return schemas[0] if len(schemas) == 1 else {"anyOf": schemas}
+
+
+def list_of(each: Any) -> Any:
+    """A list of values of some type."""
+    return GenericAlias(list, (each,))
+
+
+def by_name(each: Any) -> Any:
+    """A table of values of some type, by names that a user chooses."""
+    return GenericAlias(dict, (str, each))
+
+
 def numbers(*depths: int) -> Any:
     """Numbers in lists that are that deep."""
-    schemas = [_number_schema(depth) for depth in depths]
-    schema = schemas[0] if len(schemas) == 1 else {"anyOf": schemas}
-    return kept(partial(_numbers, depths), schema)
+    schemas = [_schema(depth, {"type": "number"}) for depth in depths]
+    return kept(partial(_numbers, depths), _any_of(schemas))
+
+
+def angles(*depths: int) -> Any:
+    """Numbers in lists that are that deep, which may be angles in degrees, "90 deg"."""
+    number = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": f"^{_DEGREES.pattern}$"}]}
+    return kept(partial(_angles, depths), _any_of([_schema(depth, number) for depth in depths]))
 
 
 def _of(kind: type, words: str, value: Any) -> Any:
@@ -140,7 +172,7 @@ def _robot(value: Any) -> RobotName | RobotNumber:
 
 def _rotation(value: Any) -> Any:
     """A rotation matrix, of nine numbers or of three angles about the axes x, y, z, in that order, in rad."""
-    read = _numbers((1, 2), value)
+    read = _angles((1, 2), value)
     if read and isinstance(read[0], list):
         return read
     if len(read) != 3:
@@ -180,6 +212,9 @@ NUMBERS, ANY_NUMBERS = numbers(0, 1), numbers(0, 1, 2, 3)
 INTEGER = kept(partial(_of, int, "a whole number"), {"type": "integer"})
 TEXT = kept(partial(_of, str, "a text"), {"type": "string"})
 TRUTH = kept(partial(_of, bool, "true or false"), {"type": "boolean"})
+#: (3, 3), or its diagonal, (3,)
+INERTIA = numbers(1, 2)
+ANGLE, ANGLES, ANGLE_ROWS = angles(0), angles(1), angles(2)
 ROTATION = kept(_rotation, {"type": "array", "minItems": 3, "maxItems": 3})
 ROBOT = kept(_robot, {"type": ["string", "integer"]})
 SOURCE = kept(_source, {"type": "string"})

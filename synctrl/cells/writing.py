@@ -134,14 +134,18 @@ class Writer:
         return written["kind"] if written.keys() == {"kind"} else written
 
     def _parts(self, made: Experiment) -> dict[str, Any]:
-        parts = {"gains": made.gains, "law": made.law, "adaptation": made.adaptation}
-        parts |= {"network": made.network, "admittance": made.admittance}
-        parts |= {"sensors": made.sensors, "actuators": made.actuators}
-        parts |= {"disturbances": made.disturbances, "loads": made.payloads}
-        written = {
-            name: self.part(list(part) if isinstance(part, tuple) else part, (name,))
-            for name, part in parts.items()
+        parts: dict[str, Any] = {
+            "gains": made.gains,
+            "law": made.law,
+            "adaptation": made.adaptation,
+            "network": made.network,
+            "admittance": made.admittance,
+            "sensors": list(made.sensors),
+            "actuators": list(made.actuators),
+            "disturbances": list(made.disturbances),
+            "loads": list(made.payloads),
         }
+        written = {name: self.part(part, (name,)) for name, part in parts.items()}
         return {name: value for name, value in written.items() if value is not None and value != []}
 
     def _member(self, member: Member, place: Place) -> dict[str, Any]:

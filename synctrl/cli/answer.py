@@ -43,9 +43,7 @@ class Answer:
         """Say an error in a line, and remember it; the command goes on, and will end with the code."""
         self.code = code
         self.data["error"] = about_error(error)
-        complain(
-            "error" if code != codes.INTERRUPTED else "interrupted", str(error) or "before anything was done"
-        )
+        complain("error" if code != codes.INTERRUPTED else "interrupted", str(error) or "by Ctrl-C")
 
 
 @contextmanager

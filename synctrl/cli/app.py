@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from .advise import advise
 from .compare import compare
 from .doctor import doctor
 from .inspect import inspect
@@ -43,5 +44,5 @@ def synctrl(
     """What all subcommands have in common: nothing but the version."""
 
 
-for command in (new, run, show, compare, sweep, tune, inspect, reproduce, doctor):
+for command in (new, advise, run, show, compare, sweep, tune, inspect, reproduce, doctor):
     app.command()(command)

@@ -17,6 +17,7 @@ FEATURES = {
     "sweep": "sweeps by joblib or Dask, tables of them as pandas or xarray",
     "tune": "tuning for several goals",
     "data": "results for xarray, pandas, NetCDF and Foxglove",
+    "rerun": "results as recordings for Rerun",
     "notebooks": "the notebooks",
 }
 PACKAGE = "synctrl"

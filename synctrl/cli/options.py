@@ -37,4 +37,12 @@ Period = Annotated[
         "--control-period", metavar="SECONDS", help="Hold torque so long; by default as the file says."
     ),
 ]
+Export = Annotated[
+    list[Path],
+    typer.Option(
+        "--export",
+        metavar="FILE",
+        help="Write it for other tools: .csv, .mat, .nc (netCDF), .mcap (Foxglove), .rrd (Rerun).",
+    ),
+]
 Seed = Annotated[int, typer.Option(min=0, help="Of random numbers.")]

@@ -17,7 +17,7 @@ def progress_bar(what: str, total: float, unit: str = "s") -> Iterator[Callable[
     columns = (
         TextColumn("{task.description}"),
         BarColumn(bar_width=30),
-        TextColumn("{task.completed:.3g}/{task.total:.3g} " + unit),
+        TextColumn("{task.completed:.4g}/{task.total:g} " + unit),
         TimeElapsedColumn(),
         TextColumn("left:"),
         TimeRemainingColumn(),

@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from .answer import answering
+from .exports import check_exports, export
 from .made import make_run, planned
-from .options import CellFile, Duration, Engine, Folder, Json, Period, Step
+from .options import CellFile, Duration, Engine, Export, Folder, Json, Period, Step
 from .pages import certified, tell_run, write_page, write_run
 
 LogStep = Annotated[
@@ -32,6 +33,7 @@ def run(
     log_dt: LogStep = None,
     plant: Plant = None,
     page: Page = True,
+    export_to: Export = [],  # noqa: B006
     as_json: Json = False,
 ) -> None:
     """Run a cell, and write its page, numbers, certificate and animation into a folder.
@@ -40,11 +42,13 @@ def run(
     shows them. A run that has to stop, or is interrupted by Ctrl-C, is written as far as it came.
     """
     with answering(as_json) as answer:
+        check_exports(export_to)
         asked = {"duration": duration, "dt": dt, "engine": engine, "control_period": control_period}
         experiment, how = planned(answer, cell, **asked, log_dt=log_dt, plant=plant)
         result = make_run(answer, experiment, how)
         certificate = certified(answer, result, experiment)
         tell_run(answer, result, certificate)
         write_run(answer, out, result, certificate, cell)
+        export(answer, result, export_to)
         if page:
             write_page(answer, out, result, certificate, experiment)

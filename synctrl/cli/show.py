@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from .answer import answering
-from .options import Json
+from .exports import check_exports, export
+from .options import Export, Json
 from .pages import cell_beside, certified, tell_run, write_page
 
 Saved = Annotated[
@@ -39,6 +40,7 @@ def show(
     cell: Cell = None,
     page: Written = True,
     open_: Open = False,
+    export_to: Export = [],  # noqa: B006
     as_json: Json = False,
 ) -> None:
     """Show a saved result: its numbers here, and a page with figures and an animation.
@@ -49,10 +51,12 @@ def show(
         from ..cells import read_cell
         from ..simulation.result import Result
 
+        check_exports(export_to)
         loaded = Result.load(result)
         experiment = cell_beside(answer, result) if cell is None else read_cell(cell)
         certificate = None if experiment is None else certified(answer, loaded, experiment)
         tell_run(answer, loaded, certificate)
+        export(answer, loaded, export_to)
         if page:
             made = write_page(answer, _folder(result, out), loaded, certificate, experiment)
             if open_:

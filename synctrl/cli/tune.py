@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -42,6 +44,9 @@ File = Annotated[
     ),
 ]
 
+#: how runs of the search were made, and not how the cell is to be run
+OF_SEARCH = ("engine", "duration")
+
 
 def tune(
     cell: CellFile,
@@ -71,26 +76,31 @@ def tune(
         from .values import read_factor
 
         asked = {"duration": duration, "dt": dt, "engine": engine, "control_period": control_period}
-        base = planned(answer, cell, **asked)
-        experiment, answer.data["folder"] = base.experiment, out
+        experiment, _ = base = planned(answer, cell, **asked)
         factors = [read_factor("--search", text, experiment.gains) for text in search]
-        found = find(
-            experiment,
-            factors,
-            minimize=minimize or ([] if maximize else ["sync_rms"]),
-            maximize=maximize,
-            limits=_limits(limit),
-            generations=generations,
-            population=population,
-            folder=out,
-            workers=workers,
-            progress=sys.stderr.isatty(),
-            seed=seed,
-            **base.shared,
-        )
+        goals = {"minimize": minimize or ([] if maximize else ["sync_rms"]), "maximize": maximize}
+        amount = {"generations": generations, "population": population, "seed": seed}
+        where = {"folder": out, "workers": workers, "progress": sys.stderr.isatty()}
+        with _kept(answer, out):
+            options: dict[str, Any] = {**goals, **amount, **where, **base.shared}
+            found = find(experiment, factors, limits=_limits(limit), **options)
         _tell(answer, found)
         _write(answer, found, out)
         _write_cell(answer, found, tuned or out / "tuned.toml", base.how)
+
+
+@contextmanager
+def _kept(answer: Answer, folder: Path) -> Iterator[None]:
+    """Say of a search that is interrupted which runs are kept."""
+    from .rows import endings, read_rows
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        rows = read_rows(folder)
+        answer.data |= {"runs": len(rows), "endings": endings(rows)}
+        answer.show(f"{len(rows)} runs so far are in {folder}; the same command goes on from them.")
+        raise
 
 
 def _limits(texts: list[str]) -> dict[str, float]:
@@ -143,7 +153,7 @@ def _write_cell(answer: Answer, found: Tuned, file: Path, how: dict[str, Any]) -
     from ..cells import write_cell
 
     try:
-        write_cell(found.experiment, file, run={name: x for name, x in how.items() if name != "engine"})
+        write_cell(found.experiment, file, run={name: x for name, x in how.items() if name not in OF_SEARCH})
     except SynctrlError as error:
         answer.data["not_written"] = str(error)
         answer.show(f"Not written as a cell file: {error}")

@@ -37,11 +37,12 @@ KINDS: Mapping[str, tuple[Callable[..., Any], int]] = MappingProxyType(
     }
 )
 #: names of the sweep's room that make no factor of numbers or words
-_OTHERS = ("Factor", "OwnMeasure", "Sweep", "load", "trajectories", "adaptation", "network", "law", "gain")
+_OTHERS = ("Factor", "OwnMeasure", "Sweep", "load", "trajectories", "adaptation", "network", "law")
+_GAINS = ("gain", "gain_scale")
 FACTORS = tuple(
     name
     for name in sweep.__all__
-    if name not in (*_OTHERS, "Choice", "Grid", "LogUniform", "Normal", "Uniform")
+    if name not in (*_OTHERS, *_GAINS, "Choice", "Grid", "LogUniform", "Normal", "Uniform")
 )
 
 

@@ -8,42 +8,43 @@
  * other than the ideal one never have robots in lanes.
  */
 
-/* A coordinate of the rows of robots, or pairs, that a term speaks of: one row per lane, see `Cell`. */
-INSIDE vec fetch(const Cell *c, const vec *rows, const int *places) {
+/* sum += sign times the row of a robot, or pair, that a term speaks of; one row per lane, see `Cell`. */
+INSIDE void add(const Cell *c, vec *sum, vec sign, const vec *rows, const int *places) {
     const double *numbers = (const double *)rows;
-    if (!c->scattered) return load(numbers + places[0]);
-    int together = c->n == 1 && c->p == 1; /* one row of robots, and one of pairs */
-    return together ? permuted(*rows, places) : gather(numbers, places);
+    if (!c->scattered)
+        for (int j = 0; j < m; j++) sum[j] += sign * load(numbers + places[0] + j * LANES);
+    else if (c->n == 1 && c->p == 1) /* one row of robots, and one of pairs */
+        for (int j = 0; j < m; j++) sum[j] += sign * permuted(rows[j], places);
+    else
+        for (int j = 0; j < m; j++) sum[j] += sign * gather(numbers + j * LANES, places);
 }
 
 /* S times rows of robots: one row per pair. */
 static void compare(const Cell *c, const vec *rows, vec *epsilon) {
-    for (int pair = 0; pair < c->p; pair++, epsilon += m)
-        for (int j = 0; j < m; j++) {
-            vec sum = splat(0);
-            for (int t = pair * c->arity; t < (pair + 1) * c->arity; t++)
-                sum += c->sign[t] * fetch(c, rows + j, c->edge + t * LANES);
-            epsilon[j] = sum;
-        }
+    for (int pair = 0; pair < c->p; pair++, epsilon += m) {
+        vec sum[m] = { 0 };
+        for (int t = pair * c->arity; t < (pair + 1) * c->arity; t++)
+            add(c, sum, c->sign[t], rows, c->edge + t * LANES);
+        memcpy(epsilon, sum, sizeof sum);
+    }
 }
 
 /* E, sigma, sigma' = S^T (integral, epsilon, epsilon') per robot */
 static void distribute(const Cell *c, Quantities *a) {
     a->integral = a->memory;
-    for (int i = 0; i < c->n; i++)
-        for (int j = 0; j < m; j++) {
-            vec E = splat(0), sigma = splat(0), sigma_dot = splat(0);
-            for (int t = c->first[i]; t < c->first[i + 1]; t++) {
-                const int *pair = c->incident + t * LANES;
-                vec sign = c->incident_sign[t];
-                E += sign * fetch(c, a->integral + j, pair);
-                sigma += sign * fetch(c, a->epsilon + j, pair);
-                sigma_dot += sign * fetch(c, a->epsilon_dot + j, pair);
-            }
-            a->E[i * m + j] = E;
-            a->sigma[i * m + j] = sigma;
-            a->sigma_dot[i * m + j] = sigma_dot;
+    for (int i = 0; i < c->n; i++) {
+        vec E[m] = { 0 }, sigma[m] = { 0 }, sigma_dot[m] = { 0 };
+        for (int t = c->first[i]; t < c->first[i + 1]; t++) {
+            const int *pair = c->incident + t * LANES;
+            vec sign = c->incident_sign[t];
+            add(c, E, sign, a->integral, pair);
+            add(c, sigma, sign, a->epsilon, pair);
+            add(c, sigma_dot, sign, a->epsilon_dot, pair);
         }
+        memcpy(a->E + i * m, E, sizeof E);
+        memcpy(a->sigma + i * m, sigma, sizeof sigma);
+        memcpy(a->sigma_dot + i * m, sigma_dot, sizeof sigma_dot);
+    }
 }
 
 /* What is believed of W, w and w' of who is heard on a link, one row after another. */

@@ -93,6 +93,33 @@ class Shape:
     faces: np.ndarray | None = None
 
 
+def as_triangles(shape: Shape) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Triangles of a cylinder, a cone, or of triangles.
+
+    Returns:
+        Corners, (k, 3), m, triangles, (f, 3), counted from 0, and directions in which corners look, (k, 3).
+    """
+    vertices, faces = shape.vertices, shape.faces
+    if vertices is None or faces is None:
+        below, above = (0.5, -0.5), (0.5 * shape.top, 0.5)
+        lines = ((0.0, -0.5), below), (below, above), (above, (0.0, 0.5))  # parts do not share their rims
+        parts = [_turned(np.array(line)) for line in lines]
+        before = np.cumsum([0, *(len(corners) for corners, _ in parts)])
+        faces = np.vstack([each + start for (_, each), start in zip(parts, before, strict=False)])
+        upright = np.vstack([corners for corners, _ in parts]) @ UPRIGHT
+        vertices = (upright * shape.size) @ shape.rotation.T + shape.position
+    return vertices, faces, _normals(vertices, faces)
+
+
+def _normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Directions in which corners look: those of the triangles around, the more of the larger ones."""
+    first, second, third = (vertices[faces[:, k]] for k in range(3))
+    across, found = np.cross(second - first, third - first), np.zeros(vertices.shape)
+    for k in range(3):
+        np.add.at(found, faces[:, k], across)
+    return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-300)
+
+
 def take_apart(nodes: Sequence[Node]) -> tuple[list[Frame], list[Body]]:
     """Frames and bodies of a scene's nodes."""
     frames: list[Frame] = []

@@ -9,11 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import instance, positive_number
-from ..errors import InputError, RobotWarning, warn
+from ..checks import instance
 from ..files import reported, whole_file, write_whole
-from ..show.cell_scene import scene_of
-from ..show.runs import frame_indices
 from ..show.scene import Scene
 from ..simulation.result import Result
 from .identifiers import identifiers
@@ -22,12 +19,11 @@ from .names import PAPER
 from .needed import needed
 from .pictures import Pictures, message, nanoseconds_of, stamp
 from .quantities import quantities
+from .shown import picture_instants, scene_or_warn
 from .signals import Signal, numbers_of, signals
 
 #: instants whose numbers are read at a time
 ROWS = 1000
-#: the last time that can be recorded, s, some 580 years
-LATEST = 1.8e10
 
 
 def to_mcap(result: Result, path: str | Path, *, fps: float = 30.0) -> Path:
@@ -44,8 +40,8 @@ def to_mcap(result: Result, path: str | Path, *, fps: float = 30.0) -> Path:
     """
     instance("path", path, (str, Path), "a path")
     writer = needed("an MCAP recording", "mcap_protobuf.writer")
-    found, frames = signals(quantities(result)), _frames(result, fps)
-    scene = _scene(result, fps) if len(frames) else None
+    found, frames = signals(quantities(result)), picture_instants(result, fps)
+    scene = scene_or_warn(result, fps) if len(frames) else None
     with reported("write the recording", path), whole_file(path) as file, writer.Writer(file) as recording:
         for name, words in _about(result, found).items():
             recording.add_metadata(name, words)
@@ -56,25 +52,6 @@ def to_mcap(result: Result, path: str | Path, *, fps: float = 30.0) -> Path:
     with reported("write the layout", beside):
         write_whole(beside, json.dumps(layout(found, None if scene is None else scene.box()), indent=1))
     return Path(path)
-
-
-def _frames(result: Result, fps: float) -> np.ndarray:
-    """Indices of the instants that the pictures show."""
-    fps = positive_number("fps", fps)
-    if not len(result.t):
-        return np.zeros(0, dtype=int)
-    if not 0 <= result.t[0] <= result.t[-1] <= LATEST:
-        found = result.t[0], result.t[-1]
-        raise InputError.expected(f"times from 0 to {LATEST:g} s", found, "result, t")
-    return frame_indices(result, fps)
-
-
-def _scene(result: Result, fps: float) -> Scene | None:
-    try:
-        return scene_of(result, fps=fps)
-    except InputError as error:
-        warn(f"the recording of '{result.info['title']}' has no scene: {error}", RobotWarning)
-        return None
 
 
 def _about(result: Result, found: list[Signal]) -> dict[str, dict[str, str]]:

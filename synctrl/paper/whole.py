@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from itertools import chain
 from pathlib import Path
@@ -87,40 +87,62 @@ def page_of(
         certificates: by name of the run.
         data: the metrics of every run.
     """
-    runs, fair = every.named(*PLANNED), {name: done[f"fair {name}"] for name in FAIR}
-    (bodies, bodies_drawn), learned = done["bodies"], done["learned"]
-    claims, own = papers_claims(runs), our_findings(runs, bodies[BODIES], fair["planar_four"][0])
+    runs, (bodies, _) = every.named(*PLANNED), done["bodies"]
+    claims, own = papers_claims(runs), our_findings(runs, bodies[BODIES], done["fair planar_four"][0])
     found, tasks = zip(*(done[f"task {k}"] for k in range(len(TASKS))), strict=True)
     checked = [*claims, *own, *chain.from_iterable(found)]
-    sections = [
-        introduction(checked, every),
-        *(done[name] for name in (*SCENES, "full", "friction")),
-        *tasks,
-        margins_told(done["margins"], done["map"]),
-        honesty_section(own, what_parts_do(fair["planar_four"][1])),
+    cells = [done[name] for name in (*SCENES, "full", "friction")]
+    margins = margins_told(done["margins"], done["map"])
+    sections = [introduction(checked, every), *cells, *tasks, margins]
+    sections += further(runs, own, tried, done, certificates, out / "figures")
+    write_numbers(out / "metrics.json", data, checked, done, certificates)
+    print_table(runs)
+    print(f"\n{tally(checked)} The page says which do not, and why.")
+    return write(out / "index.html", sections, max(run.t[-1] for run in runs.values()))
+
+
+def further(
+    runs: SavedRuns,
+    own: Sequence[Claim],
+    tried: float,
+    done: Mapping[str, Any],
+    certificates: Mapping[str, Certificate],
+    figures: Path,
+) -> list[Section]:
+    """The sections behind those of the tasks; arguments as of `page_of`, and what the paper leaves unsaid."""
+    return [
+        honesty_section(own, what_parts_do(done["fair planar_four"][1])),
         grid_section(done["grid"], tried),
-        bodies_drawn,
-        identification_section(learned),
-        *(section for _, _, section in fair.values()),
+        done["bodies"][1],
+        identification_section(done["learned"]),
+        *(done[f"fair {name}"][2] for name in FAIR),
         told(certificates, done["promises"]),
-        certificate_section(certificates, out / "figures"),
+        certificate_section(certificates, figures),
         done["judge"],
         step_section(runs),
     ]
-    write_metrics(
-        out / "metrics.json",
+
+
+def write_numbers(
+    path: Path,
+    data: Mapping[str, Any],
+    checked: Sequence[Claim],
+    done: Mapping[str, Any],
+    certificates: Mapping[str, Certificate],
+) -> Path:
+    """Write all numbers of the page; arguments as of `page_of`, and the claims that were checked."""
+    fair = {name: done[f"fair {name}"][:2] for name in FAIR}
+    return write_metrics(
+        path,
         data,
         [{**asdict(claim), "ours": claim.ours} for claim in checked],
         certificates={name: certificate.as_dict() for name, certificate in certificates.items()},
-        comparisons={name: [each.as_dict() for each in pair] for name, (*pair, _) in fair.items()},
-        consistency={name: each.as_dict() for name, each in bodies.items()},
+        comparisons={name: [each.as_dict() for each in pair] for name, pair in fair.items()},
+        consistency={name: each.as_dict() for name, each in done["bodies"][0].items()},
         identification={
             title: [robot.as_dict() for robot in each] for title, each in done["learned"].items()
         },
     )
-    print_table(runs)
-    print(f"\n{tally(checked)} The page says which do not, and why.")
-    return write(out / "index.html", sections, max(run.t[-1] for run in runs.values()))
 
 
 def write(path: Path, sections: list[Section], longest: float) -> Path:

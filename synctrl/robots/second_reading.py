@@ -1,8 +1,8 @@
 """What other libraries read in a robot's file, beside what this package reads: yourdfpy and MuJoCo.
 
-Each gets the file itself, without its shapes, and not what this package has made of it. From yourdfpy come
-the tree, placements, masses and limits, and dynamics are computed here from these alone; MuJoCo computes its
-own. Joints that this package holds stand there where it holds them.
+Each gets the elements of the file itself, but for shapes, and not what this package has made of them. From
+yourdfpy come the tree, placements, masses and limits, and dynamics are computed here from these alone; MuJoCo
+computes its own. Joints that this package holds stand there where it holds them.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .mechanism import joint_limits
 from .robot import Robot
 from .urdf.document import Joint
 from .urdf.xacro import SUFFIX, expand_xacro
-from .urdf.xml import read_bytes
+from .urdf.xml import Element, parse_xml, read_bytes
 
 #: in how many configurations readings are compared, and by how much they may differ: m, rad, or relative
 CONFIGURATIONS, SAME = 4, 1e-6
@@ -33,6 +33,12 @@ CONFIGURATIONS, SAME = 4, 1e-6
 GRAVITY = 9.81
 #: what MuJoCo is told: no fixed link is merged with another, and nothing is balanced, bounded or left out
 COMPILER = {"fusestatic": "false", "balanceinertia": "false", "boundmass": "0", "boundinertia": "0"}
+
+#: elements that other libraries get of a file; shapes, and what simulators are told, could name other files
+MECHANICAL = (
+    *("link", "inertial", "origin", "mass", "inertia"),
+    *("joint", "parent", "child", "axis", "limit", "dynamics"),
+)
 
 Locks = Mapping[str, float]
 """Positions of the joints that are held, by name, rad or m."""
@@ -88,20 +94,20 @@ def second_readings(robot: Robot, xacro_args: Mapping[str, object] | None = None
 
 
 def _text(robot: Robot, xacro_args: Mapping[str, object] | None) -> bytes | None:
-    """The URDF of a robot without its shapes, as XML."""
+    """The URDF of a robot as XML, without its shapes; joints that follow others stand where they are held."""
     file = None if robot.document is None else robot.document.file
     if file is None:
         return None
     content = expand_xacro(file, xacro_args).encode() if file.suffix == SUFFIX else read_bytes(Path(file))
-    root = ElementTree.fromstring(content)
-    if root.tag != "robot":
-        return None
-    for child in [each for each in root if each.tag not in ("link", "joint")]:
-        root.remove(child)
-    for link in root.findall("link"):
-        for shape in [each for each in link if each.tag != "inertial"]:
-            link.remove(shape)
-    return ElementTree.tostring(root)
+    root = parse_xml(str(file), content)
+    return ElementTree.tostring(_mechanical(root)) if root.tag == "robot" else None
+
+
+def _mechanical(element: Element) -> ElementTree.Element:
+    """An element with those of its children that belong to the mechanism, and their attributes."""
+    made = ElementTree.Element(element.tag, {k: v for k, v in element.attributes.items() if ":" not in k})
+    made.extend(_mechanical(child) for child in element.children if child.tag in MECHANICAL)
+    return made
 
 
 def _reading(name: str, read: Callable, robot: Robot, text: bytes) -> Reading:

@@ -48,6 +48,10 @@ class Exported:
         """
         return _module("mcap_file").to_mcap(self, path, fps=fps)
 
+    def to_rerun(self, path: str | Path, *, fps: float = 30.0) -> Path:
+        """Write the same as a recording for Rerun, with its layout inside; this needs the extra `rerun`."""
+        return _module("rerun_file").to_rerun(self, path, fps=fps)
+
 
 def _module(name: str) -> Any:
     return import_module(f"{EXPORTS}.{name}")

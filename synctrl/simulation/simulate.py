@@ -200,7 +200,7 @@ class Experiment:
 
     @classmethod
     def from_file(cls, path: str | Path) -> Experiment:
-        """The experiment that a cell file describes, see `synctrl.cells.read_cell`, which says what is raised."""
+        """The experiment of a cell file, see `synctrl.cells.read_cell`, which says what is raised."""
         return import_module(CELLS).read_cell(path)
 
     def to_file(self, path: str | Path) -> Path:
