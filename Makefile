@@ -1,5 +1,6 @@
 # make reproduce: the experiments of the paper, out/index.html
 # make test:      all tests
+# make docs:      the documentation, out/docs/index.html
 # make stress:    the long ones
 #
 # Everything is installed into .venv, in the versions of constraints.txt. What was installed is remembered in
@@ -20,12 +21,13 @@ export OPENBLAS_NUM_THREADS := 1
 # Modules are compiled where they are first imported, and never those that nothing imports (--no-compile below).
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help reproduce test test-lowest stress lint clean
+.PHONY: help reproduce docs test test-lowest stress lint clean
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 
 help:
 	@echo "make reproduce   run every experiment of the paper and write out/index.html"
+	@echo "make docs        build the documentation, out/docs/index.html (npm fetches MathJax; DOCS=--short is quicker)"
 	@echo "make test        run all tests (WORKERS=$(WORKERS) at a time)"
 	@echo "make test-lowest run those that depend on libraries with the oldest versions allowed"
 	@echo "make stress      run the long versions of tests, and print what they found (docs/reliability.md)"
@@ -35,6 +37,9 @@ help:
 
 reproduce: $(VENV)/.installed-core
 	@$(PY) scripts/reproduce.py
+
+docs: $(VENV)/.installed-docs
+	@$(PY) scripts/build_docs.py $(DOCS)
 
 test: $(VENV)/.installed-test
 	@$(PY) -m pytest -q -n $(WORKERS) --dist loadfile

@@ -18,12 +18,18 @@
 #
 # **Synthetic data.** Masses, inertias and friction of the A460 were never published; those used here are
 # invented to be plausible. The size of the errors is not the paper's, the effects are.
+#
+# You will learn
+#
+# - what adaptation does with gravity, and what it cannot do with friction that nobody models;
+# - what is gained by synchronization, joint by joint;
+# - to tell a step that is too long from a controller that is bad.
 
 # %%
 # %matplotlib inline
 
 import numpy as np
-from IPython.display import HTML, display
+from IPython.display import display
 
 from synctrl.analysis import certify
 from synctrl.experiments import a460_pair
@@ -40,9 +46,9 @@ DURATION = 4.0  # s
 # their values. It does not know that there is friction.
 #
 # **A `StepWarning` is right here.** With friction, runs warn that their step of 1 ms is too long: near rest
-# friction answers a joint's velocity about 2000 times per second, faster than such a step can follow, so the
-# first milliseconds are off. In these figures it cannot be seen. Where the start matters, ask for a shorter
-# step, `simulate(DURATION, dt=1e-4)`, which warns of nothing; `engine="compiled"` makes that quick.
+# friction answers a joint's velocity about 2000 times per second, faster than such a step can follow, so
+# the first milliseconds are off. In these figures it cannot be seen. Where the start matters, ask for a
+# shorter step, `simulate(DURATION, dt=1e-4)`, which warns of nothing; `engine="compiled"` makes that quick.
 
 # %%
 together = a460_pair().simulate(DURATION)
@@ -88,7 +94,27 @@ print(certify(together))
 
 # %%
 limit = float(np.linalg.norm(alone.sync_error, axis=2).max())
-HTML(payload_pair_scene(together, limit=limit).html())
+payload_pair_scene(together, limit=limit)
 
 # %%
-HTML(payload_pair_scene(alone, limit=limit).html())
+payload_pair_scene(alone, limit=limit)
+
+# %% [markdown]
+# ## Exercises
+#
+# 1. `a460_pair(adapt_friction=True)` puts friction among what is learned. Which of the figures changes, and
+#    what does the certificate say now?
+# 2. Halve and double `Gamma` (`GAINS` is in `synctrl.experiments.a460_pair`). How long does the sag of the
+#    second joint last?
+# 3. `simulate(DURATION, dt=1e-4, engine="compiled")` resolves the start. How large was the error of the
+#    first milliseconds?
+# 4. With `gravity=False` nothing pulls. How large are the errors at first, and what is left of the
+#    advantage of synchronization?
+# 5. The wrists of the real arm are held by controllers of their own: run `a460_full_pair()`, and compare
+#    the errors of the first three joints.
+#
+# ## Further
+#
+# [Why beta works](why_beta_works.ipynb) takes these arms apart into modes. [An adaptation of your
+# own](own_adaptation.ipynb) changes how they learn. [Adaptations](../docs/adaptation.md) compares those
+# that there are on this cell.

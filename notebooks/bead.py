@@ -17,6 +17,12 @@
 # does. In the first an arm carries a plate, and the other one lays adhesive along the edge of it. In the
 # second both lay adhesive on one path, from its ends, until their beads meet. Adhesive weighs nothing here.
 #
+# You will learn
+#
+# - to compare errors where they count: against a plate that moves, or along a path;
+# - what is won by that, what stiffness alone would do, and what is not better;
+# - to let a motion wait for those who are late.
+#
 # Runs are computed by the compiled engine, which needs `pip install 'synctrl[compiled]'` and a C compiler;
 # `ENGINE = "pinocchio"` does without, and takes many times as long.
 
@@ -26,7 +32,7 @@
 from functools import partial
 
 import numpy as np
-from IPython.display import HTML, Markdown, display
+from IPython.display import Markdown, display
 
 from synctrl.experiments import bead_on_edge, bead_on_path
 from synctrl.experiments.bead_on_edge import GAINS
@@ -75,7 +81,7 @@ edge = {
 # red the largest of both runs.
 
 # %%
-HTML(side_by_side({name: edge[name] for name in ("independent", "synchronized")}).html())
+side_by_side({name: edge[name] for name in ("independent", "synchronized")})
 
 # %%
 display(overlay(partial(output_curves, name="bead_error"), edge))
@@ -135,7 +141,7 @@ def on_path(mode):
 path = {mode: on_path(mode) for mode in MODES}
 
 # %%
-HTML(side_by_side({name: path[name] for name in ("independent", "gap_weighted")}).html())
+side_by_side({name: path[name] for name in ("independent", "gap_weighted")})
 
 # %%
 display(overlay(partial(output_curves, name="gap_error"), path))
@@ -190,3 +196,16 @@ for name, run in (("without", without), ("with", waiting)):
 
 # %% [markdown]
 # They meet a little later, closer to the place: the motion has waited for the first arm.
+
+# %% [markdown]
+# ## Exercises
+#
+# 1. In the first task double the push. Is the bead twice as bad?
+# 2. Which of Λ, β and K_ε matters for the speed along the edge, on which the thickness depends?
+# 3. In the second task let the *second* arm be pushed. Are `gap` and `phase` as good as before?
+# 4. Lay the bead on a path of your own: [assembly](../docs/assembly.md) has `Path` and `AlongPath`.
+#
+# ## Further
+#
+# [Robots that hold one object](../docs/assembly.md) has both tasks with their proofs. [Taking it to a
+# robot](to_a_robot.ipynb) goes on from here to a loop of your own.

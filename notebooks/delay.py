@@ -17,6 +17,13 @@
 # tell comes late, seldom, or not at all. Two UR5 that move together are asked here how much of that they
 # take, and what helps them to take more.
 #
+# You will learn
+#
+# - what robots send each other, and how little it is;
+# - to ask a cell how much delay, which period and which loss it takes, before any run;
+# - what a theorem says about it in one eigenvalue per robot;
+# - to cure a cell that takes too little.
+#
 # Runs are computed by the compiled engine, which needs `pip install 'synctrl[compiled]'` and a C compiler;
 # `ENGINE = "pinocchio"` does without, and takes many times as long.
 
@@ -24,7 +31,7 @@
 # %matplotlib inline
 
 import numpy as np
-from IPython.display import HTML, display
+from IPython.display import display
 
 from synctrl import Network
 from synctrl.analysis import certify, delay_map, delay_margin, period_margin
@@ -58,9 +65,9 @@ def epsilon(result):
 # ## What robots send
 #
 # Each robot integrates its own weighted error, W' = w, and sends W, w and w' with the time. Of its own W
-# and those of its neighbours it makes what the paper's law wants: E = Σ S_ki ∫ε_k. After any number of
-# lost messages the next one restores E. Here the arms talk every 10 ms, messages take 10 to 20 ms, and a
-# fifth is lost.
+# and those of its neighbours it makes what the paper's law wants: E = Σ S_ki ∫ε_k. After any number of lost
+# messages the next one restores E. Here the arms talk every 10 ms, messages take 10 to 20 ms, and a fifth
+# is lost.
 
 # %%
 network = Network(period=0.01, delay=0.01, jitter=0.01, loss=0.2, receiver="filter", omega=50.0, seed=1)
@@ -68,7 +75,7 @@ talking = run(network)
 display(traffic(talking))
 
 # %%
-HTML(scene_of(talking).html())
+scene_of(talking)
 
 # %% [markdown]
 # ## The margin
@@ -84,8 +91,8 @@ for delay in (0.0, 0.01, 0.02, 0.03, 0.05):
     print(f"{1e3 * delay:3.0f} ms: small errors grow with {margin.growth(delay):+.2f} 1/s")
 
 # %% [markdown]
-# Runs of the nonlinear cell show it, here with estimates that stay as they are, Γ = 0. Below the margin
-# the delay is hardly seen. Beyond it the sixth joints swing ever more, although each arm by itself is well
+# Runs of the nonlinear cell show it, here with estimates that stay as they are, Γ = 0. Below the margin the
+# delay is hardly seen. Beyond it the sixth joints swing ever more, although each arm by itself is well
 # damped.
 
 # %%
@@ -152,7 +159,8 @@ display(delay_map_figure(maps))
 # ## The cure
 #
 # The theorem says it: more K_r for the joint that swings, less K_ε, or just the damping that is missing.
-# `SunMills(injection=True)` adds a/(4Λ) Jᵀ cᵀ K_ε r to the torque, and any constant delay is tolerated again.
+# `SunMills(injection=True)` adds a/(4Λ) Jᵀ cᵀ K_ε r to the torque, and any constant delay is tolerated
+# again.
 
 # %%
 cured = run(Network(delay=longer), gains=fixed, law=SunMills(injection=True))
@@ -166,7 +174,7 @@ learning = run(Network(delay=longer), law=SunMills(injection=True))
 print(certify(learning).delay_condition)
 
 # %%
-HTML(scene_of(learning).html())
+scene_of(learning)
 
 # %% [markdown]
 # ## Robots of their own
@@ -174,3 +182,20 @@ HTML(scene_of(learning).html())
 # `experiment.agents(period)` gives every robot a controller of its own, which knows its own joints and the
 # messages that came, and nothing else: that is what runs on the computers of a real cell.
 # `docs/own_loop.md` shows how.
+
+# %% [markdown]
+# ## Exercises
+#
+# 1. By how much does the margin grow if `K_r` of the sixth joint is doubled? Predict it from the theorem,
+#    then ask `delay_margin`.
+# 2. Let one link alone be late: `delay` may be a matrix, with a row for each sender. Which of the two
+#    directions hurts more?
+# 3. At which loss does "hold" with a period of 10 ms leave the blue? Look at one run there.
+# 4. `Network(event=...)` sends only what is news. How many messages are left, and how much worse is ε?
+# 5. Clocks that are off: `offset=`. What does the certificate call it?
+#
+# ## Further
+#
+# [Robots that hear each other late](../docs/network.md) has the theorems, and [how much delay can a cell
+# take](../docs/delays.md) the analysis. [Taking it to a robot](to_a_robot.ipynb) sends these messages over
+# a wire of your own.

@@ -48,10 +48,11 @@ from synctrl import (
     SynctrlError,
     load_robot,
 )
-from synctrl.analysis import certify, delay_margin
+from synctrl.analysis import advise, certify, delay_margin
 from synctrl.show import scene_of, side_by_side
 from synctrl.show.curves import Curves, overlay
 from synctrl.show.front_figures import front_figure
+from synctrl.show.run_page import write_run_page
 from synctrl.sweep import LogUniform, gain, gain_scale
 from synctrl.tune import tune
 
@@ -117,6 +118,7 @@ URDF = f"""<robot name="crane">
   </joint>
 </robot>
 """
+Path("out").mkdir(exist_ok=True)  # for all that is written here
 Path("out/crane.urdf").write_text(URDF)
 crane = load_robot("out/crane.urdf", tip="hand")
 print(crane)
@@ -223,7 +225,13 @@ print("learned of each arm:", cell.parameters[0].names[-9:])
 gains = Gains.suggest(cell, bandwidth=8.0)  # rad/s
 for name in ("Lambda", "beta", "K_r", "K_eps"):
     print(f"{name:6} {np.round(getattr(gains, name), 2).tolist()}")
-print(delay_margin(cell, gains))
+
+# %% [markdown]
+# Are they good? `advise` looks at small errors along the path: which step and which delay the loop takes,
+# what torque is to be expected against the motors' limits, and what should be changed first, if anything.
+
+# %%
+advise(cell, gains)
 
 # %% [markdown]
 # ## A run
@@ -345,12 +353,16 @@ side_by_side({"independent": alone, "tuned": tuned})
 # %% [markdown]
 # ## Keep it
 #
-# A result is a file without code, which opens years later with its robots. A scene is one HTML file.
+# A result is a file without code, which opens years later with its robots. A scene is one HTML file, and a
+# page has everything to show a colleague: a summary, the certificate in words, figures, and the arms in
+# motion.
 
 # %%
 tuned.save("out/tuned.npz")
 scene_of(tuned).write("out/tuned.html")
-print([(path.name, path.stat().st_size // 1024) for path in sorted(Path("out").glob("tuned.*"))], "kB")
+page = write_run_page(tuned, "out/page", certify(tuned))
+for path in (*sorted(Path("out").glob("tuned.*")), page):
+    print(path, path.stat().st_size // 1024, "kB")
 
 # %% [markdown]
 # ## Exercises

@@ -15,14 +15,20 @@
 #
 # Section V-B of Sun and Mills (2002). Four two-link arms in the plane move their tips along short arcs
 # while they keep their distances. Nobody knows their inertia well: the first estimate is that of links of
-# 0.8 kg and 0.2 m where 1 kg and 0.3 m are true; only positions are computed with the true lengths.
-# What happens when robot 1 is pushed?
+# 0.8 kg and 0.2 m where 1 kg and 0.3 m are true; only positions are computed with the true lengths. What
+# happens when robot 1 is pushed?
+#
+# You will learn
+#
+# - what a cell is: robots, desired motions, a coupling;
+# - what synchronization does where one robot is pushed, and what it does not do;
+# - to read figures of errors, and a certificate that names what acted from outside.
 
 # %%
 # %matplotlib inline
 
 import numpy as np
-from IPython.display import HTML, display
+from IPython.display import display
 
 from synctrl.analysis import certify
 from synctrl.experiments import planar_four
@@ -107,15 +113,25 @@ print(certify(pushed_together))
 
 # %%
 limit = float(np.linalg.norm(pushed_alone.sync_error, axis=2).max())
-HTML(planar_scene(pushed_together, limit=limit).html())
+planar_scene(pushed_together, limit=limit)
 
 # %%
-HTML(planar_scene(pushed_alone, limit=limit).html())
+planar_scene(pushed_alone, limit=limit)
 
 # %% [markdown]
-# ## Try it
+# ## Exercises
 #
-# - `planar_four(phi=0.3)` moves the cell towards the end of the arms' reach; at 0.5 it is out of it, and a
-#   message says so.
-# - `planar_four(gains=GAINS.replace(beta=0))`, with `GAINS` from `synctrl.experiments.planar_four`, shows
-#   that β does most of the work here and K_ε little.
+# 1. `planar_four(phi=0.3)` moves the cell towards the end of the arms' reach. What becomes of the errors?
+#    At 0.5 it is out of reach: what does the message say, and could you mend the cell by it?
+# 2. With `GAINS` from `synctrl.experiments.planar_four`, try `planar_four(gains=GAINS.replace(beta=0))` and
+#    the same with `K_eps=0`. Which of the two gains does the work here?
+# 3. Push robot 2 in place of robot 1: `Disturbance(1, 1.0, 0.5, 0.75)` of `synctrl`, in
+#    `dataclasses.replace(experiment, disturbances=[...])`. Is the cell as symmetric as it looks?
+# 4. Find the smallest push that the certificate still names.
+# 5. Save `together`, load it in a new session, and draw its scene from the file alone.
+#
+# ## Further
+#
+# [Why beta works](why_beta_works.ipynb) explains what you saw. [Ten thousand runs](ten_thousand.ipynb)
+# varies the gains of this very cell. [My robots, my task](my_robots.ipynb) builds a cell from nothing. The
+# law and its proof are in [the theory](../docs/theory.md), the symbols in [notation](../docs/notation.md).

@@ -32,6 +32,7 @@
 # %matplotlib inline
 
 from dataclasses import replace
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -222,6 +223,7 @@ print(f"and on it goes: hands apart by {1e3 * np.linalg.norm(patient.signals.eps
 # `load` reads it into another controller, which goes on as the first one would have.
 
 # %%
+Path("out").mkdir(exist_ok=True)
 patient.save("out/controller.npz")
 another = experiment.controller(PERIOD, faults="hold")
 another.load("out/controller.npz")

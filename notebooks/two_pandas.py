@@ -16,12 +16,18 @@
 # Two arms move side by side, and should stay in step: ε = e_1 - e_2. A quarter of the time on, their hands
 # close around a bar of two kilograms, of which the first arm gets 1.4 kg and the second 0.6 kg. The
 # controllers know their arms exactly and nothing of the bar. What do ways to learn make of it?
+#
+# You will learn
+#
+# - to let robots pick up what nobody told them of;
+# - what five ways to learn make of it, and what that costs;
+# - to ask whether estimates are those of bodies that can exist, and when that matters.
 
 # %%
 # %matplotlib inline
 
 import numpy as np
-from IPython.display import HTML, display
+from IPython.display import display
 
 from synctrl import Cell, Coupling, Cubic, Experiment, Friction, Gains, Member, Payload, load_robot
 from synctrl.analysis.consistency import physical_consistency
@@ -93,8 +99,8 @@ for name, run in runs.items():
 # ## What do they believe to hold?
 #
 # The estimated mass of the last body, hand and load included, less that of the hand; dashed is the truth.
-# Torque does not tell masses one by one: other bodies may take their share, and a wrong mass need not make a
-# wrong torque.
+# Torque does not tell masses one by one: other bodies may take their share, and a wrong mass need not make
+# a wrong torque.
 
 # %%
 with style():
@@ -126,7 +132,22 @@ display(consistency_figure(physical_consistency(runs["Natural(5)"])))
 # Without learning, and with estimates that stay physical.
 
 # %%
-HTML(scene_of(runs["nothing learned"]).html())
+scene_of(runs["nothing learned"])
 
 # %%
-HTML(scene_of(runs["Natural(5)"]).html())
+scene_of(runs["Natural(5)"])
+
+# %% [markdown]
+# ## Exercises
+#
+# 1. Let go of the bar again, with `stop=` of `Payload`. Which way to learn is quickest to forget it?
+# 2. Give both arms the same share of the load. What is left of the synchronization error, and why?
+# 3. Raise the rate of `Natural` threefold, and again. Where does it end, and what does the run warn of?
+# 4. With β = K_ε = 0, `gains.independent()`: how much of what holds the arms in step is learning, and how
+#    much is synchronization?
+#
+# ## Further
+#
+# [Adaptations](../docs/adaptation.md) says of each what it does badly. [An adaptation of your
+# own](own_adaptation.ipynb) writes one more. Arms that really share one load, with forces inside it, are in
+# [carrying](carry.ipynb).

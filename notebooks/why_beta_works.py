@@ -13,19 +13,24 @@
 # %% [markdown]
 # # Why beta works
 #
-# The law adds β times the integral of the synchronization errors to every robot's error. Why does that
-# hold robots together? Because of what it does to the coupled velocity error r on its way to the errors:
-# it is a filter, and β moves one of its poles. Two A460 show it, with friction that their model does not
-# know.
+# The law adds β times the integral of the synchronization errors to every robot's error. Why does that hold
+# robots together? Because of what it does to the coupled velocity error r on its way to the errors: it is a
+# filter, and β moves one of its poles. Two A460 show it, with friction that their model does not know.
 #
 # The proof is in `docs/theorem_b.md`. **Masses, inertias and friction of the A460 are invented**, see the
 # notebook about the two arms.
+#
+# You will learn
+#
+# - to see the law as a filter, one for each mode of the cell;
+# - what β does to the modes in which robots differ, and that it does nothing to the common one;
+# - to read bounds that hold for every run.
 
 # %%
 # %matplotlib inline
 
 import numpy as np
-from IPython.display import HTML, display
+from IPython.display import display
 
 from synctrl.analysis import modal_bounds
 from synctrl.analysis.modal_filter import ModalFilter
@@ -65,8 +70,8 @@ figure
 # %% [markdown]
 # ## The two arms
 #
-# The same controller, with β and without; K_ε goes with it, but is in none of the gains. Friction near
-# rest is faster than the step, of which runs warn; see the notebook about the two arms.
+# The same controller, with β and without; K_ε goes with it, but is in none of the gains. Friction near rest
+# is faster than the step, of which runs warn; see the notebook about the two arms.
 
 # %%
 together = a460_pair().simulate(DURATION, log_dt=1e-2)
@@ -77,9 +82,8 @@ display(sync_errors(together, limits), sync_errors(alone, limits))
 # %% [markdown]
 # ## Bounds, and the runs inside
 #
-# What a run may do at most, given the r that it had, is the dark band. The light band knows no r, only
-# what is stored at first and how much torque the model lacks. The common mode is the same in both
-# figures.
+# What a run may do at most, given the r that it had, is the dark band. The light band knows no r, only what
+# is stored at first and how much torque the model lacks. The common mode is the same in both figures.
 
 # %%
 bounds = {"synchronized": modal_bounds(together), "independent": modal_bounds(alone)}
@@ -107,14 +111,23 @@ for name, found in bounds.items():
 
 # %%
 limit = float(np.linalg.norm(alone.sync_error, axis=2).max())
-HTML(payload_pair_scene(together, limit=limit).html())
+payload_pair_scene(together, limit=limit)
 
 # %%
-HTML(payload_pair_scene(alone, limit=limit).html())
+payload_pair_scene(alone, limit=limit)
 
 # %% [markdown]
-# ## Try it
+# ## Exercises
 #
-# - `Gains.leak` lets the integral forget. The zero of the filter moves from 0 to −l, and a constant r leaves
-#   something again: look at `static` of `ModalFilter`.
-# - `planar_four()` is a ring with three eigenvalues, and β = 100.
+# 1. Draw the gain of the filter for a ring of four, `Coupling.signed_ring(4)`, which has three eigenvalues.
+#    In which mode does β do most?
+# 2. `Gains.leak` lets the integral forget. The zero of the filter moves from 0 to −l, and a constant r
+#    leaves something again: look at `static` of `ModalFilter`.
+# 3. `planar_four()` has β = 100. Compute what the bound of its differences is, and compare it with a run.
+# 4. By the formula, how large does β have to be for the differences to be ten times smaller than the common
+#    mode? Try it, and look at the torque.
+#
+# ## Further
+#
+# [Theorem B](../docs/theorem_b.md) has the proof, [gains](../docs/gains.md) how β is chosen, and [the
+# tube](../docs/tube.md) bounds that need no run at all.

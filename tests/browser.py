@@ -68,12 +68,14 @@ class Page:
 
     Attributes:
         requests: addresses it asked for that are not local.
+        files: addresses of the files that it asked for.
         errors: uncaught exceptions, console errors, blocked resources, dialogs it opened.
     """
 
     pipe: Pipe
     session: str
     requests: list[str] = field(default_factory=list)
+    files: list[str] = field(default_factory=list)
     errors: list[str] = field(default_factory=list)
 
     def call(self, method: str, **parameters: Any) -> dict[str, Any]:
@@ -104,6 +106,12 @@ class Page:
             f"{expression} stayed false for {timeout:g} s; errors of the page: {self.errors}"
         )
 
+    def go(self, path: str | Path, query: str = "") -> None:
+        """Open another local file, with what follows its name in the address."""
+        answer = self.call("Page.navigate", url=Path(path).resolve().as_uri() + query)
+        assert "errorText" not in answer, f"{path}: {answer['errorText']}"
+        self.wait_for("document.readyState == 'complete'")
+
     def check_plays(self) -> None:
         """An animation of MeshCat that runs by itself, in a page without errors that asks for nothing."""
         self.wait_for("typeof viewer === 'object' && viewer.animator.playing")
@@ -124,6 +132,10 @@ class Page:
         match message.get("method"):
             case "Network.requestWillBeSent" if not parameters["request"]["url"].startswith(LOCAL):
                 self.requests.append(parameters["request"]["url"])
+            case "Network.requestWillBeSent" if parameters["request"]["url"].startswith("file:"):
+                self.files.append(parameters["request"]["url"])
+            case "Network.loadingFailed" if not parameters.get("canceled"):
+                self.errors.append(f"not loaded: {parameters.get('errorText')}")
             case "Network.webSocketCreated" | "Network.webTransportCreated":
                 self.requests.append(parameters["url"])
             case "Runtime.exceptionThrown":
@@ -149,8 +161,7 @@ def open_page(path: str | Path, size: tuple[int, int] = (1200, 800)) -> Iterator
             page.call(f"{domain}.enable")
         screen = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
         page.call("Emulation.setDeviceMetricsOverride", **screen)
-        page.call("Page.navigate", url=Path(path).resolve().as_uri())
-        page.wait_for("document.readyState == 'complete'")
+        page.go(path)
         yield page
 
 

@@ -45,7 +45,9 @@ def test_the_page_has_every_kind_and_no_other():
 @pytest.mark.parametrize("name", [name for name, kind in KINDS.items() if not issubclass(kind, Warning)])
 def test_a_section_says_what_its_kind_derives_from(name):
     (told,) = re.findall(r"(?m)^\*A kind of (.*)\.\*$", SECTIONS[name])
-    assert re.findall(r"`(\w+)`", told) == [base.__name__ for base in KINDS[name].__bases__ if base is not Portable]
+    assert re.findall(r"`(\w+)`", told) == [
+        base.__name__ for base in KINDS[name].__bases__ if base is not Portable
+    ]
 
 
 @pytest.mark.parametrize("name", SECTIONS)
@@ -61,7 +63,9 @@ def test_an_example_ends_with_the_error_that_stands_below_it(name, tmp_path, mon
         warnings.simplefilter("ignore")
         exec(compile(code, f"example of {name}", "exec"), {})
     assert type(caught.value) is KINDS[name]
-    assert f"{name}: {caught.value}" == said
+    begin = said.removesuffix("...")
+    message = f"{name}: {caught.value}"
+    assert message == said or (begin != said and message.startswith(begin.rstrip()))
 
 
 def test_what_the_first_example_prints_stands_below_it(capsys):
@@ -72,5 +76,5 @@ def test_what_the_first_example_prints_stands_below_it(capsys):
 
 def test_the_table_has_the_data_of_every_error():
     data = re.findall(r"`(\w+)`", " ".join(re.findall(r"(?m)^\| (`.*?) \|", PAGE)))
-    assert data == [name for name in ("subject", "found", "file", "line", "result", "problem")]
+    assert data == ["subject", "found", "file", "line", "result", "problem"]
     assert all(hasattr(SynctrlError("wrong"), name) for name in data)

@@ -32,7 +32,9 @@ def written(figure):
     """Boxes of all words of a figure that can be seen, in dots."""
     with style():
         figure.canvas.draw()
-        texts = [text for legend in figure.legends for text in legend.get_texts()]
+        own = (panel.get_legend() for panel in figure.axes)
+        every = [*figure.legends, *(legend for legend in own if legend is not None)]
+        texts = [text for legend in every for text in legend.get_texts()]
         for panel in figure.axes:
             texts += [panel.xaxis.label, panel.yaxis.label, panel.yaxis.get_offset_text()]
             texts += [text for text in panel.findobj(Text) if text.get_text() == panel.get_title(loc="left")]

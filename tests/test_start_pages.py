@@ -1,4 +1,4 @@
-"""A newcomer who does what the pages of the chapter Start say gets through: every block of them runs, in order."""
+"""A newcomer who does what the pages of the chapter Start say gets through: every block runs, in order."""
 
 from __future__ import annotations
 
@@ -20,7 +20,13 @@ BLOCK = re.compile(r"(?ms)^```(\w+)\n(.*?)^```$")
 #: what a block is to be saved as, if the text before it says so
 SAVED = re.compile(r"[Ss]ave (?:this|it) as `([\w.]+)`")
 #: what takes long, and what takes its place
-SHORTER = {"simulate(duration=2.0)": "simulate(duration=0.7)", "simulate(2.0)": "simulate(0.3)"}
+SHORTER = {
+    "simulate(duration=2.0)": "simulate(duration=0.7)",
+    "simulate(2.0)": "simulate(0.3)",
+    "synctrl doctor": "synctrl doctor --no-trial",
+    "synctrl run": "synctrl run --duration 0.3",
+    "synctrl compare": "synctrl compare --duration 0.3",
+}
 #: commands of the shell that prepare a machine; what they name is looked at below
 PREPARING = ("python3 -m venv", ". .venv", "pip install")
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]

@@ -287,13 +287,3 @@ def test_the_bench_goes_through_pairs_and_rings():
     rows = list(bench(["planar2r"], BANDWIDTH, (0.0,), (None,), (2, 3)))
     assert [(row[1], row[2]) for row in rows] == [(s, n) for s in ("joint", "position") for n in (2, 3)]
     assert all(row[-1].good for row in rows)
-
-
-def test_the_example_of_the_page_about_gains_runs():
-    page = (SCRIPTS.parent / "docs" / "gains.md").read_text("utf-8")
-    (block,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        names: dict = {}
-        exec(compile(block, "docs/gains.md", "exec"), names)
-    assert names["result"].status == "completed"

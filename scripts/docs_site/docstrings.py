@@ -1,7 +1,7 @@
 """Docstrings of the package as Sphinx reads them: plain words, names in single backticks, indented code.
 
-They follow Google's style, but are no reStructuredText: a * or | in them is a star or an absolute value, and a
-name in backticks is code, and a link where the reference has that name. One item may be about several names.
+They follow Google's style, but are no reStructuredText: a * or | in them is a star or an absolute value, and
+a name in backticks is code, and a link where the reference has that name. One item may have several names.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ SECTIONS = {
 }
 HEADING = re.compile(rf"(?:{'|'.join(SECTIONS)}):\s*$")
 #: what an item of a section begins with: names, and perhaps a word in parentheses
-ITEM = re.compile(r"(\*{0,2}[A-Za-z_]\w*(?:\.\w+)*(?:, \*{0,2}[A-Za-z_]\w*)*)(?: \([^)]*\))?: *(.*)", re.DOTALL)
+ITEM = re.compile(
+    r"(\*{0,2}[A-Za-z_]\w*(?:\.\w+)*(?:, \*{0,2}[A-Za-z_]\w*)*)(?: \([^)]*\))?: *(.*)", re.DOTALL
+)
 CODE = re.compile(r"(`+)(.+?)\1", re.DOTALL)
 #: what would begin markup outside of code
 MARKUP = re.compile(r"([\\*|])|(?<=\w)(_)(?!\w)")
@@ -37,7 +39,7 @@ def as_markup(lines: list[str]) -> list[str]:
         if kind == "words":
             found += escaped("\n".join(block)).split("\n")
         elif kind == "code":
-            found += ["", "::", "", *(f"    {line}" for line in block), ""]
+            found += ["", "::", "", *indented(textwrap.dedent("\n".join(block)).split("\n")), ""]
         else:
             found += ["", f":{SECTIONS[kind]}:", *indented(section(kind, block)), ""]
     return found
@@ -88,7 +90,7 @@ def indented(lines: list[str]) -> list[str]:
 
 
 def escaped(text: str) -> str:
-    """Words with what would be markup escaped, and code in backticks as a link to what it names or as code."""
+    """Words with what would be markup escaped, and code in backticks as a link or as code."""
     pieces, end = [], 0
     for code in CODE.finditer(text):
         pieces += [MARKUP.sub(r"\\\1\2", text[end : code.start()]), linked(" ".join(code[2].split()))]

@@ -7,10 +7,13 @@ import re
 from pathlib import Path
 from typing import Any
 
+from docutils import nodes
+from sphinx import addnodes
+from sphinx.application import Sphinx
+from sphinx.ext.viewcode import _get_full_modname
+
 from docs_site import reference
 from docs_site.docstrings import as_markup
-from docutils import nodes
-from sphinx.application import Sphinx
 
 ROOT = Path(__file__).resolve().parents[2]
 #: defaults that are no code, and what is shown for them
@@ -27,12 +30,20 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Called by Sphinx."""
     names = reference.public_names(reference.example_sources(ROOT))
     app.add_config_value("public_paths", public_paths(names), "env")
-    app.connect("config-inited", lambda app, config: config.html_static_path.append(str(app.srcdir / "_static")))
+    app.connect("config-inited", with_files)
     app.connect("autodoc-process-docstring", markup)
     app.connect("autodoc-process-signature", signed)
     app.connect("autodoc-skip-member", skipped)
     app.connect("missing-reference", resolved)
+    app.connect("doctree-read", with_origins)
+    app.connect("env-updated", sources_lead_back)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def with_files(app: Sphinx, config: Any) -> None:
+    """Take files that the site has as they are from beside its source."""
+    config.html_static_path.append(str(app.srcdir / "_static"))
+    config.html_extra_path.append(str(app.srcdir.parent / "extra"))
 
 
 def public_paths(names: list[reference.Public]) -> dict[str, str]:
@@ -50,7 +61,11 @@ def skipped(app: Sphinx, what: str, name: str, obj: Any, skip: bool, options: An
     """Members that a class has from elsewhere, of tuples, exceptions, arrays, and fields without words."""
     if (inspect.getdoc(obj) or "").startswith("Alias for field number"):
         return True
-    function = getattr(obj, "fget", None) or getattr(obj, "func", None) or inspect.unwrap(obj) if callable(obj) else obj
+    function = (
+        getattr(obj, "fget", None) or getattr(obj, "func", None) or inspect.unwrap(obj)
+        if callable(obj)
+        else obj
+    )
     function = getattr(obj, "fget", function)
     module = getattr(function, "__module__", None)
     return True if isinstance(module, str) and not module.startswith("synctrl") else None
@@ -72,6 +87,24 @@ def readable(signature: str | None) -> str | None:
     return signature
 
 
+def with_origins(app: Sphinx, doctree: nodes.document) -> None:
+    """Give every entry the place under which the page of its source leads back to it."""
+    for signature in doctree.findall(addnodes.desc_signature):
+        module, name = signature.get("module"), signature.get("fullname")
+        origin = f"{_get_full_modname(module, name)}.{name}" if module and name else ""
+        if origin and origin not in signature["ids"] and not origin.startswith("None."):
+            signature["ids"].append(origin)
+
+
+def sources_lead_back(app: Sphinx, env: Any) -> list[str]:
+    """Let pages of sources lead to entries by where things are defined, whatever their public paths are."""
+    modules = getattr(env, "_viewcode_modules", {})
+    for module, entry in modules.items():
+        if entry:
+            modules[module] = (*entry[:3], module)
+    return []
+
+
 def resolved(app: Sphinx, env: Any, node: Any, content: nodes.Element) -> nodes.Element | None:
     """A reference to where something is defined, or to its bare name, leads to where it is public."""
     if node.get("refdomain") != "py":
@@ -86,7 +119,7 @@ def resolved(app: Sphinx, env: Any, node: Any, content: nodes.Element) -> nodes.
 def public(target: str, module: str | None, paths: dict[str, str]) -> str | None:
     """The public path of what a reference is to: a path, or a name of the module, a class or of the front.
 
-    A bare name in small letters is that of an argument more often than that of a function, so that it leads to
+    A bare name in small letters is that of an argument more often than that of a function, so it leads to
     another module only if it is one of those that `import synctrl` has.
     """
     owner, _, member = target.rpartition(".")

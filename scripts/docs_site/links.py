@@ -17,6 +17,8 @@ PIECES = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 
+#: words of a link that are a file's name: on the site it has the title of the page instead
+NAMED = re.compile(r"\[`?[\w./]+\.(?:md|ipynb)`?\]$")
 #: tests that a page names for a statement, in brackets
 TESTS = re.compile(r"\[[^\[\]]*`test_[^\[\]]*\](?!\()")
 
@@ -31,8 +33,8 @@ def relinked(text: str, page: str, places: Mapping[str, str], sources: Mapping[s
         sources: of every module whose source the site shows, its path there.
 
     Returns:
-        The text. Links to files that are on the site lead to their places there, and so do links to modules and
-        their paths in code, which may begin in synctrl/. Of links to other files of the repository the words are left.
+        The text. Links to files that are on the site lead to their places there, and so do links to modules
+        and their paths in code, which may begin in synctrl/. Of links to other files the words are left.
 
     Raises:
         FileNotFoundError: a picture that is not on the site.
@@ -50,7 +52,8 @@ def relinked(text: str, page: str, places: Mapping[str, str], sources: Mapping[s
         origin = posixpath.normpath(posixpath.join(posixpath.dirname(page), path))
         there = places.get(origin)
         if there is not None:
-            return f"{found['words']}({posixpath.relpath(there, here)}{hash_}{anchor})"
+            words = "[]" if NAMED.match(found["words"]) else found["words"]
+            return f"{words}({posixpath.relpath(there, here)}{hash_}{anchor})"
         if origin in sources:
             return shown(found["words"][1:-1].strip("`"), posixpath.relpath(sources[origin], here))
         if found["words"].startswith("!"):
@@ -66,13 +69,15 @@ def shown(words: str, target: str) -> str:
 
 
 def contents(index: str) -> dict[str, list[tuple[str, str]]]:
-    """Sections of the index, each with its links to pages, as (words, path), in the order in which they stand."""
+    """Sections of the index, each with its links to pages, as (words, path), in their order."""
     sections: dict[str, list[tuple[str, str]]] = {}
     for part in re.split(r"(?m)^## ", index)[1:]:
         title, _, body = part.partition("\n")
         links = [(found["words"][1:-1], found["target"]) for found in PIECES.finditer(body) if found["link"]]
         pages = [(words, path) for words, path in links if not OUTSIDE.match(path) and "#" not in path]
-        sections[title.strip()] = list({path: (words, path) for words, path in reversed(pages)}.values())[::-1]
+        sections[title.strip()] = list({path: (words, path) for words, path in reversed(pages)}.values())[
+            ::-1
+        ]
     return sections
 
 
@@ -81,12 +86,15 @@ def with_toctrees(index: str, others: Mapping[str, list[str]]) -> str:
 
     Args:
         index: Markdown, with links to pages of the site.
-        others: by section, pages that it does not name, which come last.
+        others: by section, pages that it does not name, which come last and are named by their titles.
     """
-    trees = []
-    for title, pages in contents(index).items():
-        entries = [f"{words.replace('`', '')} <{path}>" for words, path in pages]
-        entries += others.get(title, [])
+    head, *sections = re.split(r"(?m)^(?=## )", index)
+    shown, trees = [head], []
+    for section, (title, pages) in zip(sections, contents(index).items(), strict=True):
+        more = others.get(title, [])
+        listed = section.rstrip().rpartition("\n")[2].startswith("- ")
+        shown += [section.rstrip(), "\n" if listed else "\n\n", *(f"- [](/{path})\n" for path in more), "\n"]
+        entries = [*(f"{words.replace('`', '')} <{path}>" for words, path in pages), *more]
         if entries:
             trees.append("\n".join(["```{toctree}", ":hidden:", f":caption: {title}", "", *entries, "```"]))
-    return "\n\n".join([index.rstrip(), *trees]) + "\n"
+    return "".join(shown) + "\n\n".join(trees) + "\n"

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import inspect
 import re
+import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from importlib import import_module
@@ -77,14 +78,26 @@ def public_names(sources: Iterable[str] = ()) -> list[Public]:
         for name in getattr(package, "__all__", ())
     ]
     errors = import_module("synctrl.errors")
-    kinds = [name for name, kind in vars(errors).items() if _is_kind(kind) and kind.__module__ == "synctrl.errors"]
+    kinds = [
+        name for name, kind in vars(errors).items() if _is_kind(kind) and kind.__module__ == "synctrl.errors"
+    ]
     pairs = [*(("synctrl.errors", name) for name in kinds), *sorted(imported(sources))]
     known = {(each.module, each.name) for each in found}
     for module, name in dict.fromkeys(pair for pair in pairs if pair not in known):
-        thing = getattr(import_module(module), name)
-        if not inspect.ismodule(thing):
+        thing = current(module, name)
+        if thing is not None and not inspect.ismodule(thing):
             found.append(Public(module, name, thing))
     return found
+
+
+def current(module: str, name: str) -> Any:
+    """What a module has under a name; None where that is an old name."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DeprecationWarning)
+        try:
+            return getattr(import_module(module), name)
+        except DeprecationWarning:
+            return None
 
 
 def imported(sources: Iterable[str]) -> set[tuple[str, str]]:
@@ -100,9 +113,11 @@ def imported(sources: Iterable[str]) -> set[tuple[str, str]]:
 def example_sources(root: Path) -> Iterator[str]:
     """Blocks of Python in the pages, notebooks as scripts, and the scripts of the gallery."""
     for page in [root / "README.md", *sorted((root / "docs").rglob("*.md"))]:
-        for block in re.findall(r"(?ms)^```python\n(.*?)^```", page.read_text("utf-8")):
-            yield block
-    for script in [*sorted((root / "notebooks").glob("*.py")), *sorted((root / "scripts/examples").glob("*.py"))]:
+        yield from re.findall(r"(?ms)^```python\n(.*?)^```", page.read_text("utf-8"))
+    for script in [
+        *sorted((root / "notebooks").glob("*.py")),
+        *sorted((root / "scripts/examples").glob("*.py")),
+    ]:
         yield re.sub(r"(?m)^%.*", "", script.read_text("utf-8"))
 
 
@@ -147,7 +162,10 @@ def table(names: list[Public], chosen: dict[str, Public]) -> list[str]:
     """A table of names, each a link to its entry, with the first sentence about it."""
     lines = [".. list-table::", "   :class: names", "   :widths: 1 2", ""]
     for each in sorted(names, key=lambda each: each.name.lower()):
-        lines += [f"   * - :py:obj:`{each.name} <{chosen[each.origin].path}>`", f"     - {escaped(first_line(each.thing))}"]
+        lines += [
+            f"   * - :py:obj:`{each.name} <{chosen[each.origin].path}>`",
+            f"     - {escaped(first_line(each.thing))}",
+        ]
     return [*lines, ""]
 
 
@@ -180,7 +198,9 @@ def heading(words: str, line: str) -> list[str]:
 def _rooms() -> list[str]:
     """Rooms in the order in which a user meets them."""
     first = ["", "experiments", "robots", "tasks", "coupling", "control", "simulation", "show", "analysis"]
-    there = sorted(path.stem for path in Path(synctrl.__file__).parent.iterdir() if not path.stem.startswith("_"))
+    there = sorted(
+        path.stem for path in Path(synctrl.__file__).parent.iterdir() if not path.stem.startswith("_")
+    )
     return [*first, *(room for room in there if room not in first)]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import posixpath
 import shutil
 from collections.abc import Iterable, Mapping
@@ -9,11 +10,13 @@ from pathlib import Path
 
 from docs_site.links import contents, relinked, with_toctrees
 
+ROOT = Path(__file__).resolve().parents[2]
 #: pages from the top of the repository, and the folder of the site for them
 TOP, PROJECT = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md"), "project"
 PICTURES = {".png", ".svg", ".gif", ".webp", ".jpg"}
 #: sections of the index for pages that it does not name, by the folder in which they are; else the last
 SECTIONS = {"start": "Start", "tutorials": "Tutorials", "howto": "How-to", "reference": "Reference"}
+ALONE = {"gallery.md": "Gallery"}
 ELSE = "Explanation"
 
 
@@ -34,7 +37,7 @@ def stage(root: Path, source: Path, made: Iterable[str], sources: Mapping[str, s
     Args:
         root: the repository.
         source: folder of the source; files there that are the same already are left alone.
-        made: pages, as paths in the source, that others write.
+        made: pages, as paths in the source, that others write, also in the place of one of the repository.
         sources: of every module whose source the site shows, its path there.
 
     Returns:
@@ -44,7 +47,7 @@ def stage(root: Path, source: Path, made: Iterable[str], sources: Mapping[str, s
     written = []
     for origin, place in where.items():
         file = source / place
-        if origin.endswith(".ipynb"):
+        if origin.endswith(".ipynb") or place in made:
             continue
         if origin.endswith(".md"):
             text = relinked((root / origin).read_text("utf-8"), origin, where, sources)
@@ -58,12 +61,13 @@ def stage(root: Path, source: Path, made: Iterable[str], sources: Mapping[str, s
 
 
 def unnamed(index: str, pages: Iterable[str]) -> dict[str, list[str]]:
-    """By section of the index, the pages that it does not name, and that no page of a folder of theirs names."""
+    """By section of the index, the pages that it does not name."""
     named = {path for links in contents(index).values() for _, path in links} | {"index.md"}
     found: dict[str, list[str]] = {}
     for page in pages:
         if page not in named and page.endswith((".md", ".rst", ".ipynb")):
-            found.setdefault(SECTIONS.get(posixpath.dirname(page), ELSE), []).append(page)
+            section = ALONE.get(page) or SECTIONS.get(posixpath.dirname(page), ELSE)
+            found.setdefault(section, []).append(page)
     return found
 
 
@@ -72,6 +76,14 @@ def keep(file: Path, content: bytes) -> None:
     if not file.is_file() or file.read_bytes() != content:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(content)
+
+
+def digest(files: Iterable[Path], *words: str) -> str:
+    """What files, words and all code of the package are, as a short text."""
+    found = hashlib.sha256("\0".join(words).encode())
+    for file in [*files, *sorted((ROOT / "synctrl").rglob("*.py"))]:
+        found.update(file.read_bytes())
+    return found.hexdigest()[:16]
 
 
 def sweep(source: Path, kept: Iterable[Path]) -> None:

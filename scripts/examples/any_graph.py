@@ -15,7 +15,7 @@ edges = [(0, 1, 1.0), (1, 2, 1.0), (0, 2, 1.0), (3, 4, 1.0), (2, 3, 0.2)]  # fro
 coupling = Coupling.from_graph(edges)
 arm, rng = load_robot("planar2r"), np.random.default_rng(2)
 way = Cubic([0.2, 1.0], [0.9, 0.5], duration=1.0)
-starts = [0.2, 1.0] + rng.uniform(-0.3, 0.3, (5, 2))  # rad, each off its path
+starts = np.array([0.2, 1.0]) + rng.uniform(-0.3, 0.3, (5, 2))  # rad, each off its path
 members = [Member(arm.placed((0, 0.7 * k, 0)), way, q0=q0) for k, q0 in enumerate(starts)]
 gains = Gains(Lambda=2, beta=5, K_r=2, K_eps=20, Gamma=0.05)
 run = simulate(Cell(members, coupling, name="any graph"), gains, 0.1 if short else 2.0, dt=1e-3)

@@ -1,25 +1,16 @@
 """A circle in Cartesian space: two UR5 whose tips go round on circles that face each other.
 
-Paths are those of the tips, in metres. Where a robot is not told from which joint positions it starts, inverse
-kinematics finds them on the path; here both start a few centimetres off, and know of their masses 0.7 and 0.4.
+Paths are those of the tips, in metres. Both arms start a few centimetres off, where inverse kinematics
+finds joint positions for them, and know different shares of their own masses.
 """
 
 import numpy as np
 from example import arguments
 
-from synctrl import (
-    CartesianSpace,
-    Cell,
-    Circle,
-    Coupling,
-    Gains,
-    Member,
-    inverse_kinematics,
-    load_robot,
-    simulate,
-)
+from synctrl import CartesianSpace, Cell, Circle, Coupling, Gains, Member, load_robot, simulate
 from synctrl.show import scene_of
 from synctrl.show.plots import new_figure, save, style
+from synctrl.tasks.inverse_kinematics import reach
 
 out, short = arguments(__doc__)
 posture = [0.0, -1.3, 1.9, -2.17, -1.57, 0.0]  # rad, where inverse kinematics begins
@@ -27,7 +18,7 @@ members = []
 for k, (side, off, known) in enumerate(((-1.0, [0.03, 0, 0], 0.7), (1.0, [0, 0.01, -0.02], 0.4))):
     robot = load_robot("ur5").placed((0, 0.75 * side, 0), (0, 0, -side * np.pi / 2), name=f"UR5 {k + 1}")
     circle = Circle((0, 0.25 * side, 0.4), 0.12, speed=np.pi, first=(1, 0, 0), second=(0, 0, 1))
-    q0 = inverse_kinematics(robot, circle(0.0).x + off, np.array(posture))
+    q0 = reach(robot, circle(0.0).x + off, np.array(posture))
     members.append(Member(robot, circle, q0, theta_hat0=known * robot.inertial_parameters))
 cell = Cell(members, Coupling.pair(), CartesianSpace("xyz"), name="two circles")
 gains = Gains.suggest(cell, bandwidth=6.0)

@@ -1,6 +1,7 @@
-"""Desired motions: a cubic, a circle, an approach, and a function of your own of which only the position is said.
+"""Desired motions: a cubic, a circle, an approach, and a function of your own.
 
-`SmoothTrajectory` finds velocity and acceleration of a function by itself, and refuses one that has none.
+Of a function only the position is said: `SmoothTrajectory` finds velocity and acceleration by itself, and
+refuses a function that has none.
 """
 
 import numpy as np

@@ -12,7 +12,8 @@ from synctrl.show.plots import save
 out, short = arguments(__doc__)
 LINK = """<link name="link{k}"><inertial><origin xyz="0 0 0.2"/><mass value="3"/>
   <inertia ixx="0.04" iyy="0.04" izz="0.004" ixy="0" ixz="0" iyz="0"/></inertial>
-  <visual><origin xyz="0 0 0.2"/><geometry><cylinder radius="0.05" length="0.4"/></geometry></visual></link>"""
+  <visual><origin xyz="0 0 0.2"/><geometry><cylinder radius="0.05" length="0.4"/></geometry></visual>
+  </link>"""
 JOINT = """<joint name="joint{k}" type="revolute"><parent link="link{p}"/><child link="link{k}"/>
   <origin xyz="0 0 {z}"/><axis xyz="{axis}"/>
   <limit lower="-3" upper="3" velocity="3" effort="80"/></joint>"""

@@ -1,7 +1,7 @@
 """A push: one arm of four is disturbed, and the others follow it, so that they stay together.
 
-The paper's own cell: 1 N·m for a quarter of a second. What a pushed robot costs its neighbours, and what they
-spare it.
+The paper's own cell: 1 N·m for a quarter of a second. What a pushed robot costs its neighbours, and what
+they spare it.
 """
 
 import numpy as np

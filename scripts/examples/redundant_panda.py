@@ -6,35 +6,24 @@ With a posture they go back to it, without one they drift. The tip does not noti
 import numpy as np
 from example import arguments
 
-from synctrl import (
-    CartesianSpace,
-    Cell,
-    Circle,
-    Coupling,
-    Friction,
-    Gains,
-    Member,
-    Redundancy,
-    load_robot,
-    simulate,
-)
+from synctrl import CartesianSpace, Cell, Circle, Coupling, Friction, Gains, Member, Redundancy, load_robot
 from synctrl.show import side_by_side
 from synctrl.show.plots import new_figure, save, style
+from synctrl.simulation.simulate import simulate
 
 out, short = arguments(__doc__)
 posture = np.array([0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8])
-arms = [load_robot("panda").placed((0, y, 0), name=f"Panda {k + 1}") for k, y in enumerate((-0.4, 0.4))]
+members = []
+for k, y in enumerate((-0.4, 0.4)):
+    arm = load_robot("panda").placed((0, y, 0), name=f"Panda {k + 1}")
+    center = arm.tip_position(posture) - [0.15, 0, 0]
+    circle = Circle(center, 0.15, speed=2 * np.pi, first=(1, 0, 0), second=(0, 0.8, 0.6))
+    known = {"theta_hat0": arm.inertial_parameters, "friction": Friction()}
+    members.append(Member(arm, circle, q0=posture, name=arm.name, **known))
 
 
 def cell(redundancy):
-    members = []
-    for arm in arms:
-        center = arm.tip_position(posture) - [0.15, 0, 0]
-        circle = Circle(center, 0.15, speed=2 * np.pi, first=(1, 0, 0), second=(0, 0.8, 0.6))
-        members.append(
-            Member(arm, circle, q0=posture, theta_hat0=arm.inertial_parameters, friction=Friction())
-        )
-    return Cell(members, Coupling.pair(), CartesianSpace("xyz", redundancy=redundancy), name="two Pandas")
+    return Cell(members, Coupling.pair(), CartesianSpace("xyz", redundancy=redundancy))
 
 
 ways = {"with a posture": Redundancy(posture, gain=4.0), "without": Redundancy()}

@@ -1,22 +1,14 @@
 """A synchronization function: say what must stay true, and the weights follow from it.
 
-Two sliders of a drawing machine: the second has to be at twice the angle of the first, less a little that
-changes with time. f(x_1, x_2, t) = 0 is all that is written down.
+The second arm has to be at twice the angles of the first, less a little that changes with time. f = 0 is
+all that is written down; here it is held while the first arm is pushed.
 """
 
 import numpy as np
 from example import arguments
 
-from synctrl import (
-    Cell,
-    Disturbance,
-    Gains,
-    Member,
-    SmoothTrajectory,
-    SynchronizationFunction,
-    load_robot,
-    simulate,
-)
+from synctrl import Cell, Disturbance, Gains, Member, SmoothTrajectory, load_robot, simulate
+from synctrl.coupling.synchronization import SynchronizationFunction
 from synctrl.show.plots import new_figure, save, style
 
 out, short = arguments(__doc__)

@@ -1,6 +1,7 @@
 """Two arms in sync: each tracks its own path, and makes up for what the other one is late.
 
-The second arm rubs four times as hard as the first, and neither controller knows. Beta and K_eps couple them.
+The second arm rubs four times as hard as the first, and neither controller knows. Beta and K_eps couple
+them.
 """
 
 import numpy as np

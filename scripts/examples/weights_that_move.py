@@ -1,7 +1,7 @@
 """Weights that move: two wheels turn as a curve demands, whose radius changes on the way.
 
-Example 2 of the paper: a vehicle stays on its path as long as the angles of its wheels, each over the radius
-of its track, agree. The weights of the errors are these radii, functions of time.
+Example 2 of the paper: a vehicle stays on its path as long as the angles of its wheels, each over the
+radius of its track, agree. The weights of the errors are these radii, functions of time.
 """
 
 import numpy as np

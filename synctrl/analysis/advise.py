@@ -20,12 +20,13 @@ from ..coupling.cell import Cell
 from ..simulation.closed_loop import ClosedLoop
 from ..simulation.simulate import Experiment
 from .advice import Advice
-from .delay_margin import delay_margin
+from .delay_margin import DelayMargin, delay_margin
+from .equipped import equipment
 from .expected_torque import ExpectedTorque, existing, expected_torque, on_path
 from .gain_case import Case, Change, longest_by_rates
 from .gain_rules import Rule, changes, slow, swinging, too_fast, too_strong
-from .linear_loop import Linearized, Place, modes_of
-from .network_rule import too_late
+from .late_rules import too_lagged, too_late
+from .linear_loop import Linearized, LinearLoop, Place, modes_of
 
 #: places of the path at which the loop is held, beside its start
 PLACES = 4
@@ -77,9 +78,8 @@ def advise_run(experiment: Experiment, dt: float = 1e-3, control_period: float |
         other = replace(experiment, gains=gains).closed_loop()
         return expected_torque(other, at_rest(other).loop(), times, states)
 
-    rules = _rules(case, longest, experiment, torque)
-    found = tuple(changes(case, rules))
-    delay = delay_margin(loop.cell, case.gains, k_r_space=loop.controller.k_r_space)
+    found = tuple(changes(case, _rules(case, longest, experiment, torque)))
+    delay = _delay(experiment, control_period)
     return Advice(
         loop.cell, case.gains, dt, control_period, *longest, tuple(modes), delay, torque(case.gains),
         case.shares, *_joints(case, held), found,
@@ -136,12 +136,18 @@ def _rules(
         return min((mode.damping for mode in modes if mode.gain == "Gamma"), default=1.0)
 
     used = longest[case.period is not None]
+    lags = equipment(experiment.sensors, experiment.actuators, case.period)
+
+    def linear(gains: Gains) -> LinearLoop:
+        return at_rest(replace(experiment, gains=gains).closed_loop()).loop()
+
     return [
         lambda case: too_fast(case, used),
+        lambda case: too_lagged(case, lags, linear),
         lambda case: too_late(case, experiment.network),
         lambda case: too_strong(case, torque),
         lambda case: swinging(case, damping),
-        slow,
+        lambda case: iter(()) if experiment.sensors or experiment.actuators else slow(case),
     ]
 
 
@@ -155,3 +161,10 @@ def _joints(case: Case, held: Sequence[Linearized]) -> tuple[np.ndarray, np.ndar
         damping[i, :k] = K if case.in_joints else (J * K[:, None] * J).sum(axis=0)
     spring[existing(cell)] = np.max([np.diag(each.G) for each in held], axis=0)
     return inertia, damping, spring
+
+
+def _delay(experiment: Experiment, control_period: float | None) -> DelayMargin:
+    """How much delay between robots it takes, with the devices in its loop."""
+    devices = {"sensors": experiment.sensors, "actuators": experiment.actuators}
+    held = {"control_period": control_period, **devices, "k_r_space": experiment.k_r_space}
+    return delay_margin(experiment.cell, experiment.gains, **held)  # type: ignore[arg-type]

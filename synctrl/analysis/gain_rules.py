@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..control.gains import Gains
-from ..control.suggest import cut, learning, stiffness, wished
+from ..control.suggest import Arm, cut, learning, stiffness, wished
 from ..robots.model import unit_for
 from .expected_torque import ExpectedTorque
 from .gain_case import Case, Change
@@ -21,8 +21,10 @@ from .gain_case import Case, Change
 MARGIN, SHORTENED = 0.9, 0.4
 #: damping ratio of what is learned, below which it swings too much
 SWINGING = 0.25
-#: change of K_r that is worth a word, as a share
+#: change that is worth a word, as a share
 WORTH = 0.05
+#: torque above the limit, as a share, that is not worth a word
+ROUNDING = 1e-3
 #: of Lambda and beta: the least share to which they are lowered for the sake of torque
 LEAST = 0.05
 #: how exactly that share is found
@@ -75,7 +77,7 @@ def _lowered(case: Case, name: str) -> Change | None:
         why = f"with {case.pace} its modes have to stay below {case.rates.room:.3g} 1/s"
         return _damped(case, K_r, "diverges", why)
     if name == "K_eps":
-        return coupled(case, "it is a spring too stiff for the damping") if case.in_joints else None
+        return coupled(case, "diverges", "it is a spring too stiff for the damping")
     return _at_most(case, name, case.top / 4 / (case.loop.cell.largest_share if name == "beta" else 1.0))
 
 
@@ -87,8 +89,10 @@ def _at_most(case: Case, name: str, most: float) -> Change:
     return Change("diverges", name, None, None, float(gain.max()), most, "1/s", why, changed.gains)
 
 
-def coupled(case: Case, why: str) -> Change | None:
+def coupled(case: Case, urgency: str, why: str) -> Change | None:
     """K_eps as `Gains.suggest` has it: every constant delay is tolerated; None if it is no larger now."""
+    if not case.in_joints:
+        return None
     gain, rates = case.controller.K_eps, case.rates
     arms = zip(case.arms, case.K_r, strict=True)
     most = np.min([stiffness(arm, K, case.loop.cell, rates) for arm, K in arms], axis=0)
@@ -96,7 +100,7 @@ def coupled(case: Case, why: str) -> Change | None:
     if gain[at] <= most[at]:
         return None
     gains = case.changed(K_eps=np.minimum(gain, most)).gains
-    return Change("diverges", "K_eps", None, None, float(gain[at]), float(most[at]), "", why, gains)
+    return Change(urgency, "K_eps", None, None, float(gain[at]), float(most[at]), "", why, gains)
 
 
 def _shorter(case: Case, longest: float) -> Change:
@@ -119,10 +123,10 @@ def swinging(case: Case, damping: Callable[[Gains], float]) -> Iterator[Change]:
 def _learning(case: Case, urgency: str) -> Change | None:
     """Gamma in the metric of the bodies, as fast as the damping allows; None if it is no faster now."""
     Gamma, rates, worst = case.Gamma, case.rates, int(np.argmax(case.shares))
-    if Gamma is None or case.shares[worst] <= 1:
+    if Gamma is None or case.shares[worst] <= 1 + WORTH:
         return None
     new = [learning(arm, K, rates.Lambda, rates) for arm, K in zip(case.arms, case.K_r, strict=True)]
-    at = int(np.argmax(Gamma[worst] / new[worst]))
+    at = _pulls_most(case.arms[worst], Gamma[worst])
     why = (
         f"estimates move {case.shares[worst]:.3g} times as fast as the damping can follow, "
         f"{case.loop.cell.parameters[worst].names[at]} most of all; in the metric of the bodies each has a "
@@ -130,6 +134,13 @@ def _learning(case: Case, urgency: str) -> Change | None:
     )
     found, to = float(Gamma[worst][at]), float(new[worst][at])
     return Change(urgency, "Gamma", worst, None, found, to, "", why, case.changed(Gamma=new).gains)
+
+
+def _pulls_most(arm: Arm, Gamma: np.ndarray) -> int:
+    """The parameter whose estimate moves the torque most along the path."""
+    on = zip(arm.q, arm.v, arm.a, strict=True)
+    Y = np.array([arm.parameters.regressor(q, v, v, a) for q, v, a in on])
+    return int(np.argmax(Gamma * (Y**2).sum(axis=1).max(axis=0)))
 
 
 def slow(case: Case) -> Iterator[Change]:
@@ -172,7 +183,7 @@ def too_strong(case: Case, expected: Callable[[Gains], ExpectedTorque]) -> Itera
     """
     torque = expected(case.gains)
     robot, joint = (int(k) for k in np.unravel_index(np.argmax(torque.share), torque.share.shape))
-    if torque.share[robot, joint] <= 1:
+    if torque.share[robot, joint] <= 1 + ROUNDING:
         return
     unit = unit_for("N·m", case.arms[robot].robot.joint_units[joint])
     limit, peak = float(torque.limit[robot, joint]), float(torque.peak[robot, joint])
@@ -211,7 +222,7 @@ def _gentler(case: Case, why: str, expected: Callable[[Gains], ExpectedTorque]) 
 
 def _nearer(case: Case, torque: ExpectedTorque, robot: int, joint: int, why: str) -> Change:
     """A start nearer to the path: what errors add to the torque is in proportion to them."""
-    rest = float(torque.path[robot, joint])
-    share = max(0.0, (torque.limit[robot, joint] - rest) / (torque.peak[robot, joint] - rest))
+    limit, peak, rest = (float(x[robot, joint]) for x in (torque.limit, torque.peak, torque.path))
+    share = max(0.0, (limit - rest) / (peak - rest))
     words = "times as far from the path, with estimates that much nearer to the truth"
     return Change("torque", "start", robot, joint, 1.0, MARGIN * share, words, why, case.gains)

@@ -86,6 +86,19 @@ def assembly_figure(
     return curves_figure(result, CURVES[name][1](result), width, style)
 
 
+def internal_forces(result: Result, *, width: float | None = None, style: str | None = None) -> Figure:
+    """Size of the internal force at each hand of what several hands carry, and of the moment.
+
+    Args:
+        result: the run.
+        width, style: of the figure, see `look.look_of`.
+
+    Raises:
+        InputError: nothing is carried.
+    """
+    return assembly_figure(result, name="internal_force", width=width, style=style)
+
+
 def has(result: Result, name: str) -> bool:
     """Whether a run has what one of the figures of `CURVES` shows, all of it known."""
     values = result.outputs.get(CURVES[name][0])

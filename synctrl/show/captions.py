@@ -22,6 +22,10 @@ CAPTIONS: Mapping[str, str] = MappingProxyType(
         "gap_error": "By how much the gap between two robots on one path is off.",
         "phase": "How far along the desired motion is, where the feed gives way.",
         "feed": "How fast it goes, as a share of the speed that is planned.",
+        "tip_path": "Paths of the tips, and where they should go, dash-dot; all panels have the same scale.",
+        "phase_portrait": "Errors and their rates; along the dashed line errors vanish as Λ says.",
+        "spectrum": "Amplitudes of errors and torques by frequency.",
+        "consistency": "Below zero, the dashed line, an estimate is that of no body that can exist.",
         "lyapunov": "V and V' with their terms; dashed is what acts outside the theorem.",
     }
 )

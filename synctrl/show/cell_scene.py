@@ -66,7 +66,7 @@ def scene_of(
         InputError: nothing to show, or a robot that cannot be made again, by name.
     """
     check_run(result, "x", "x_desired", "sync_error", "q", "disturbance")
-    robots, frames = _robots(result, experiment, package_dirs), frame_indices(result, fps)
+    robots, frames = robots_of(result, experiment, package_dirs), frame_indices(result, fps)
     scene, scale = arms.arms_scene(result, robots, frames, fps, meshes=meshes), _scale(robots)
     marks = _add_marks(scene, result, robots, frames, limit, scale)
     carried = carried_scene.add_carried(scene, result, robots, frames, force, bead_error, scale)
@@ -85,16 +85,20 @@ def _add_marks(
 ) -> list[str]:
     """Tips, their desired paths and bars between them; returns what a caption says of them."""
     tips = arms.tip_positions(robots, result.q[frames])
-    desired = _desired_tips(result, robots, frames, tips)
+    desired = desired_tips(result, robots, frames, tips)
     _add_tips(scene, result, tips, desired, scale)
     bars = _add_bars(scene, result, tips, frames, limit, scale)
     return _caption(robots, result, desired is not None, bars)
 
 
-def _robots(
-    result: Result, experiment: Experiment | None, package_dirs: Iterable[str | Path]
+def robots_of(
+    result: Result, experiment: Experiment | None = None, package_dirs: Iterable[str | Path] = ()
 ) -> Sequence[Robot]:
-    """The robots of a run: those of its experiment, or made again."""
+    """The robots of a run: those of its experiment, or made again.
+
+    Raises:
+        InputError: one cannot be made again, by name, or the experiment is that of another cell.
+    """
     if experiment is not None or result.experiment is not None:
         return shown_experiment(result, experiment).cell.robots
     robots = []
@@ -117,7 +121,7 @@ def _scale(robots: Sequence[Robot]) -> float:
     return float(np.median(reaches)) if reaches else NO_REACH
 
 
-def _desired_tips(
+def desired_tips(
     result: Result, robots: Sequence[Robot], frames: np.ndarray, tips: np.ndarray
 ) -> np.ndarray | None:
     """Where the tips should be, (T, n, 3), m; None in a space that does not say it.

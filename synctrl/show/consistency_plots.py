@@ -4,11 +4,44 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..analysis.consistency import Consistency
+from ..analysis.consistency import Consistency, physical_consistency
+from ..simulation.result import Result
+from ..simulation.simulate import Experiment
+from .curves import Curves, curves_figure
 from .plots import new_figure, style
+from .runs import check_run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+def consistency(
+    result: Result,
+    experiment: Experiment | None = None,
+    *,
+    width: float | None = None,
+    style: str | None = None,
+) -> Figure:
+    """The smallest eigenvalue of every estimated body over time, a panel for each robot.
+
+    Below the dashed line, which is zero, the estimates are those of no body that can exist.
+
+    Args:
+        result: the run.
+        experiment: what made it; needed for a result loaded from a file.
+        width, style: of the figure, see `look.look_of`.
+
+    Raises:
+        InputError: no experiment, or parameters that are not those of bodies.
+    """
+    check_run(result, "theta_hat")
+    found = physical_consistency(result, experiment)
+    label = "smallest eigenvalue"
+    curves = [
+        Curves(name, label, values, [f"body {k + 1}" for k in range(values.shape[1])], [(0.0,)])
+        for name, values in zip(found.names, found.smallest, strict=True)
+    ]
+    return curves_figure(result, curves, width, style)
 
 
 def consistency_figure(consistency: Consistency) -> Figure:

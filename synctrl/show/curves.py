@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 #: height of a panel, inches
 PANEL = 1.5
+#: so many names may a line style of an overlay have
+MOST_NAMES = 2
 
 
 class Curves(NamedTuple):
@@ -98,7 +100,7 @@ def overlay(
     Raises:
         InputError: no runs, or runs with other curves than the first.
     """
-    drawn = {name: list(curves_of(run)) for name, run in _named(runs).items()}
+    drawn = {name: list(curves_of(run)) for name, run in named(runs).items()}
     first = next(iter(drawn.values()))
     layers = [(run, _alike(own, first)) for run, own in zip(runs.values(), drawn.values(), strict=True)]
     return in_look(style, width, partial(_layers, list(drawn), layers))
@@ -107,8 +109,11 @@ def overlay(
 def _layers(names: Sequence[str], layers: Sequence[tuple[Result, Sequence[Curves]]], width: float) -> Figure:
     from matplotlib.lines import Line2D
 
-    count = len(layers[0][1])
+    first = layers[0][1]
+    count, styles = len(first), _style_names(first)
     handles = [Line2D([], [], color=robot_color(i), label=plain(name)) for i, name in enumerate(names)]
+    for k, name in enumerate(styles or ()):
+        handles.append(Line2D([], [], color="#555555", ls=line_style(k), label=plain(name)))
     above = [LEGEND * legend_rows(handles, width) + TITLE, *[TITLE] * (count - 1)]
     figure, panels = stacked_panels([PANEL] * count, above, width)
     for i, (run, own) in enumerate(layers):
@@ -117,12 +122,18 @@ def _layers(names: Sequence[str], layers: Sequence[tuple[Result, Sequence[Curves
                 panel.plot(run.t, values, ls=line_style(k), color=robot_color(i))
             _draw_levels(panel, shown)
             panel.set_ylabel(shown.label)
-            panel.set_title(plots.titled(_styled(shown), width), loc="left")
+            title = _styled(shown) if styles is None else shown.title
+            panel.set_title(plots.titled(title, width), loc="left")
     legend(figure, handles)
     return figure
 
 
-def _named(runs: Mapping[str, Result]) -> Mapping[str, Result]:
+def named(runs: Mapping[str, Result]) -> Mapping[str, Result]:
+    """The runs, if they are some by name.
+
+    Raises:
+        InputError: they are not.
+    """
     instance("runs", runs, Mapping, "runs by name")
     if not runs:
         raise InputError("expected at least one run, found none", subject="runs")
@@ -135,6 +146,18 @@ def _alike(own: Sequence[Curves], first: Sequence[Curves]) -> Sequence[Curves]:
     if shapes != expected:
         raise InputError("expected runs with the same curves", subject="runs", found=shapes)
     return own
+
+
+def _style_names(panels: Sequence[Curves]) -> list[str] | None:
+    """What every line style stands for, if that is much the same in all panels; else None.
+
+    None at all where no panel has more than one curve.
+    """
+    most = max(len(each.names) for each in panels)
+    if most == 1:
+        return []
+    columns = [[*dict.fromkeys(each.names[k] for each in panels if k < len(each.names))] for k in range(most)]
+    return [" or ".join(names) for names in columns] if max(map(len, columns)) <= MOST_NAMES else None
 
 
 def _styled(shown: Curves) -> str:

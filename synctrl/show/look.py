@@ -144,6 +144,9 @@ def _look() -> Any:
 
 
 def _sizes(look: Look) -> Any:
+    """What a look sets beside the style sheet: sizes, letters, and the colours of whatever has none."""
+    from matplotlib.rcsetup import cycler
+
     words = {
         "font.size": SIZE,
         "axes.titlesize": TITLE_SIZE,
@@ -151,7 +154,7 @@ def _sizes(look: Look) -> Any:
         "legend.fontsize": legends.SIZE,
     }
     sizes = {name: look.scale * size for name, size in {**words, **_SIZED}.items()}
-    return {**sizes, "font.family": [*look.family]}
+    return {**sizes, "font.family": [*look.family], "axes.prop_cycle": cycler(color=PALETTE)}
 
 
 def new_figure(

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from ..analysis.growth import Growth
-from ..analysis.lyapunov import Lyapunov
+from ..analysis.lyapunov import Lyapunov, lyapunov
+from ..analysis.replay import replay
 from ..renamed import names_elsewhere
-from .panels import GAP, LEGEND, power_of_ten, stacked_panels
-from .plots import style
+from ..simulation.result import Result
+from ..simulation.simulate import Experiment
+from .legends import columns_that_fit, fitted
+from .look import in_look
+from .panels import GAP, LEFT, LEGEND, RIGHT, power_of_ten, stacked_panels
+from .runs import check_run
 from .style import ACCENT, DESIRED, PALETTE
 
 if TYPE_CHECKING:
@@ -20,29 +26,58 @@ if TYPE_CHECKING:
 
 #: names of terms and their colours
 Terms: TypeAlias = list[tuple[str, str]]
-#: height of a panel, inches, and how many names a line of its legend takes
-PANEL, COLUMNS = 2.0, 4
+#: height of a panel, inches
+PANEL = 2.0
 #: terms that never exceed this share of the largest are left out
 VISIBLE = 1e-9
 #: powers below this share of the largest are drawn on a linear scale
 LINEAR = 1e-4
 
 
-def lyapunov_figure(record: Lyapunov) -> Figure:
+def lyapunov_terms(
+    result: Result,
+    experiment: Experiment | None = None,
+    *,
+    width: float | None = None,
+    style: str | None = None,
+) -> Figure:
+    """V and V' of a run with their terms, see `lyapunov_figure`; it goes through the run once more.
+
+    Args:
+        result: the run.
+        experiment: what made it; needed for a result loaded from a file.
+        width, style: of the figure, see `look.look_of`.
+
+    Raises:
+        InputError: no experiment, or another than the one that made the result.
+    """
+    check_run(result, "q", "v", "tau")
+    return lyapunov_figure(lyapunov(replay(result, experiment)), width=width, style=style)
+
+
+def lyapunov_figure(record: Lyapunov, *, width: float | None = None, style: str | None = None) -> Figure:
     """V with its terms above, on a logarithmic scale, and V' with its terms below, signs kept.
 
     Args:
         record: of `synctrl.analysis.lyapunov.lyapunov`.
+        width, style: of the figure, see `look.look_of`.
     """
-    with style():
-        energies, powers = (_visible(terms) for terms in (record.energy, record.power))
-        above = [GAP + LEGEND * -(-(len(terms) + 1) // COLUMNS) for terms in (energies, powers)]
-        figure, panels = stacked_panels([PANEL, PANEL], above)
-        _energies(panels[0], record, energies)
-        _powers(panels[1], record, powers)
-        for panel in panels:
-            panel.yaxis.set_major_formatter(power_of_ten)
-            panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=COLUMNS, borderaxespad=0.2)
+    return in_look(style, width, partial(_terms, record))
+
+
+def _terms(record: Lyapunov, width: float) -> Figure:
+    room = width - LEFT - RIGHT
+    energies, powers = (_visible(terms) for terms in (record.energy, record.power))
+    drawn = zip((energies, powers), ("V", "V'"), strict=True)
+    columns = [columns_that_fit([*(name for name, _ in terms), total], room) for terms, total in drawn]
+    rows = [-(-(len(terms) + 1) // c) for terms, c in zip((energies, powers), columns, strict=True)]
+    figure, panels = stacked_panels([PANEL, PANEL], [GAP + LEGEND * count for count in rows], width)
+    _energies(panels[0], record, energies)
+    _powers(panels[1], record, powers)
+    for panel in panels:
+        panel.yaxis.set_major_formatter(power_of_ten)
+        handles = panel.get_legend_handles_labels()[0]
+        panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), **fitted(handles, room))
     return figure
 
 

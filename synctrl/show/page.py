@@ -105,6 +105,17 @@ class SideBySide:
 
 
 @dataclass(frozen=True)
+class Columns:
+    """Blocks in columns, as many as fit, that are filled one after another."""
+
+    blocks: tuple[Block, ...]
+
+    def html(self) -> str:
+        """Columns, as on a page of a newspaper."""
+        return f'<div class="columns">{"".join(block.html() for block in self.blocks)}</div>'
+
+
+@dataclass(frozen=True)
 class Table:
     """A table of words and numbers, already written as text.
 

@@ -54,6 +54,57 @@ def stacked_panels(
     return figure, panels
 
 
+#: margins of a panel of a grid: left of it for ticks and a label, right, and below, inches
+GRID_LEFT, GRID_RIGHT, GRID_BELOW = 0.74, 0.22, 0.5
+#: the widest panel of a grid, inches
+WIDEST = 3.4
+
+
+def panel_grid(
+    count: int, least: float, height: float | None, above: float, width: float, together: int = 1
+) -> tuple[Figure, list[Axes]]:
+    """Panels in rows, each with a title and axes of its own; to be called within `look.drawing`.
+
+    Args:
+        count: how many.
+        least: width of a panel with its margins: there are as many in a row as fit, inches.
+        height: of a panel, inches; None for as much as its width.
+        above: room above all of them, inches.
+        width: of the figure, inches.
+        together: so many stay in one row, one after another, where there is room.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    columns = min(max(int(width / least), 1), count)
+    columns -= columns % together if columns > together else 0
+    own = min(width / columns - GRID_LEFT - GRID_RIGHT, WIDEST)
+    tall = own if height is None else height
+    cell, rows = TITLE + tall + GRID_BELOW, -(-count // columns)
+    figure = Figure(figsize=(width, above + rows * cell), dpi=DPI)
+    FigureCanvasAgg(figure)
+    panels = []
+    for k in range(count):
+        left = (k % columns) * (own + GRID_LEFT + GRID_RIGHT) + GRID_LEFT
+        bottom = (rows - 1 - k // columns) * cell + GRID_BELOW
+        total = above + rows * cell
+        place = left / width, bottom / total, own / width, tall / total
+        panels.append(figure.add_axes(place))
+        _set_ticks(panels[-1], own, tall)
+    return figure, panels
+
+
+def _set_ticks(panel: Axes, width: float, height: float) -> None:
+    """As many ticks as have room, and labels at fixed places."""
+    from matplotlib.ticker import MaxNLocator
+
+    panel.xaxis.set_major_locator(MaxNLocator(max(int(width / 0.6), 1)))
+    panel.yaxis.set_major_locator(MaxNLocator(max(int(height / 0.4), 2)))
+    panel.yaxis.set_label_coords((LABEL - GRID_LEFT) / width, 0.5)
+    panel.xaxis.set_label_coords(0.5, (LABEL - GRID_BELOW) / height)
+    panel.yaxis.get_offset_text().set_x((EDGE - GRID_LEFT) / width)
+
+
 def power_of_ten(value: float, _: object = None) -> str:
     """A tick of a logarithmic axis as plain text, 10⁻³, which is drawn much faster than a formula."""
     if value == 0:

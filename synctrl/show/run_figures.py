@@ -18,18 +18,34 @@ from ..errors import InputError, SynctrlError
 from ..simulation.result import Result
 from . import plots
 from .assembly_figures import CURVES, assembly_figure, has
+from .consistency_plots import consistency
 from .curves import Curves, curves_figure
 from .legends import legend, legend_rows, plain
 from .look import NARROWEST, in_look, look_of
+from .lyapunov_plots import lyapunov_terms
 from .network_figures import traffic
 from .panels import LEGEND, TITLE, stacked_panels
+from .phase_figures import phase_portraits
 from .runs import check_run
+from .spectrum_figures import spectra
 from .style import DESIRED, robot_color
+from .tip_figures import tip_paths
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["FIGURES", "NARROWEST", "OF_TASKS", "Gallery", "estimates", "gallery", "paths", "torques"]
+__all__ = [
+    "FIGURES",
+    "NARROWEST",
+    "OF_TASKS",
+    "ON_REQUEST",
+    "Gallery",
+    "estimates",
+    "gallery",
+    "paths",
+    "torque_curves",
+    "torques",
+]
 
 #: height of a panel, inches
 COORDINATE = 1.1
@@ -48,6 +64,11 @@ def torques(result: Result, *, width: float | None = None, style: str | None = N
         result: the run.
         width, style: of the figure, see `look.look_of`.
     """
+    return curves_figure(result, torque_curves(result), width, style)
+
+
+def torque_curves(result: Result) -> list[Curves]:
+    """The panels of `torques`, for one run."""
     check_run(result, "tau")
     curves = []
     for i, robot in enumerate(result.info["robots"]):
@@ -62,7 +83,7 @@ def torques(result: Result, *, width: float | None = None, style: str | None = N
                     [_near(result.tau[:, i, k], limits[k]) for k in columns],
                 )
             )
-    return curves_figure(result, curves, width, style)
+    return curves
 
 
 def estimates(result: Result, *, width: float | None = None, style: str | None = None) -> Figure:
@@ -150,6 +171,16 @@ FIGURES: Mapping[str, Callable[..., Figure]] = MappingProxyType(
 OF_TASKS: Mapping[str, Callable[..., Figure]] = MappingProxyType(
     {"traffic": traffic, **{name: partial(assembly_figure, name=name) for name in CURVES}}
 )
+#: those that are drawn when they are asked for by name, for they take long or are not always wanted
+ON_REQUEST: Mapping[str, Callable[..., Figure]] = MappingProxyType(
+    {
+        "tip_path": tip_paths,
+        "phase_portrait": phase_portraits,
+        "spectrum": spectra,
+        "consistency": consistency,
+        "lyapunov": lyapunov_terms,
+    }
+)
 
 
 class Gallery(dict[str, "Figure"]):
@@ -203,8 +234,9 @@ def gallery(result: Result, *names: str, width: float | None = None, style: str 
 
     Args:
         result: the run.
-        names: which ones, see `FIGURES` and `OF_TASKS`; by default all of the first, and of the others those
-            that the run has. Of the first, what a run does not have is left out and named in `missing`.
+        names: which ones, see `FIGURES`, `OF_TASKS` and `ON_REQUEST`; by default all of the first, and of the
+            second those that the run has. Of the first, what a run does not have is left out and named in
+            `missing`.
         width, style: of all figures, see `look.look_of`.
 
     Raises:
@@ -212,7 +244,7 @@ def gallery(result: Result, *names: str, width: float | None = None, style: str 
             an unknown style, or a width in which words have no place.
     """
     found = Gallery(str(result.info["title"]), look_of(style, width).formats)
-    known = {**FIGURES, **OF_TASKS}
+    known = {**FIGURES, **OF_TASKS, **ON_REQUEST}
     asked = names or (*FIGURES, *(name for name in OF_TASKS if _shows(result, name)))
     for name in asked:
         try:

@@ -8,7 +8,10 @@ the gains, in the step and in the pushes from outside.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
+from importlib import import_module
 from typing import Any, NamedTuple
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
@@ -31,6 +34,11 @@ NEARLY = 100.0
 
 #: causes that no closed loop has a hand in
 DESIRED = ("motion", "weights")
+
+#: causes that other gains, or another step, would cure
+CURABLE = ("step", "period", "Lambda", "beta", "K_r", "K_eps", "Gamma", "friction", "unstable")
+#: what knows which change comes first: its module and name, imported when a run has to stop
+ADVICE = ("synctrl.analysis.advise", "first_change")
 
 DAMPING = "N·m·s/rad"
 UNITS = {"Lambda": " 1/s", "beta": " 1/s", "K_eps": "", "Gamma": ""}
@@ -94,7 +102,19 @@ def diagnosed(
         return found.about(error.subject, found=error.found)
     name = "the cell" if cause.robot is None else loop.cell.names[cause.robot]
     place = name if cause.joint is None else f"joint {cause.joint + 1} of {name}"
-    return NonFiniteError(f"{place} ran away at t = {error.time:g} s: {cause.words}", **about)
+    words = cause.words + (_advice(loop, info) if cause.word in CURABLE else "")
+    return NonFiniteError(f"{place} ran away at t = {error.time:g} s: {words}", **about)
+
+
+def _advice(loop: ClosedLoop, info: Mapping[str, Any]) -> str:
+    """What to change first, as far as that is known; whatever goes wrong here is not worth a word."""
+    module, name = ADVICE
+    with suppress(Exception), catch_warnings():
+        simplefilter("ignore")
+        change = getattr(import_module(module), name)(loop, info["dt"], info["control_period"])
+        first = "" if change is None else f"to begin with, change {change.told(loop.cell.names)}; "
+        return f"; {first}synctrl.analysis.advise(cell, gains) tells what else"
+    return ""
 
 
 def find_cause(stop: Stop) -> Cause:

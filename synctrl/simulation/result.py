@@ -138,7 +138,8 @@ class Result(Exported):
         """Figures by name, which a notebook shows: errors, torques with limits, paths and estimates.
 
         Args:
-            names: "tracking_error", "sync_error", "torque", "path", "estimates"; by default all of them.
+            names: "tracking_error", "sync_error", "torque", "path", "estimates", all of which are drawn by
+                default, and if asked for "tip_path", "phase_portrait", "spectrum", "consistency", "lyapunov".
             width: of each figure, inches; by default that of the style.
             style: None, 6.4 inches wide; "ieee", a column of a journal, 3.5 inches, that can be read in grey;
                 or "slides", 10 inches, with large words.
