@@ -147,11 +147,12 @@ def test_samples_and_packages_stay_below_too(name: str, folder: Path) -> None:
         read_cell(path)
 
 
-def test_samples_are_a_motion_through_all_of_them(folder: Path) -> None:
+@pytest.mark.parametrize("head", ["", "\ufeff", "t,x,y\n", "\ufefft,x,y\n"])
+def test_samples_are_a_motion_through_all_of_them(head: str, folder: Path) -> None:
     t = np.linspace(0.0, 4.0, 41)
     points = np.column_stack((-0.15 + 0.08 * np.cos(t), 0.35 + 0.08 * np.sin(t)))
     rows = [",".join(map(repr, row)) for row in np.column_stack((t, points)).tolist()]
-    (folder / "way.csv").write_text("t,x,y\n" + "\n".join(rows) + "\n\n", "utf-8")
+    (folder / "way.csv").write_text(head + "\n".join(rows) + "\n\n", "utf-8")
     path = cell_with(folder, "planar2r")
     text = path.read_text("utf-8").replace(
         '{ kind = "circle", center = [-0.15, 0.35], radius = 0.08, speed = "90 deg" }',
@@ -166,7 +167,7 @@ def test_samples_are_a_motion_through_all_of_them(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["", "0,1,2\n1,2", "t,x\n0,a\n", "0,1\n0,1\n", "0;1\n", "0\n1\n", b"\xff\xfe"]
+    "text", ["", "0,1,2\n1,2", "t,x\n0,a\n", "0,O,0\n1,1,1\n2,2,2\n", "0,1\n0,1\n", "0;1\n", "0\n1\n", b"\xff\xfe"]
 )
 def test_samples_that_are_none_are_refused(text: str | bytes, folder: Path) -> None:
     (folder / "way.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
@@ -185,7 +186,7 @@ def test_samples_that_are_none_are_refused(text: str | bytes, folder: Path) -> N
 # -- files that are none -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("content", ["a = ", "a = 1\na = 2", "[[a]\n", 'x = "\n', "[" * 5000, b"\xff"])
+@pytest.mark.parametrize("content", ["a = ", "a = 1\na = 2", "[[a]\n", 'x = "\n', "[" * 5000, "a = " + "1" * 5000, b"\xff"])
 def test_a_file_that_is_no_toml_is_refused_with_its_line(content: str | bytes, tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())

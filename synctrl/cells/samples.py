@@ -14,7 +14,8 @@ def samples(file: Path, ends: str = "free") -> Spline:
     """The motion through the samples of a CSV file.
 
     Args:
-        file: CSV, a line for each sample: time, s, then coordinates; a first line of names is passed over.
+        file: CSV, a line for each sample: time, s, then coordinates; a first line of names, none of which is
+            a number, is passed over, and so is a byte order mark.
         ends: "rest" begins and ends at rest, and holds the first and last point; "free" leaves the ends to
             the points, at least six of them, and has no motion outside of the times.
 
@@ -22,12 +23,12 @@ def samples(file: Path, ends: str = "free") -> Spline:
         InputError: no such file, or a line that is no list of numbers, as many as in the lines before.
     """
     try:
-        lines = file.read_text("utf-8").splitlines()
+        lines = file.read_text("utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "something else"
         raise InputError(f"expected a CSV file, found: {reason}", subject="file", found=file.name) from None
     rows = [(number, line.split(",")) for number, line in enumerate(lines, 1) if line.strip()]
-    named = bool(rows) and _numbers(rows[0][1]) is None
+    named = bool(rows) and not any(_numbers([text]) for text in rows[0][1])
     table = _table(file.name, rows[named:])
     return Spline(table[:, 0], table[:, 1:], ends)
 
