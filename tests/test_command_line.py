@@ -219,6 +219,15 @@ def test_a_sweep_has_the_rows_of_the_library_and_goes_on_where_it_was(folder, ex
     assert "3 of 3 runs" in printed and (folder / "sweep" / "runs.jsonl").read_bytes() == lines
 
 
+def test_a_sweep_of_which_no_run_comes_to_its_end_says_why(folder, tmp_path):
+    words = ("sweep", folder / "cell.toml", "--vary", "model_error[robot=9]=uniform(0,1)", "-o", tmp_path / "out")
+    printed = ended(*words, "--samples", 2, "--backend", "serial", *QUICK, code=codes.FOUND_WANTING).stdout
+    rows = [json.loads(line) for line in (tmp_path / "out" / "runs.jsonl").read_text("utf-8").splitlines()]
+    columns = json.loads((tmp_path / "out" / "sweep.json").read_text("utf-8"))["columns"]
+    (cause,) = {row[columns.index("cause")] for row in rows}
+    assert " ".join(f"{cause} (2 times)".split()) in " ".join(printed.split())
+
+
 def test_tuning_writes_a_cell_with_what_it_found(folder):
     words = ("tune", folder / "cell.toml", "--search", "gains.beta=log(5,50)", "-o", folder / "tune", *QUICK)
     found = answer(*words, "--generations", 1, "--population", 5, "--workers", 1)

@@ -99,8 +99,10 @@ def test_every_factor_of_numbers_can_be_named(name):
     ],
 )
 def test_what_is_no_factor_is_refused(text):
-    with refused(InputError):
+    with refused(InputError) as found:
         read(text)
+    if "law" in text:
+        assert found.value.subject == "--vary"
 
 
 @given(st.text(max_size=30))

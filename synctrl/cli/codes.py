@@ -10,7 +10,8 @@ REFUSED = 1
 USAGE = 2
 #: a run had to stop before its end; what was computed until then is written
 STOPPED = 3
-#: done, and what was looked at is not as it should be: readers that disagree, something missing
+#: done, and what was looked at is not as it should be: readers that disagree, something missing, no run
+#: that came to its end
 FOUND_WANTING = 4
 #: interrupted by Ctrl-C; what was computed until then is written
 INTERRUPTED = 130

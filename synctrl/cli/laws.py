@@ -42,12 +42,13 @@ LAWS: Mapping[str, Callable[[Gains], Law]] = MappingProxyType(
 )
 
 
-def named_laws(names: Sequence[str], gains: Gains) -> dict[str, Law]:
+def named_laws(names: Sequence[str], gains: Gains, option: str = "--laws") -> dict[str, Law]:
     """Laws by name.
 
     Args:
         names: of `LAWS`.
         gains: those of the cell, from which free gains begin.
+        option: that has the names, for messages.
 
     Raises:
         InputError: another name, with the near ones.
@@ -56,7 +57,7 @@ def named_laws(names: Sequence[str], gains: Gains) -> dict[str, Law]:
         if name not in LAWS:
             raise InputError(
                 f"expected some of {', '.join(LAWS)}, found {name!r}{near(name, LAWS)}",
-                subject="--laws",
+                subject=option,
                 found=name,
             )
     return {name: LAWS[name](gains) for name in names}

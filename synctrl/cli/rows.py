@@ -34,6 +34,11 @@ def endings(rows: Sequence[Mapping[str, Any]]) -> dict[str, int]:
     return dict(Counter(str(row["status"]) for row in rows))
 
 
+def causes_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, int]:
+    """Why runs did not come to their end, the most frequent cause first, and of how many it is said."""
+    return dict(Counter(str(row["cause"]) for row in rows if row["status"] != COMPLETED).most_common())
+
+
 def spreads(rows: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, float]]:
     """Of every measure, over the runs that came to their end: least, median and largest value, ..."""
     found = {}

@@ -71,7 +71,8 @@ def sweep(
 def _tell(answer: Answer, folder: Path, whole: int, names: list[str], best: str, cell: object) -> None:
     from ..sweep.measures import definitions
     from ..sweep.rows import COMPLETED
-    from .rows import best_table, endings, read_rows, spread_table, spreads
+    from .console import lines
+    from .rows import best_table, causes_of, endings, read_rows, spread_table, spreads
 
     rows = read_rows(folder)
     good = [row for row in rows if row["status"] == COMPLETED and row.get(best) is not None]
@@ -80,6 +81,12 @@ def _tell(answer: Answer, folder: Path, whole: int, names: list[str], best: str,
     answer.data |= {"measures": spreads(rows), "best": first}
     ended = ", ".join(f"{count} {status}" for status, count in endings(rows).items())
     answer.show(f"{len(rows)} of {whole} runs: {ended or 'none yet'}", "")
+    if causes := causes_of(rows):
+        answer.data["causes"] = causes
+        said = [f"{cause} ({count} times)" if count > 1 else cause for cause, count in causes.items()]
+        answer.show(lines("Why runs did not come to their end", said[:LISTED]), "")
+    if len(rows) == whole and not good:
+        answer.code = codes.FOUND_WANTING
     if good:
         units = definitions(cell)  # type: ignore[arg-type]
         answer.show(spread_table(rows, units), "")

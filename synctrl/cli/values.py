@@ -67,7 +67,8 @@ def read_factor(option: str, text: str, gains: Gains) -> Factor:
             f"{text!r}: expected {', '.join(KINDS)}, found {kind!r}{near(kind, KINDS)}", subject=option
         )
     if name == "law":
-        return sweep.law(_listed(option, text, kind, [*named_laws(_words(values), gains).values()]))
+        _check_listed(option, text, kind)
+        return sweep.law(KINDS[kind][0]([*named_laws(_words(values), gains, option).values()]))
     try:
         return _factor(
             option, text, name, _values(option, text, kind, values), _indices(option, text, indices)
@@ -111,11 +112,9 @@ def _values(option: str, text: str, kind: str, values: str) -> Any:
     return make(*numbers)
 
 
-def _listed(option: str, text: str, kind: str, parts: list[Any]) -> Any:
-    make, count = KINDS[kind]
-    if count:
+def _check_listed(option: str, text: str, kind: str) -> None:
+    if KINDS[kind][1]:
         raise InputError(f"{text!r}: expected choice(...) or grid(...) of laws, found {kind}", subject=option)
-    return make(parts)
 
 
 def _indices(option: str, text: str, words: str | None) -> dict[str, int]:
