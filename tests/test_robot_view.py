@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from synctrl.show import shapes
 from synctrl.show.raster import picture, triangles_of
 from synctrl.show.robot_view import middle, robot_picture, robot_scene
 
+ROBOTS = Path(__file__).parents[1] / "robots"
 RED, BLUE = np.array([[1.0, 0, 0]]), np.array([[0, 0, 1.0]])
 pixels = st.floats(5, 95)
 
@@ -100,6 +102,16 @@ def test_positions_of_another_size_are_refused():
     for draw in (robot_picture, robot_scene):
         with refused(InputError, "q"):
             draw(load_robot("planar2r"), [0.0])
+
+
+def test_names_are_no_formulas(tmp_path):
+    text = (ROBOTS / "planar2r" / "planar2r.urdf").read_text("utf-8")
+    for name in ("planar2r", "joint1"):
+        text = text.replace(f'name="{name}"', f'name="{name} $\\frac{{$"')
+    (tmp_path / "arm.urdf").write_text(text, "utf-8")
+    robot = load_robot(tmp_path / "arm.urdf")
+    assert "$" in robot.name and "$" in robot.joint_names[0]
+    robot_picture(robot).savefig(io.BytesIO(), format="png")
 
 
 def test_the_scene_of_a_robot_opens_in_a_browser_without_asking_for_anything(tmp_path):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..analysis.comparison import RULES, Comparison
 from ..analysis.trial_rows import AS_GIVEN
+from .legends import plain
 from .plots import new_figure, style
 from .style import display
 
@@ -76,5 +77,5 @@ def _legend(figure: Figure, numbers: dict[str, int]) -> None:
     rules = [
         Line2D([], [], ls="", marker=m, ms=8, mfc="white", mec="#222222", label=r) for r, m in MARKERS.items()
     ]
-    laws = [Line2D([], [], ls="", label=f"{number}  {name}") for name, number in numbers.items()]
+    laws = [Line2D([], [], ls="", label=f"{number}  {plain(name)}") for name, number in numbers.items()]
     figure.legend(handles=rules + laws, loc="outside lower center", ncols=4)

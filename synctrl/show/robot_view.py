@@ -13,6 +13,7 @@ from ..robots.mechanism import joint_limits
 from ..robots.model import SLIDES, joint_poses, subspace
 from ..robots.robot import Robot
 from .arms import SMALLEST, has_shapes, reach, skeleton
+from .legends import plain
 from .meshes import MeshLibrary
 from .plots import new_figure, style
 from .raster import picture, triangles_of
@@ -119,7 +120,7 @@ def robot_picture(robot: Robot, q: ArrayLike | None = None) -> Figure:
         panel.set_xlim(0, width)
         panel.set_ylim(0, height)
         _mark(panel, robot, lines, view.seen(robot.tip_position(q)), view)
-        panel.text(0.02 * width, 0.96 * height, robot.name, fontsize=11, va="top", fontweight="bold")
+        panel.text(0.02 * width, 0.96 * height, plain(robot.name), fontsize=11, va="top", fontweight="bold")
     return figure
 
 
@@ -185,4 +186,4 @@ def _name(panel: Any, names: Sequence[str], points: np.ndarray, colors: Sequence
         x = 0.75 * width
         panel.plot([points[k, 0], x - 6], [points[k, 1], y], color=colors[k], lw=0.5, alpha=0.6)
         short = names[k] if len(names[k]) <= 30 else f"{names[k][:29]}…"
-        panel.text(x, y, short, va="center", fontsize=7.5, color=colors[k], parse_math=False)
+        panel.text(x, y, plain(short), va="center", fontsize=7.5, color=colors[k])

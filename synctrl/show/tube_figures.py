@@ -11,6 +11,7 @@ from ..coupling.cell import Cell
 from ..errors import InputError
 from ..simulation.result import Result
 from ..tasks.spaces import CartesianSpace
+from .legends import plain
 from .plots import new_figure, style
 from .style import ACCENT, DESIRED, display, robot_color
 
@@ -46,7 +47,7 @@ def tube_figure(tube: Tube, cell: Cell, result: Result, robot: int = 0) -> Figur
         if flat:
             _in_plane(axes[0][0], tube, cell, result, robot)
         else:
-            axes[0][0].set_title(cell.names[robot])
+            axes[0][0].set_title(plain(cell.names[robot]))
         for part, panel in enumerate(axes[0][flat:]):
             _over_time(panel, tube, result, robot, part)
         _legend(figure, robot, flat)
