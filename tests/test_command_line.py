@@ -147,6 +147,24 @@ def test_a_run_that_has_to_stop_is_written_as_far_as_it_came(folder, tmp_path):
     assert saved.status != "completed" and saved.t[-1] == found["end"] < float(DURATION)
 
 
+def test_a_run_replaces_no_cell_file_but_its_own_copy(folder, tmp_path):
+    mine, other = tmp_path / "cell.toml", tmp_path / "other.toml"
+    mine.write_text("# mine\n", "utf-8")
+    other.write_text((folder / "cell.toml").read_text("utf-8"), "utf-8")
+    words = ("run", other, "--no-page", *QUICK)
+    assert answer(*words, "-o", tmp_path, code=codes.REFUSED)["error"]["subject"] == "--out"
+    assert mine.read_text("utf-8") == "# mine\n" and not (tmp_path / "run.npz").exists()
+    for _ in range(2):
+        ended(*words, "-o", tmp_path / "out")
+    ended("run", tmp_path / "out" / "cell.toml", "--no-page", *QUICK, "-o", tmp_path / "out")
+    assert (tmp_path / "out" / "cell.toml").read_bytes() == other.read_bytes()
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_the_run(folder):
+    found = answer("run", folder / "cell.toml", "-o", folder / "cell.toml", *QUICK, code=codes.REFUSED)
+    assert found["error"]["kind"] == "ResultError" and "metrics" not in found
+
+
 def test_advice_is_that_of_the_library_and_changes_the_gains_in_a_file(folder, experiment, tmp_path):
     text = (folder / "cell.toml").read_text("utf-8").replace("K_r = 0.5", "K_r = 5e4")
     (tmp_path / "stiff.toml").write_text(text, "utf-8")

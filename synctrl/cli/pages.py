@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..analysis.certify import Certificate, certify
 from ..analysis.metrics import as_data, metrics, write_metrics
-from ..errors import SynctrlError
+from ..errors import InputError, SynctrlError
 from ..files import read_regular, reported, write_whole
 from ..simulation.result import Result
 from ..simulation.simulate import Experiment
@@ -40,6 +40,25 @@ def tell_run(answer: Answer, result: Result, certificate: Certificate | None) ->
         answer.show(certificate_lines(certificate))
 
 
+def prepare_folder(folder: Path, source: Path) -> None:
+    """Make the folder of a run, before there is anything that could be lost.
+
+    Args:
+        folder: where the run will be written.
+        source: the file that it is made of, of which a copy will be there.
+
+    Raises:
+        InputError: a cell file is in the place of the copy that is neither the source nor beside a run.
+        ResultError: the folder cannot be made.
+    """
+    copy = folder / CELL
+    if copy.exists() and not _same(source, copy) and not (folder / RESULT).exists():
+        words = f"expected a folder without a {CELL} of its own, which the copy of '{source}' would replace"
+        raise InputError(f"{words}, found one", subject="--out", found=str(folder))
+    with reported("write into the folder", folder):
+        folder.mkdir(parents=True, exist_ok=True)
+
+
 def write_run(
     answer: Answer, folder: Path, result: Result, certificate: Certificate | None, source: Path
 ) -> None:
@@ -50,8 +69,6 @@ def write_run(
     """
     certificates = {} if certificate is None else {"run": certificate.as_dict()}
     numbers = {"run": as_data(result, metrics(result))}
-    with reported("write into the folder", folder):
-        folder.mkdir(parents=True, exist_ok=True)
     written = [result.save(folder / RESULT)]
     written.append(write_metrics(folder / METRICS, numbers, [], certificates=certificates))
     with reported("copy the cell file to", folder / CELL):

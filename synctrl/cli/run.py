@@ -11,7 +11,7 @@ from .answer import answering
 from .exports import check_exports, export
 from .made import make_run, planned
 from .options import CellFile, Duration, Engine, Export, Folder, Json, Period, Step
-from .pages import certified, tell_run, write_page, write_run
+from .pages import certified, prepare_folder, tell_run, write_page, write_run
 
 LogStep = Annotated[
     float | None,
@@ -45,10 +45,11 @@ def run(
         check_exports(export_to)
         asked = {"duration": duration, "dt": dt, "engine": engine, "control_period": control_period}
         experiment, how = planned(answer, cell, **asked, log_dt=log_dt, plant=plant)
+        prepare_folder(out, cell)
         result = make_run(answer, experiment, how)
         certificate = certified(answer, result, experiment)
         tell_run(answer, result, certificate)
         write_run(answer, out, result, certificate, cell)
-        export(answer, result, export_to)
         if page:
             write_page(answer, out, result, certificate, experiment)
+        export(answer, result, export_to)
