@@ -81,10 +81,7 @@ def robots_table(result: Result, computed: Metrics) -> Table:
 def pairs_table(result: Result, computed: Metrics) -> Table:
     """A row for each pair of robots that is compared: its synchronization errors."""
     columns = _error_columns(result, "sync_error", computed.sync_error)
-    caption = (
-        "Synchronization errors, in the same way; the number of a pair is the index of its ε in the figures."
-    )
-    return _table("pair", row_names(result, "sync_error"), columns, caption)
+    return _table("pair", row_names(result, "sync_error"), columns, OF_PAIRS)
 
 
 def _error_columns(result: Result, kind: str, computed: ErrorMetrics) -> list[Column]:
