@@ -389,6 +389,8 @@ def test_what_makes_no_sense_is_refused_by_name(subject, changes):
     cell = moving()
     with refused(InputError, subject):
         advise(**{"cell": cell, "gains": Gains(8, 4, 40, 40, 0.1), **changes})
+    with refused(InputError, "experiment"):
+        advise_run(cell)
 
 
 def test_a_path_out_of_reach_is_refused():

@@ -29,6 +29,7 @@ from synctrl import (
     load_robot,
 )
 from synctrl.cells import STARTER, CellFileError, read_cell, read_cell_file, write_cell
+from synctrl.errors import InputError
 from synctrl.experiments import a460_pair, planar_four
 from synctrl.robots.urdf import urdf_folder
 from synctrl.simulation.plant import Plant
@@ -232,6 +233,20 @@ def test_how_it_is_run_is_read_and_written(tmp_path: Path) -> None:
     assert found.run == {"dt": 5e-4, "engine": "compiled"}
     written = write_cell(found.experiment, tmp_path / "again.toml", run=found.run)
     assert read_cell_file(written).run == found.run
+
+
+@pytest.mark.parametrize("run", [{"foo": 1}, {"dt": "x"}, {"engine": "mujoco"}, {"duration": 1.0}])
+def test_a_way_to_run_that_could_not_be_read_is_not_written(run: dict, tmp_path: Path) -> None:
+    with refused(CellFileError, f"run.{next(iter(run))}"):
+        write_cell(planar_four(), tmp_path / "cell.toml", run=run)
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize("path", [None, 3, "a\0b"])
+def test_what_is_no_path_is_refused(path) -> None:
+    for use in (read_cell, lambda path: write_cell(planar_four(), path)):
+        with refused(InputError):
+            use(path)
 
 
 # -- what no file can say ----------------------------------------------------------------------------------

@@ -157,6 +157,8 @@ def test_what_is_no_style_format_or_width_is_refused(star, tmp_path):
         star.plot(style="nature")
     with refused(InputError, "format", found="gif"):
         save(paths(star), tmp_path / "path", ("gif",))
+    with refused(InputError, "runs, 'file'"):
+        overlays({"run": star, "file": "run.npz"})
     assert not list(tmp_path.iterdir())
     for style, look in (("slides", STYLES["slides"]), (None, PLAIN)):
         least = NARROWEST * look.scale

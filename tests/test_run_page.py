@@ -182,6 +182,8 @@ def test_what_has_no_page_is_refused(star, tmp_path):
         write_run_page(replace(star, **{name: getattr(star, name)[:0] for name in LAYOUT}), tmp_path)
     with refused(InputError, "certificate"):
         write_run_page(star, tmp_path, "covered")
+    with refused(InputError, "experiment"):
+        write_run_page(star, tmp_path, experiment="cell.toml")
     (tmp_path / "file").write_text("")
     with pytest.raises((ResultError, InputError)):
         write_run_page(star, tmp_path / "file")

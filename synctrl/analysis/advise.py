@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import positive_number
+from ..checks import instance, positive_number
 from ..control.excursion import Excursion, at_start, excursion
 from ..control.gains import Gains
 from ..control.suggest import Arm, usual_load
@@ -62,6 +62,7 @@ def advise(
 
 def advise_run(experiment: Experiment, dt: float = 1e-3, control_period: float | None = None) -> Advice:
     """`advise` for an experiment, with all of its parts; arguments and errors are the same."""
+    instance("experiment", experiment, Experiment, "an Experiment")
     positive_number("dt", dt)
     if control_period is not None:
         positive_number("control_period", control_period)

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
+from ..checks import instance
 from ..errors import near
 from ..files import read_regular
 from ..simulation.simulate import Experiment
@@ -45,6 +46,7 @@ def read_cell(path: str | Path) -> Experiment:
         path: of the file, in TOML.
 
     Raises:
+        InputError: no path.
         CellFileError: no such file, or what is wrong with it: with file, line and key, with what was found
             and what is expected, and with near names.
     """
@@ -58,8 +60,9 @@ def read_cell_file(path: str | Path) -> CellFile:
         path: of the file, in TOML.
 
     Raises:
-        CellFileError: see `read_cell`.
+        InputError, CellFileError: see `read_cell`.
     """
+    instance("path", path, (str, Path), "a path")
     path = Path(path)
     text = _text(path)
     data = _parsed(path, text)
@@ -76,6 +79,8 @@ def read_cell_file(path: str | Path) -> CellFile:
 
 
 def _text(path: Path) -> str:
+    if "\0" in str(path):
+        raise CellFileError("expected the name of a file, found a zero byte in it", file=path)
     try:
         if path.stat().st_size > LARGEST:
             raise CellFileError(f"expected a cell file of at most {LARGEST} bytes", file=path)

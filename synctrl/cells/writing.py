@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from ..checks import instance
 from ..coupling.cell import Cell, Member
@@ -22,7 +23,7 @@ from ..simulation.simulate import Experiment
 from ..tasks.spaces import JointSpace
 from . import toml
 from .couplings import coupling_keys
-from .file import BY_PART, FORM
+from .file import BY_PART, FORM, RunTable
 from .folders import from_folder
 from .plants import PLANTS
 from .problems import CellFileError, Misfit, Place, key_of
@@ -43,14 +44,16 @@ def write_cell(experiment: Experiment, path: str | Path, run: Mapping[str, Any] 
         The path.
 
     Raises:
-        CellFileError: a part of one's own, a function for example, which no file can say; or a file that
-            cannot be written.
+        InputError: no experiment, or no path.
+        CellFileError: a part of one's own, a function for example, which no file can say; something in `run`
+            that [run] does not have; or a file that cannot be written.
     """
     instance("experiment", experiment, Experiment, "an Experiment")
+    instance("path", path, (str, Path), "a path")
     path = Path(path)
     try:
         data = Writer(path.parent).experiment(experiment)
-        data |= {"run": dict(run)} if run else {}
+        data |= {"run": _run(run)} if run else {}
         write_whole(path, toml.document(data))
     except Misfit as misfit:
         key = key_of(misfit.place) or None
@@ -58,6 +61,19 @@ def write_cell(experiment: Experiment, path: str | Path, run: Mapping[str, Any] 
     except OSError as error:
         raise CellFileError(f"cannot be written: {error.strerror}", file=path) from error
     return path
+
+
+def _run(run: Mapping[str, Any]) -> dict[str, Any]:
+    """The table of how a cell is run, as it can be read again."""
+    instance("run", run, Mapping, "arguments of `Experiment.simulate`")
+    said = {name: plain(value) for name, value in run.items() if value is not None}
+    try:
+        RunTable.model_validate(said)
+    except ValidationError as error:
+        *_, name = ("run", *error.errors(include_url=False)[0]["loc"])
+        words = f"expected arguments that [run] can have, found {name} = {said.get(str(name))!r}"
+        raise Misfit.at(("run", name), words, name) from None
+    return said
 
 
 class Writer:

@@ -137,6 +137,8 @@ def named(runs: Mapping[str, Result]) -> Mapping[str, Result]:
     instance("runs", runs, Mapping, "runs by name")
     if not runs:
         raise InputError("expected at least one run, found none", subject="runs")
+    for name, run in runs.items():
+        instance(f"runs, {name!r}", run, Result, "a Result")
     return runs
 
 

@@ -72,12 +72,14 @@ def write_run_page(
         The path of the page, `index.html` in the folder.
 
     Raises:
-        InputError: no run, or one without instants.
+        InputError: no run, or one without instants; no certificate, or no experiment.
         ResultError: a file cannot be written.
     """
     check_run(result)
     if certificate is not None:
         instance("certificate", certificate, Certificate, "what `certify` gives")
+    if experiment is not None:
+        instance("experiment", experiment, Experiment, "an Experiment")
     folder = Path(folder)
     seen = as_far_as_it_means(result)
     sections = [
