@@ -360,6 +360,19 @@ def test_the_table_has_a_row_for_every_joint_and_all_of_it_is_plain():
     assert str(advice) == repr(advice) and str(advice).count("UR5") >= 12
 
 
+def test_cells_with_very_many_joints_are_told_what_needs_no_poles():
+    few, many = (Cell([moving().members[0]] * n, Coupling.signed_ring(n)) for n in (4, 12))
+    gains = good(few)
+    gains = gains.replace(K_r=gains.K_r[0], Gamma=gains.Gamma[0])
+    advice, close = (advise(cell, gains, duration=1.0) for cell in (many, few))
+    assert advice.modes == () and close.modes and "so many joints" in str(advice)
+    assert advice.longest_step <= close.longest_step * (1 + 1e-9)
+    np.testing.assert_allclose(advice.torque.path[0], close.torque.path[0])
+    bad = advise(many, gains.replace(K_r=30 * gains.K_r), duration=1.0)
+    assert (bad.first.urgency, bad.first.what) == ("diverges", "K_r")
+    assert not advise(many, bad.changed, duration=1.0).diverges
+
+
 def test_the_damping_ratio_of_a_joint_alone_is_that_of_its_poles(tmp_path):
     """One joint: M s' + K s + p = 0 and p' = G s swing with the ratio K/(2 sqrt(M G))."""
     rod = load_robot(write_urdf(planar_arm([0.5], [2.0]), tmp_path / "rod.urdf"))
