@@ -24,18 +24,20 @@ ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = ROOT / "scripts" / "examples"
 #: which scripts there are, in the order in which they are shown
 SECTIONS = {
-    "First steps": "first_robot two_arms_in_sync own_urdf overlay_of_runs",
+    "First steps": "first_robot two_arms_in_sync own_urdf cell_from_file",
     "Who is compared with whom": "couplings any_graph synchronization_function weights_that_move",
     "Spaces and desired motion": "desired_motions circle_in_space full_pose redundant_panda mixed_cell",
     "What acts on robots": "friction push payload_picked_up torque_limits",
-    "Laws and adaptations": "laws_side_by_side adaptations_side_by_side bodies_that_exist base_parameters",
+    "Gains, laws and adaptations": "advice laws_side_by_side adaptations_side_by_side",
+    "Parameters": "bodies_that_exist base_parameters",
     "Parts of your own": "own_law own_adaptation own_space",
     "Robots that touch": "carrying leak handing_over bead_on_edge beads_that_meet",
     "Networks": "network_delay lost_messages delay_map agents",
     "Clocks, sensors and loops": "sampled_control noisy_sensors own_loop mujoco_loop",
     "Plants, integrators and engines": "mujoco_plant integrators compiled_engine",
     "What is proved": "certify dissipation modal_bounds tube rate_over_gamma",
-    "Many runs": "sweep tuning_front",
+    "Many runs": "overlay_of_runs sweep tuning_front",
+    "Papers and other tools": "for_a_paper by_name for_foxglove",
 }
 #: size of a thumbnail, and of the page that an animation is photographed in, pixels
 THUMBNAIL, SCREEN = (360, 240), (960, 640)
@@ -110,7 +112,9 @@ def photograph(folder: Path) -> None:
         return
     for path in moved:
         with open_page(path, SCREEN) as page:
-            page.check_plays()
+            page.wait_for("typeof viewer === 'object' && viewer.animator !== undefined")
+            if page.evaluate("viewer.animator.duration > 0"):  # a short run may have one frame
+                page.check_plays()
             page.evaluate(BARE)
             page.evaluate("new Promise(done => setTimeout(done, 800))")
             page.screenshot(folder / f"{path.stem}_scene.png")
@@ -154,6 +158,21 @@ def index(shown: Sequence[tuple[str, list[Example]]]) -> str:
     return "\n".join([*lines, "", "```{toctree}", ":hidden:", "", *names, "```", ""])
 
 
+def listing() -> str:
+    """The page of the repository, where there are no pictures: titles, each with a link to its script."""
+    lines = [
+        "# Gallery",
+        "",
+        "Small scripts, one idea each; `python scripts/examples/NAME.py` writes its picture to",
+        "`out/gallery/`, and `python scripts/gallery.py` runs them all. The site that `make docs` builds",
+        "has this page with all pictures.",
+    ]
+    for heading, examples in sections():
+        lines += ["", f"## {heading}", ""]
+        lines += [f"- [{e.title}](../scripts/examples/{e.name}.py)" for e in examples]
+    return "\n".join([*lines, ""])
+
+
 def page(example: Example, folder: Path) -> str:
     """What a script says of itself, its pictures, and its code."""
     name, lines = example.name, [f"# {example.title}", ""]
@@ -189,8 +208,12 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("out/gallery"), help="folder for everything")
     parser.add_argument("--short", action="store_true", help="short runs, to see that all works")
     parser.add_argument("--workers", type=int, default=2, help="scripts that run at a time")
+    parser.add_argument("--list", type=Path, help="write docs/gallery.md, say, and run nothing")
     parser.add_argument("--only", nargs="+", default=[], help="names of the scripts to run")
     options = parser.parse_args()
+    if options.list:
+        options.list.write_text(listing(), "utf-8")
+        return 0
     complaints = write(options.out, [*sections(options.only)], options.short, options.workers)
     print(*complaints, sep="\n", file=sys.stderr)
     if not complaints:

@@ -1,4 +1,4 @@
-"""The picture in README: two arms that carry a payload, with the forces inside it.
+"""The picture in docs/assembly.md: two arms that carry a payload, with the forces inside it.
 
 python scripts/readme_picture.py [docs/carried.png]
 

@@ -7,7 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from synctrl import Disturbance, Gains, Network
+from synctrl import (
+    CartesianSpace,
+    Cell,
+    Coupling,
+    Cubic,
+    Disturbance,
+    Experiment,
+    Gains,
+    Member,
+    Network,
+    Payload,
+    Redundancy,
+    Robot,
+    load_robot,
+)
 from synctrl.assembly.grasp import Fixture, Pin
 from synctrl.control.adaptation import (
     Ball,
@@ -48,6 +62,7 @@ from synctrl.experiments import (
     rigid_object,
     ur5_payload,
 )
+from synctrl.robots.payload import carrying, holding
 from synctrl.simulation.devices import (
     Bias,
     DeadTime,
@@ -122,3 +137,80 @@ PARTS: list[dict[str, Any]] = [
     {"sensors": [Quantisation(1e-4), Noise(1e-5, 1e-3, 2), Bias((0.0, 1e-3, 0.0)), DifferencedVelocity(9.0)]},
     {"actuators": [TorqueQuantisation(0.01), RateLimit(5e3), DeadTime(0.002), Lag(0.004), Ripple(0.02, 6.0)]},
 ]  # fmt: skip
+
+
+# -- cells of one's own, with what ready ones do not have --------------------------------------------------
+
+ARM = load_robot("planar2r")
+GAINS = Gains(3.0, 2.0, 0.5, 1.0, 0.5)
+STATES = np.array([[0.4, 0.9], [1.1, -0.7], [0.2, 1.3], [0.9, 0.8]])
+
+
+def own_cell(
+    coupling: Coupling, robots: list[Robot] | None = None, space: Any = None, **options: Any
+) -> Experiment:
+    """Robots that go somewhere in joint space, or stay where they are in another space."""
+    n = coupling.robots
+    robots = [ARM.placed((i, 0.0, 0.0)) for i in range(n)] if robots is None else robots
+    own = {key: options.pop(key) for key in ("parameters", "friction", "v0") if key in options}
+    members = []
+    for robot, q in zip(robots, STATES, strict=False):
+        q0 = np.resize(q, robot.nv)
+        x = q0 if space is None else robot.tip_position(q0)[space.rows]
+        members.append(Member(robot, Cubic(x, x + 0.1, 0.5), q0, **own))
+    cell = Cell(members, coupling, space, clocks=options.pop("clocks", 0.0))
+    return Experiment(cell, GAINS, 0.5, **options)
+
+
+def matrices(n: int) -> np.ndarray:
+    """Weights that are full matrices."""
+    return np.eye(2) + 0.1 * np.arange(n * 4).reshape(n, 2, 2)
+
+
+def ur5(**options: Any) -> list[Robot]:
+    return [load_robot("ur5", **options).placed((i, 0.0, 0.0), (0.0, 0.0, 0.1 * i)) for i in range(2)]
+
+
+def arms(change: Callable[[Robot], Robot]) -> list[Robot]:
+    return [change(ARM), change(ARM.placed((1.0, 0.2, 0.0), (0.0, 0.0, 0.3), "second"))]
+
+
+LOAD = Payload(0, 0.2, (0.1, 0.0, 0.0), (1e-3, 2e-3, 2e-3))
+
+
+def pair(*parts: Any, **options: Any) -> Experiment:
+    return own_cell(Coupling.pair(), *parts, **options)
+
+
+#: each makes an experiment
+OWN: dict[str, Callable[[], Experiment]] = {
+    "sum": lambda: own_cell(Coupling.sum(3)),
+    "chain": lambda: own_cell(Coupling.chain(3, c=[(1.0, 2.0), (2.0, 1.0), (0.5, 0.7)])),
+    "star": lambda: own_cell(Coupling.star(4, leader=2)),
+    "complete": lambda: own_cell(Coupling.complete(3, c=matrices(3))),
+    "signed ring": lambda: own_cell(Coupling.signed_ring(4, unit="m")),
+    "weighted": lambda: own_cell(Coupling.chain(3).weighted((0.3, 1 / 3))),
+    "normalized": lambda: own_cell(Coupling.pair((5.0, -5.0), "m").normalized()),
+    "graph": lambda: own_cell(Coupling.from_graph([(0, 1, 0.5), (1, 2, 2.0), (0, 2, 1.0)])),
+    "all in one": lambda: own_cell(Coupling(3, [(0, 1, 2)], [(1.0, 2.0, -0.5)], np.ones(3), "own")),
+    "clocks": lambda: pair(clocks=(0.0, 1e-3), saturate=True, k_r_space="joint"),
+    "payloads": lambda: pair(payloads=[Payload(1, 0.3, start=1e-3, stop=3e-3)], title="t"),
+    "space": lambda: pair(space=CartesianSpace("y", redundancy=Redundancy((1.0, 2.0), 0.5))),
+    "base": lambda: pair(parameters="base", v0=(0.1, -0.1)),
+    "friction": lambda: pair(
+        [r.with_armature(0.01) for r in arms(lambda r: r)], friction="urdf", parameters="base"
+    ),
+    "locked": lambda: pair(ur5(locked={"wrist_3_joint": 0.3})),
+    "inertials": lambda: pair(
+        ur5(
+            inertials={
+                "forearm_link": {"mass": 3.0, "com": (0.0, 0.0, 0.2), "inertia": np.diag([0.1, 0.1, 0.02])}
+            }
+        ),
+    ),
+    "tip": lambda: pair(arms(lambda r: r.with_tip("link2"))),
+    "bodies": lambda: pair(arms(lambda r: r.with_parameters(1.1 * r.inertial_parameters))),
+    "no weight": lambda: pair(arms(lambda r: r.weightless().with_armature((0.1, 0.2)))),
+    "tool": lambda: pair(arms(lambda r: carrying(holding(r, (0.1, 0.0, 0.0), np.eye(3), "t"), LOAD))),
+    "moved twice": lambda: pair(arms(lambda r: r.placed((0.0, 0.1, 0.0)).placed(rpy=(0, 0, 1)))),
+}

@@ -9,7 +9,7 @@ from typing import Any
 
 import jsonschema
 import pytest
-from cell_variants import CELLS, PARTS
+from cell_variants import CELLS, OWN, PARTS
 
 from synctrl import Experiment
 from synctrl.cells import read_cell, schema, write_cell
@@ -53,3 +53,11 @@ def test_a_part_reads_back_to_the_same_bits(parts: dict[str, Any], tmp_path: Pat
     experiment = a460_pair(**parts)
     back = again(experiment, tmp_path / "cell.toml")
     assert ran(back) == ran(experiment)
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_a_cell_of_ones_own_reads_back_to_the_same_bits(name: str, tmp_path: Path) -> None:
+    experiment = OWN[name]()
+    back = again(experiment, tmp_path / "cell.toml")
+    assert ran(back) == ran(experiment)
+    assert [robot.name for robot in back.cell.robots] == [robot.name for robot in experiment.cell.robots]

@@ -72,7 +72,7 @@ def test_the_index_is_the_table_of_contents():
     trees = with_toctrees(staged, {"Reference": ["reference/robots.rst"]})
     listed = re.findall(r"(?m)^.* <(.+)>$", trees.split("```{toctree}", 1)[1])
     assert listed == [path for links in sections.values() for _, path in links]
-    assert "\nreference/robots.rst\n" in trees
+    assert "\nreference/robots.rst\n" in trees and "\n- [](/reference/robots.rst)\n" in trees
 
 
 def test_what_the_index_does_not_name_comes_last_in_its_section():

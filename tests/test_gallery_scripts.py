@@ -15,7 +15,10 @@ EXAMPLES = ROOT / "scripts" / "examples"
 #: what scripts share is none
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py") if path.stem != "example")
 #: what scripts need of the extras, beside `compiled`
-EXTRAS = {"mujoco_plant": "mujoco", "mujoco_loop": "mujoco", "sweep": "pandas", "tuning_front": "optuna"}
+EXTRAS = {
+    **dict.fromkeys(("mujoco_plant", "mujoco_loop"), "mujoco"),
+    **{"sweep": "pandas", "tuning_front": "optuna", "by_name": "h5netcdf", "for_foxglove": "mcap_protobuf"},
+}
 COMPILED = {"compiled_engine", "sweep", "tuning_front"}
 #: of code and comments in a script, docstring and blank lines left out
 MOST_LINES = 40
@@ -82,3 +85,7 @@ def test_pages_link_to_what_is_there(gallery, tmp_path):
     assert "(gallery/thumbs/base_parameters.png)" in index and "\ngallery/base_parameters\n" in index
     assert "(base_parameters.png)" in page and "animations/" not in page
     assert page.count("```") == 2 and "BaseParameters(robot)" in page
+
+
+def test_the_page_of_the_repository_lists_all_scripts(gallery):
+    assert (ROOT / "docs" / "gallery.md").read_text("utf-8") == gallery.listing()

@@ -86,12 +86,15 @@ def with_toctrees(index: str, others: Mapping[str, list[str]]) -> str:
 
     Args:
         index: Markdown, with links to pages of the site.
-        others: by section, pages that it does not name, which come last.
+        others: by section, pages that it does not name, which come last and are named by their titles.
     """
-    trees = []
-    for title, pages in contents(index).items():
-        entries = [f"{words.replace('`', '')} <{path}>" for words, path in pages]
-        entries += others.get(title, [])
+    head, *sections = re.split(r"(?m)^(?=## )", index)
+    shown, trees = [head], []
+    for section, (title, pages) in zip(sections, contents(index).items(), strict=True):
+        more = others.get(title, [])
+        listed = section.rstrip().rpartition("\n")[2].startswith("- ")
+        shown += [section.rstrip(), "\n" if listed else "\n\n", *(f"- [](/{path})\n" for path in more), "\n"]
+        entries = [*(f"{words.replace('`', '')} <{path}>" for words, path in pages), *more]
         if entries:
             trees.append("\n".join(["```{toctree}", ":hidden:", f":caption: {title}", "", *entries, "```"]))
-    return "\n\n".join([index.rstrip(), *trees]) + "\n"
+    return "".join(shown) + "\n\n".join(trees) + "\n"

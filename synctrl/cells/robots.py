@@ -9,12 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..robots.base_parameters import BaseParameters
+from ..robots.base_parameters import parameters_of
 from ..robots.catalog import load_robot
 from ..robots.friction import Friction
 from ..robots.parameters import (
     FrictionParameters,
-    FullParameters,
     LinearParameters,
     Parameters,
     planar_two_link_parameters,
@@ -210,12 +209,12 @@ Adapted = Callable[[Robot], Parameters | str]
 
 def full() -> Adapted:
     """All inertial parameters of all bodies, ten each."""
-    return FullParameters
+    return lambda robot: "full"
 
 
 def base() -> Adapted:
     """The fewest parameters that give the same torques."""
-    return BaseParameters
+    return lambda robot: "base"
 
 
 def linear(matrix: ArrayLike, theta: ArrayLike, names: Sequence[str]) -> Adapted:
@@ -239,14 +238,20 @@ def planar(masses: ArrayLike = (1.0, 1.0), lengths: ArrayLike = (0.3, 0.3)) -> A
     return lambda robot: planar_two_link_parameters(robot, masses, lengths)
 
 
-def rubbing(base: Adapted = FullParameters, armature: bool = False) -> Adapted:
+def rubbing(base: Adapted | None = None, armature: bool = False) -> Adapted:
     """Friction coefficients beside the parameters of the bodies.
 
     Args:
         base: parameters of the bodies; by default all of them.
         armature: whether the rotors are adapted too.
     """
-    return lambda robot: FrictionParameters(robot, base=base(robot), armature=armature)  # type: ignore[arg-type]
+
+    def made(robot: Robot) -> Parameters:
+        given = "full" if base is None else base(robot)
+        rigid = parameters_of(given, robot) if isinstance(given, str) else given
+        return FrictionParameters(robot, base=rigid, armature=armature)
+
+    return made
 
 
 _RIGID = (
