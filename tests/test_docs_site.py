@@ -77,7 +77,7 @@ def test_the_index_is_the_table_of_contents():
 
 def test_what_the_index_does_not_name_comes_last_in_its_section():
     index = "# A\n\n## Start\n\n- [Laws](laws.md)\n\n## Explanation\n"
-    pages = ["index.md", "laws.md", "theory.md", "start/install.md", "tutorials/b.ipynb", "a.png"]
+    pages = ["index.md", "laws.md", "theory.md", "theory.md", "start/install.md", "tutorials/b.ipynb", "a.png"]
     expected = {
         "Explanation": ["theory.md"],
         "Start": ["start/install.md"],
