@@ -34,13 +34,12 @@ DURATION, FPS, REST = 4.8, 12, 1.5
 #: size of the scenes and of the curves below them, pixels; they are drawn at SCALE times that
 WIDTH, SCENES, CURVES, SCALE = 840, 330, 150, 2
 CAMERA = (-0.03, -0.67, 1.12), (0.05, 0.0, 0.4)
-COLORS = 128
-#: the page draws no more by itself, on plain ground
+#: colours of the palette: of large areas, and of what is rare
+COMMON, RARE = 27, 100
+#: the page draws no more by itself, and on white
 STILL = """window.requestAnimationFrame = () => 0; viewer.animator.pause();
-viewers.forEach(each => {
-  each.set_property(["Background"], "top_color", [1, 1, 1]);
-  each.set_property(["Background"], "bottom_color", [0.93, 0.94, 0.95]);
-});"""
+viewers.forEach(each => ["top_color", "bottom_color"].forEach(
+  which => each.set_property(["Background"], which, [1, 1, 1])));"""
 #: what all scenes show at a time, as addresses of PNG pictures
 SEEN = """viewers.map(each => {
   each.animator.seek(%g); each.animator.display_progress(%g); each.render();
@@ -147,10 +146,19 @@ def write(pictures: list[Image.Image], file: Any) -> None:
 
 
 def palette_of(pictures: list[Image.Image]) -> Image.Image:
-    """Colours that come near all that are in the pictures, the rare ones too."""
-    found = np.unique(np.concatenate([np.asarray(each).reshape(-1, 3) // 8 for each in pictures]), axis=0)
-    every = Image.fromarray((8 * found + 4)[None].astype(np.uint8))
-    return every.quantize(COLORS, Image.Quantize.MEDIANCUT, kmeans=2)
+    """White, colours of large areas, and colours that come near all others, the rare ones too."""
+    seen = np.concatenate([np.asarray(each).reshape(-1, 3) for each in pictures])
+    kinds = 8 * np.unique(seen // 8, axis=0) + 4
+    parts = [np.full((1, 3), 255), chosen(seen[::7], COMMON), chosen(kinds, RARE)]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(np.concatenate(parts).astype(np.uint8).tobytes())
+    return palette
+
+
+def chosen(colors: np.ndarray, count: int) -> np.ndarray:
+    """So many colours for a list of them, (n, 3)."""
+    row = Image.fromarray(colors[None].astype(np.uint8)).quantize(count, Image.Quantize.MEDIANCUT, kmeans=2)
+    return np.array(row.getpalette()).reshape(-1, 3)[:count]
 
 
 if __name__ == "__main__":

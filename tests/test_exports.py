@@ -354,7 +354,8 @@ def test_what_is_no_path_of_a_file_is_refused(method, tmp_path):
         ("to_pandas", "pandas", "pandas"),
         ("to_netcdf", "h5netcdf", "h5netcdf"),
         ("to_netcdf", "h5py", "h5py"),
-        ("to_mcap", "mcap_protobuf.writer", "mcap_protobuf"),
+        ("to_mcap", "mcap.writer", "mcap"),
+        ("to_mcap", "mcap_protobuf.schema", "mcap_protobuf"),
         ("to_mcap", "foxglove_schemas_protobuf.JointStates_pb2", "foxglove_schemas_protobuf"),
     ],
 )

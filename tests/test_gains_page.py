@@ -55,5 +55,5 @@ def test_beta_and_k_eps_do_what_the_table_says():
 
 def test_inertia_differs_from_joint_to_joint_as_the_page_says():
     M = np.array([row["inertia"] for row in advise(pair(), Gains(8, 4, 40, 40, 0.1)).rows[:6]])
-    (told,) = re.findall(r"M_jj differs by a factor of (\d+) between", PAGE)
+    (told,) = re.findall(r"differs by a factor of (\d+) between", PAGE)
     assert M.max() / M.min() == pytest.approx(float(told), rel=0.05)

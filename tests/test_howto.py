@@ -56,7 +56,10 @@ def test_the_blocks_run_and_print_what_the_page_shows(page, tmp_path, monkeypatc
 def test_a_page_is_one_question_and_an_answer_that_runs(page):
     first, *rest = PAGES[page].splitlines()
     assert re.fullmatch(r"# [A-Z].*\?", first)
-    assert not any(line.startswith("# ") for line in re.sub(r"```.*?```", "", "\n".join(rest), flags=re.DOTALL).splitlines())
+    assert not any(
+        line.startswith("# ")
+        for line in re.sub(r"```.*?```", "", "\n".join(rest), flags=re.DOTALL).splitlines()
+    )
     assert "```python\n" in PAGES[page]
 
 

@@ -35,8 +35,7 @@ def test_the_page_names_all_figures_of_the_proof():
 
 
 def test_the_page_names_a_function_for_every_figure_of_a_run():
-    (words,) = re.findall(
-        r"^Each is a function of `synctrl.show`.*?\n\n", PAGE, flags=re.MULTILINE | re.DOTALL
-    )
-    named = re.findall(r"`(\w+)`", words.partition(", all with")[0])
+    pattern = r"^Each is a function of `synctrl.show`(.*?), all with"
+    (words,) = re.findall(pattern, PAGE, re.MULTILINE | re.DOTALL)
+    named = re.findall(r"`(\w+)`", words)
     assert len(named) == 12 and all(name in synctrl.show.__all__ for name in named)

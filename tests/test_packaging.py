@@ -84,6 +84,8 @@ MODULES = {
     "PyYAML": {"yaml"},
     "tree-sitter": {"tree_sitter"},
     "tree-sitter-toml": {"tree_sitter_toml"},
+    "mcap-protobuf-support": {"mcap_protobuf"},
+    "rerun-sdk": {"rerun"},
 }
 #: asked for although nothing imports them, and why
 UNIMPORTED = {
@@ -92,6 +94,9 @@ UNIMPORTED = {
     "example-robot-data": "a folder of URDF files and meshes",
     "pycollada": "trimesh reads DAE files with it",
     "xarray": "pandas makes datasets with it",
+    "h5netcdf": "xarray writes netCDF files with it",
+    "h5py": "h5netcdf writes with it",
+    "foxglove-schemas-protobuf": "its modules are imported by the names of messages",
     "pytest-xdist": "the Makefile starts tests with it",
     "hatchling": "builds the package",
     "ipykernel": "notebooks run in it",
@@ -131,7 +136,7 @@ def imported(*folders: str) -> set[str]:
 
 def test_every_library_that_the_package_imports_is_asked_for():
     assert imported("synctrl") <= set.union(
-        *map(modules_of, asked("compiled", "mujoco", "sweep", "tune", "xacro"))
+        *map(modules_of, asked("compiled", "mujoco", "sweep", "tune", "xacro", "data", "rerun"))
     )
 
 
@@ -145,6 +150,8 @@ def test_every_library_that_the_package_imports_is_asked_for():
         ("sweep", ["synctrl"]),
         ("tune", ["synctrl"]),
         ("xacro", ["synctrl"]),
+        ("data", ["synctrl", "tests"]),
+        ("rerun", ["synctrl"]),
         ("benchmark", ["synctrl", "scripts"]),
         ("notebooks", ["notebooks", "tests"]),
         ("test", ["tests"]),
@@ -159,7 +166,7 @@ def test_every_library_that_is_asked_for_is_used(extra, users):
 
 def test_the_lowest_versions_are_those_of_the_lower_bounds():
     lowest = dict(line.split("==") for line in (ROOT / "constraints-lowest.txt").read_text().splitlines()[1:])
-    for requirement in asked("compiled", "compiler", "mujoco", "sweep", "tune", "test"):
+    for requirement in asked("compiled", "compiler", "mujoco", "sweep", "tune", "data", "test"):
         bound = re.search(r">=([\d.]+)", requirement).group(1)
         assert (lowest[name_of(requirement)] + ".0.0").startswith(bound + "."), requirement
 
@@ -167,5 +174,8 @@ def test_the_lowest_versions_are_those_of_the_lower_bounds():
 def test_the_versions_of_every_library_that_is_asked_for_are_written_down():
     text = (ROOT / "constraints.txt").read_text()
     names = {line.partition("==")[0].lower() for line in text.splitlines()}
-    needed = asked("compiled", "compiler", "mujoco", "sweep", "tune", "xacro", "test", "notebooks", "dev")
+    needed = asked(
+        *("compiled", "compiler", "mujoco", "sweep", "tune", "xacro", "data", "rerun"),
+        *("test", "notebooks", "dev"),
+    )
     assert {name_of(requirement).lower() for requirement in needed} <= names

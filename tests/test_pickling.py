@@ -93,6 +93,7 @@ VALUES = {
     **{"order": 2, "row": 0, "error": 3.0},
     "frame": "tol",
     "available": ("tool", "flange"),
+    "place": ("robots", 0, "q0"),
     **{"subject": "link 'arm'", "found": 0.25, "file": "arm.urdf", "line": 7},
 }
 

@@ -329,6 +329,8 @@ def test_a_layout_shows_what_is_in_the_recording(recording, name):
     scene = panels["3D!scene"]
     assert {topic for topic in found.messages if topic.startswith("/scene")} <= {*scene["topics"]}
     assert scene["followTf"] == "world"
+    hidden = {key.removeprefix("frame:") for key, each in scene["transforms"].items() if not each["visible"]}
+    assert hidden == {*frames(found.messages["/tf"][0][1])}  # axes of all frames would hide the cell
 
 
 def test_the_camera_of_the_layout_sees_the_whole_scene(recording):

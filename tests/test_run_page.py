@@ -19,6 +19,7 @@ from synctrl.analysis.metrics import metrics
 from synctrl.errors import InputError, ResultError
 from synctrl.show.run_page import PAGE, write_run_page
 from synctrl.show.run_summary import pairs_table, peaks, robots_table, sentences, warnings
+from synctrl.show.runs import as_far_as_it_means
 from synctrl.simulation.result import LAYOUT
 
 NASTY = "</title><script>alert(1)</script><img src=x onerror=alert(2)>\"'"
@@ -151,6 +152,19 @@ def test_a_run_that_stopped_or_went_astray_has_a_page_that_says_so(star, tmp_pat
     text = write_run_page(run, tmp_path).read_text("utf-8")
     assert "The run stopped at t = 0.1 s of 7 s" in text and "not finite at t = 0.1 s" in text
     assert "went astray" in text and text.count("<figure>") == 0
+
+
+def test_of_a_run_that_ran_away_the_beginning_is_drawn(star, tmp_path):
+    growing = np.geomspace(1e-3, 1e40, len(star.t))[:, None, None]
+    arrays = {name: growing * np.ones_like(getattr(star, name)) for name in ("tracking_error", "v", "tau")}
+    run = replace(star, info={**star.info, "status": "stopped: joint 2 ran away"}, **arrays)
+    seen = as_far_as_it_means(run)
+    assert np.abs(seen.v).max() <= 1e3 < np.abs(run.v[len(seen.t)]).min()
+    ended = replace(run, info=star.info)
+    assert as_far_as_it_means(ended) is ended
+    text = write_run_page(run, tmp_path).read_text("utf-8")
+    assert f"Drawn until t = {seen.t[-1]:g} s" in text and text.count("<figure>") >= 5
+    assert "stopped:" not in text
 
 
 def test_a_certificate_is_told_in_words(star, tmp_path):

@@ -1,4 +1,4 @@
-"""A newcomer who does what the pages of the chapter Start say gets through: every block of them runs, in order."""
+"""A newcomer who does what the pages of the chapter Start say gets through: every block runs, in order."""
 
 from __future__ import annotations
 

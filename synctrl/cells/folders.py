@@ -22,7 +22,9 @@ def below(folder: Path, name: str, place: Place) -> Path:
     pure = PurePosixPath(name)
     outside = pure.is_absolute() or ".." in pure.parts or "\0" in name or "\\" in name
     if outside or PureWindowsPath(name).drive:
-        raise Misfit(place, f"expected a path that stays below the folder of this file, found {name!r}", name)
+        raise Misfit.at(
+            place, f"expected a path that stays below the folder of this file, found {name!r}", name
+        )
     try:
         found = (folder / pure).resolve()
         exists = found.exists()
@@ -32,18 +34,20 @@ def below(folder: Path, name: str, place: Place) -> Path:
         words = (
             f"expected a path that stays below the folder of this file, found {name!r}, a link that leads out"
         )
-        raise Misfit(place, words, name)
+        raise Misfit.at(place, words, name)
     if not exists:
         words = f"expected a file below the folder of this file, found none at {name!r}"
-        raise Misfit(place, f"{words}{near(name, _beside(folder, pure))}", name)
+        raise Misfit.at(place, f"{words}{near(name, _beside(folder, pure))}", name)
     return found
 
 
 def _beside(folder: Path, pure: PurePosixPath) -> list[str]:
-    """Names of what there is in the folder in which a file should be."""
+    """Names of what there is in the folder in which a file should be, if that lies below."""
     try:
+        if not (folder / pure.parent).resolve().is_relative_to(folder.resolve()):
+            return []
         return [(pure.parent / each.name).as_posix() for each in (folder / pure.parent).iterdir()]
-    except OSError:
+    except (OSError, RuntimeError):
         return []
 
 

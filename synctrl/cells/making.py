@@ -118,7 +118,7 @@ class Maker:
         """Refuse what does not go with the cell where it stands, and not with the whole."""
         if "adaptation" in made and self._file.gains.Gamma is not None:
             words = "expected none, for [adaptation] says how the controller learns, found one"
-            raise Misfit(("gains", "Gamma"), words)
+            raise Misfit.at(("gains", "Gamma"), words)
         for name, fits in FITS.items():
             for k, part in enumerate(made.get(PARTS[name], ())):
                 keys = {key: (name, k, key) for key in getattr(self._file, name)[k].model_fields_set}
@@ -139,12 +139,14 @@ class Maker:
             kinds = [each.name for each in MOTIONS]
             is_kind = f'; for a kind write {{ kind = "{name}", ... }}' if name in kinds else near(name, known)
             found = f"{str(name)!r}{is_kind}"
-            raise Misfit(place, f"expected the name of {words} in [{table}], found {found}", str(name))
+            raise Misfit.at(place, f"expected the name of {words} in [{table}], found {found}", str(name))
         if key not in self._made:
             self._made[key] = _Unfinished
             self._made[key] = self.part(known[name], key)
         if self._made[key] is _Unfinished:
-            raise Misfit(place, f"expected {words} that does not refer to itself, found {name!r}", str(name))
+            raise Misfit.at(
+                place, f"expected {words} that does not refer to itself, found {name!r}", str(name)
+            )
         return self._made[key]
 
     def _robot_index(self, name: str, place: Place) -> int:
@@ -153,13 +155,15 @@ class Maker:
             listed = (
                 f"one of {', '.join(map(repr, known))}" if known else "a number: the robots have no names"
             )
-            raise Misfit(place, f"expected {listed}, found {str(name)!r}{near(name, known)}", str(name))
+            raise Misfit.at(place, f"expected {listed}, found {str(name)!r}{near(name, known)}", str(name))
         return self._names.index(name)
 
     def _robot_number(self, number: int, place: Place) -> int:
         if not 0 <= number < len(self._names):
             last = len(self._names) - 1
-            raise Misfit(place, f"expected the number of a robot, from 0 to {last}, found {number}", number)
+            raise Misfit.at(
+                place, f"expected the number of a robot, from 0 to {last}, found {number}", number
+            )
         return int(number)
 
     def _meant(self) -> dict[str, Place]:
@@ -189,7 +193,7 @@ class Maker:
         parts = {name: self.part(getattr(table, name), (*place, name)) for name in given}
         for first, second in APART:
             if first in parts and second in parts:
-                raise Misfit((*place, second), f"expected one of `{first}` and `{second}`, found both")
+                raise Misfit.at((*place, second), f"expected one of `{first}` and `{second}`, found both")
         if parts.get("friction") == "none":
             parts["friction"] = Friction()
         with _placed(place, {name: (*place, name) for name in given}):
@@ -246,7 +250,7 @@ def _placed(place: Place, keys: Mapping[str, Place]) -> Iterator[None]:
     try:
         yield
     except ArithmeticError as error:
-        raise Misfit(
+        raise Misfit.at(
             place, f"expected numbers with which one can reckon, found some that end in: {error}"
         ) from error
     except SynctrlError as error:
@@ -255,4 +259,4 @@ def _placed(place: Place, keys: Mapping[str, Place]) -> Iterator[None]:
         at = next((keys[word] for word in reversed(words) if word in keys), place)
         left = [word for word in words if word not in keys]
         said = str(error) if error.file or not error.problem else ": ".join([*left, error.problem])
-        raise Misfit(at, said, error.found) from error
+        raise Misfit.at(at, said, error.found) from error

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, Portable
 
 #: a place in a file: keys and indices from the top
 Place = tuple[str | int, ...]
@@ -42,18 +43,23 @@ class CellFileError(InputError):
         return whole
 
 
-class Misfit(Exception):
+class Misfit(Portable, Exception):
     """Something that does not fit at a place of a file, before it is known which line that is.
 
     Args:
+        message: what is expected, and what was found.
         place: where.
-        problem: what is expected, and what was found.
         found: what was found, as data.
     """
 
-    def __init__(self, place: Place, problem: str, found: object = None):
-        super().__init__(problem)
-        self.place, self.problem, self.found = place, problem, found
+    def __init__(self, message: str, place: Place = (), found: Any = None):
+        super().__init__(message)
+        self.problem, self.place, self.found = message, place, found
+
+    @classmethod
+    def at(cls, place: Place, message: str, found: Any = None) -> Misfit:
+        """The misfit of a place."""
+        return cls(message, place, found)
 
 
 def key_of(place: Place) -> str:

@@ -109,7 +109,7 @@ class Writer:
         if kind is None:
             name = getattr(value, "__qualname__", type(value).__qualname__)
             words = f"expected a part that has a name in cell files, found {name}, which has none"
-            raise Misfit(place, words, name)
+            raise Misfit.at(place, words, name)
         keys = {name: self.part(each, (*place, name)) for name, each in kind.told(kind.read(value)).items()}
         return {"kind": kind.name, **keys} if kind.name else keys
 
@@ -171,7 +171,7 @@ class Writer:
         """
         if not robot.origin:
             words = "expected a robot of load_robot, and what its methods made of it, found one of a model"
-            raise Misfit((*place, "robot"), f"{words}: '{robot.name}'", robot.name)
+            raise Misfit.at((*place, "robot"), f"{words}: '{robot.name}'", robot.name)
         loaded, *steps = robot.origin
         keys = self._loaded(loaded.given, (*place, "robot"))
         if steps and steps[0].kind == "weightless":
@@ -196,7 +196,7 @@ class Writer:
         name = from_folder(self._folder, path)
         if name is None:
             words = f"expected a file below the folder of the cell file, found {path}"
-            raise Misfit(place, f"{words}; write the cell file beside it, or copy it there", str(path))
+            raise Misfit.at(place, f"{words}; write the cell file beside it, or copy it there", str(path))
         return name if "/" in name or Path(name).suffix else f"./{name}"
 
     def _change(self, kind: str, given: Mapping[str, Any], place: Place) -> dict[str, Any]:
@@ -240,7 +240,7 @@ class Writer:
         kind = PLANTS.get(plant.func) if isinstance(plant, partial) and not plant.args else None
         if kind is None:
             name = getattr(plant, "__qualname__", repr(plant))
-            raise Misfit(place, f"expected a plant that has a name in cell files, found {name}", name)
+            raise Misfit.at(place, f"expected a plant that has a name in cell files, found {name}", name)
         keys = {name: self._of_plant(name, value, (*place, name)) for name, value in given.items()}
         return {"plant": {"kind": kind.name, **kind.told(keys)}}
 
@@ -279,4 +279,4 @@ def _placed(place: Place) -> Iterator[None]:
     try:
         yield
     except SynctrlError as error:
-        raise Misfit(place, error.problem, error.found) from error
+        raise Misfit.at(place, error.problem, error.found) from error

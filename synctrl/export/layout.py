@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from .bodies import WORLD
+from ..show.scene import Scene
+from .bodies import WORLD, take_apart
 from .pictures import CHANGING, GROWING, STILL
 from .signals import Signal
 
@@ -19,19 +20,19 @@ CURVES = 40
 FAR = 3.0
 
 
-def layout(found: Sequence[Signal], box: np.ndarray | None) -> dict[str, Any]:
+def layout(found: Sequence[Signal], shown: Scene | None) -> dict[str, Any]:
     """A layout of Foxglove.
 
     Args:
         found: the signals of the recording.
-        box: lowest and highest corner of the scene, (2, 3), m; None if there is none.
+        shown: the scene of the recording, if it has one.
     """
-    panels = {} if box is None else {"3D!scene": _scene(box)}
+    panels = {} if shown is None else {"3D!scene": _scene(shown)}
     plots = [signal for name in PLOTTED for signal in found if signal.quantity.name == name]
     ids = [f"Plot!{signal.quantity.name}" for signal in plots]
     panels |= dict(zip(ids, map(_plot, plots), strict=True))
     column = _stacked(ids)
-    scene: Any = "3D!scene" if box is not None else None
+    scene: Any = "3D!scene" if shown is not None else None
     both = {"first": scene, "second": column, "direction": "row", "splitPercentage": 55}
     return {
         "configById": panels,
@@ -50,7 +51,8 @@ def _stacked(ids: Sequence[str]) -> Any:
     return {"first": ids[0], "second": _stacked(ids[1:]), "direction": "column", "splitPercentage": share}
 
 
-def _scene(box: np.ndarray) -> Mapping[str, Any]:
+def _scene(shown: Scene) -> Mapping[str, Any]:
+    box, frames = shown.box(), take_apart(shown.nodes)[0]
     size = float(np.linalg.norm(box[1] - box[0])) or 1.0
     return {
         "cameraState": {
@@ -67,8 +69,10 @@ def _scene(box: np.ndarray) -> Mapping[str, Any]:
         },
         "followMode": "follow-none",
         "followTf": WORLD,
-        "scene": {"transforms": {"visible": False, "showLabel": False, "axisScale": 0.1 * size}},
-        "transforms": {},
+        "scene": {"transforms": {"showLabel": False, "axisScale": 0.1 * size}},
+        "transforms": {
+            f"frame:{name}": {"visible": False} for name in (WORLD, *(each.name for each in frames))
+        },
         "topics": {topic: {"visible": True} for topic in (STILL, CHANGING, GROWING)},
         "layers": {"grid": _grid(size)},
         "publish": {},
@@ -115,6 +119,7 @@ def _plot(signal: Signal) -> Mapping[str, Any]:
         "showPlotValuesInLegend": False,
         "isSynced": True,
         "xAxisVal": "timestamp",
+        "yAxisLabel": signal.quantity.unit,
         "sidebarDimension": 240,
         "foxglovePanelTitle": f"{signal.quantity.long_name}, {signal.quantity.unit}",
     }

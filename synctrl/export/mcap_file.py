@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from .identifiers import identifiers
 from .layout import layout
 from .names import PAPER
 from .needed import needed
-from .pictures import Pictures, message, nanoseconds_of, stamp
+from .pictures import SCHEMAS, Pictures, message, nanoseconds_of, stamp
 from .quantities import quantities
 from .shown import picture_instants, scene_or_warn
 from .signals import Signal, numbers_of, signals
@@ -39,18 +39,17 @@ def to_mcap(result: Result, path: str | Path, *, fps: float = 30.0) -> Path:
         RobotWarning: there is no scene, and why.
     """
     instance("path", path, (str, Path), "a path")
-    writer = needed("an MCAP recording", "mcap_protobuf.writer")
+    needed("an MCAP recording", "mcap.writer", "mcap_protobuf.schema", f"{SCHEMAS}.JointStates_pb2")
     found, frames = signals(quantities(result)), picture_instants(result, fps)
     scene = scene_or_warn(result, fps) if len(frames) else None
-    with reported("write the recording", path), whole_file(path) as file, writer.Writer(file) as recording:
-        for name, words in _about(result, found).items():
-            recording.add_metadata(name, words)
-        for topic, each, t in _messages(result, found, scene, frames):
-            at = nanoseconds_of(t)
-            recording.write_message(topic, each, log_time=at, publish_time=at)
+    with reported("write the recording", path), whole_file(path) as file:
+        recording = _Recording(file, _about(result, found))
+        for each in _messages(result, found, scene, frames):
+            recording.write(*each)
+        recording.finish()
     beside = Path(path).with_suffix(".layout.json")
     with reported("write the layout", beside):
-        write_whole(beside, json.dumps(layout(found, None if scene is None else scene.box()), indent=1))
+        write_whole(beside, json.dumps(layout(found, scene), indent=1))
     return Path(path)
 
 
@@ -61,6 +60,32 @@ def _about(result: Result, found: list[Signal]) -> dict[str, dict[str, str]]:
         "run": {**run, "info": json.dumps(dict(result.info))},
         "quantities": {signal.topic: signal.about() for signal in found},
     }
+
+
+class _Recording:
+    """Messages of protobuf in an MCAP file that begins with some metadata."""
+
+    def __init__(self, file: BinaryIO, about: Mapping[str, dict[str, str]]):
+        from mcap.writer import Writer
+
+        self._writer, self._channels = Writer(file), {}  # type: ignore[var-annotated]
+        self._writer.start(library="synctrl")
+        for name, words in about.items():
+            self._writer.add_metadata(name, words)
+        self.finish = self._writer.finish
+
+    def write(self, topic: str, found: Any, t: float) -> None:
+        """Write a message to a topic, whose messages are all of one type, at a time, s."""
+        if topic not in self._channels:
+            self._channels[topic] = self._channel(topic, found)
+        channel, at = self._channels[topic], nanoseconds_of(t)
+        self._writer.add_message(channel, log_time=at, data=found.SerializeToString(), publish_time=at)
+
+    def _channel(self, topic: str, found: Any) -> int:
+        from mcap_protobuf.schema import register_schema
+
+        schema = register_schema(self._writer, type(found))
+        return int(self._writer.register_channel(topic, message_encoding="protobuf", schema_id=schema))
 
 
 def _messages(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import permutations
 from types import MappingProxyType
@@ -88,7 +89,8 @@ def coordinate_units(unit: str, length: int) -> list[str]:
 def pair_names(result: Result) -> list[str]:
     """What each synchronization error compares: `robot 1, robot 2`, or `all 3 robots`; no two are alike."""
     names = [_compared(result.names, pair) for pair in result.info["pairs"]]
-    return [f"{k}: {name}" if names.count(name) > 1 else name for k, name in enumerate(names, start=1)]
+    times = Counter(names)
+    return [f"{k}: {name}" if times[name] > 1 else name for k, name in enumerate(names, start=1)]
 
 
 def _compared(names: Sequence[str], pair: Sequence[int]) -> str:

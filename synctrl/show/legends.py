@@ -149,15 +149,21 @@ def shortened(text: str, room: float, size: float) -> str:
     return f"{text[: max(fits - 1, 1)].rstrip(chr(92))}…"
 
 
-@lru_cache(maxsize=4096)
 def text_width(text: str, size: float) -> float:
-    """How wide words are in a size, both in points."""
+    """How wide words are in a size, both in points, in the letters that are set."""
+    from matplotlib import rcParams
+
+    return _width(text, size, tuple(rcParams["font.family"]))
+
+
+@lru_cache(maxsize=4096)
+def _width(text: str, size: float, family: tuple[str, ...]) -> float:
     from matplotlib.cbook import is_math_text
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import text_to_path
 
     if not text.strip():
         return 0.0
-    font = FontProperties(family="DejaVu Sans", size=size)
+    font = FontProperties(family=[*family], size=size)
     width, _, _ = text_to_path.get_text_width_height_descent(text, font, is_math_text(text))
     return HINTED * float(width)

@@ -145,7 +145,7 @@ def _look() -> Any:
 
 def _sizes(look: Look) -> Any:
     """What a look sets beside the style sheet: sizes, letters, and the colours of whatever has none."""
-    from cycler import cycler
+    from matplotlib.rcsetup import cycler
 
     words = {
         "font.size": SIZE,

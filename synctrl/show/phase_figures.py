@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..simulation.result import Result
 from .legends import legend, legend_rows, plain, shortened
 from .look import TITLE_SIZE, in_look
-from .panels import GRID_LEFT, GRID_RIGHT, LEGEND, panel_grid
+from .panels import GRID_RIGHT, LEGEND, panel_grid
 from .runs import check_run
 from .style import DESIRED, display, robot_color
 
@@ -49,7 +49,7 @@ def phase_portraits(result: Result, *, width: float | None = None, style: str | 
 def _grid(result: Result, rates: np.ndarray, width: float) -> Figure:
     handles, names = _handles(result), result.info["axes"]
     figure, panels = panel_grid(len(names), LEAST, HEIGHT, LEGEND * legend_rows(handles, width), width)
-    room = 72 * (panels[0].get_position().width * width + GRID_RIGHT + GRID_LEFT / 3)
+    room = 72 * (panels[0].get_position().width * width + GRID_RIGHT)
     for a, panel in enumerate(panels):
         unit, factor = display(result.units("tracking_error")[0][a])
         e, rate = factor * result.tracking_error[:, :, a], factor * rates[:, :, a]

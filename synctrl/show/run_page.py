@@ -36,7 +36,7 @@ from .page import (
 from .phase_figures import phase_portraits
 from .run_figures import Gallery, gallery
 from .run_summary import headline, pairs_table, robots_table, sentences, warnings
-from .runs import check_run
+from .runs import as_far_as_it_means, check_run
 from .shown import Shown
 from .spectrum_figures import spectra
 from .tip_figures import tip_paths
@@ -79,11 +79,12 @@ def write_run_page(
     if certificate is not None:
         instance("certificate", certificate, Certificate, "what `certify` gives")
     folder = Path(folder)
+    seen = as_far_as_it_means(result)
     sections = [
         _summary(result, certificate),
         _certificate(certificate, folder),
-        _animation(result, experiment, folder),
-        _figures(result, experiment, folder),
+        _animation(seen, experiment, folder),
+        _figures(seen, experiment, folder, _until(seen, result)),
         _made_with(result),
     ]
     title = printable(str(result.info["title"])) or "a run"
@@ -117,7 +118,7 @@ def _summary(result: Result, certificate: Certificate | None) -> Section:
 def _certificate(certificate: Certificate | None, folder: Path) -> Section:
     if certificate is None:
         blocks: list[Block] = [
-            Text("This page was written without a certificate: `certify(result)` makes one.")
+            Text("This page was written without a certificate: synctrl.analysis.certify(result) makes one.")
         ]
     else:
         blocks = certificate_blocks(certificate)
@@ -141,7 +142,7 @@ def _animation(result: Result, experiment: Experiment | None, folder: Path) -> S
     return Section("Animation", (Animation(scene), link))
 
 
-def _figures(result: Result, experiment: Experiment | None, folder: Path) -> Section:
+def _figures(result: Result, experiment: Experiment | None, folder: Path, until: list[Block]) -> Section:
     try:
         found = gallery(result)
         _add(found, result, experiment)
@@ -149,7 +150,15 @@ def _figures(result: Result, experiment: Experiment | None, folder: Path) -> Sec
         return Section("Figures", (Text(f"Nothing can be drawn: {error}", "note"),))
     pictures = Columns(tuple(_picture(name, figure, folder) for name, figure in found.items()))
     missing = tuple(f"Not shown: {name}: {reason}" for name, reason in found.missing.items())
-    return Section("Figures", (pictures, *([Points(missing)] if missing else [])))
+    return Section("Figures", (*until, pictures, *([Points(missing)] if missing else [])))
+
+
+def _until(seen: Result, result: Result) -> list[Block]:
+    """What is said of a run of which only the beginning is drawn."""
+    if len(seen.t) == len(result.t):
+        return []
+    end = number(float(seen.t[-1]), 6)
+    return [Text(f"Drawn until t = {end} s: what the run has later has no meaning.", "note")]
 
 
 def _add(found: Gallery, result: Result, experiment: Experiment | None) -> None:

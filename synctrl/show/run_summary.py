@@ -170,7 +170,8 @@ def headline(result: Result) -> tuple[str, bool]:
     if result.status == COMPLETED:
         return f"The run came to its end, t = {number(end, 6)} s.", True
     of = f" of {number(planned, 6)} s" if isinstance(planned, int | float) else ""
-    return f"The run stopped at t = {number(end, 6)} s{of}: {result.status}", False
+    why = result.status.removeprefix("stopped: ")
+    return f"The run stopped at t = {number(end, 6)} s{of}: {why}.", False
 
 
 def sentences(result: Result, computed: Metrics) -> list[str]:

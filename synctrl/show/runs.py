@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..analysis.replay import experiment_of
 from ..checks import instance, positive_number
 from ..errors import InputError
-from ..simulation.result import Result
+from ..simulation.result import LAYOUT, Result
 from ..simulation.simulate import Experiment
 
 #: numbers beyond it are those of a run that went astray; no picture of them says anything
 LARGEST = 1e30
+#: an error, rad or m, or a speed, from which nothing comes back
+LOST = 1e3
 #: frames of an animation, about two hours at 25 frames per second
 MOST_FRAMES = 200_000
 
@@ -40,6 +44,24 @@ def check_run(result: Result, *arrays: str) -> None:
                 subject=f"run '{result.info['title']}', {name}",
                 found=found,
             )
+
+
+def as_far_as_it_means(result: Result) -> Result:
+    """A run that stopped, without the rows at its end that have no meaning; else the run as it is.
+
+    These are the rows from the first on in which an error or a speed is beyond `LOST`. If that leaves fewer
+    than three, there is nothing to see, and the run is returned whole.
+    """
+    lost = [
+        ~(np.abs(array) <= LOST).reshape(len(array), -1).all(axis=1)
+        for array in (result.tracking_error, result.v)
+    ]
+    kept = int(np.argmax(np.any(lost, axis=0))) if np.any(lost) else len(result.t)
+    if result.status == "completed" or not 3 <= kept < len(result.t):
+        return result
+    arrays = {name: getattr(result, name)[:kept] for name in LAYOUT}
+    outputs = {name: array[:kept] for name, array in result.outputs.items()}
+    return replace(result, **arrays, outputs=outputs)
 
 
 def check_output(result: Result, name: str) -> np.ndarray:

@@ -13,7 +13,7 @@ from .arms import tip_positions
 from .cell_scene import desired_tips, robots_of
 from .legends import legend, legend_rows, plain, shortened
 from .look import TITLE_SIZE, in_look
-from .panels import GRID_LEFT, GRID_RIGHT, LEGEND, panel_grid
+from .panels import GRID_RIGHT, LEGEND, panel_grid
 from .runs import check_run
 from .style import DESIRED, robot_color
 
@@ -75,7 +75,7 @@ def _grid(result: Result, tips: np.ndarray, wanted: np.ndarray | None, width: fl
     count = len(result.names) * len(views)
     above = LEGEND * legend_rows(handles, width)
     figure, panels = panel_grid(count, LEAST, None, above, width, len(views))
-    room = 72 * (panels[0].get_position().width * width + GRID_RIGHT + GRID_LEFT / 3)
+    room = 72 * (panels[0].get_position().width * width + GRID_RIGHT)
     for k, panel in enumerate(panels):
         i, view = divmod(k, len(views))
         _draw(panel, tips[:, i], None if wanted is None else wanted[:, i], views[view], robot_color(i))
