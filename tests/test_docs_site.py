@@ -76,6 +76,14 @@ def test_the_index_is_the_table_of_contents_and_names_every_page():
     assert "\nreference/robots.rst\n" in trees and "\n- [](/reference/robots.rst)\n" in trees
 
 
+def test_the_example_of_the_index_runs():
+    index = (ROOT / "docs" / "index.md").read_text("utf-8")
+    (block,) = re.findall(r"```python\n(.*?)```", index, re.DOTALL)
+    names: dict = {}
+    exec(block.replace("duration=2.0", "duration=0.02"), names)
+    assert names["result"].status == "completed"
+
+
 def test_what_the_index_does_not_name_comes_last_in_its_section():
     index = "# A\n\n## Start\n\n- [Laws](laws.md)\n\n## Explanation\n"
     pages = [
