@@ -59,7 +59,7 @@ display(joint_trajectories(together, 0), joint_trajectories(together, 1))
 #
 # ## Independent
 #
-# The same controller with β = K_ε = 0.
+# The same controller with $\beta = K_\epsilon = 0$.
 
 # %%
 alone = a460_pair(synchronized=False).simulate(DURATION)

@@ -62,7 +62,7 @@ def table(first, *rows):
 # that carries.
 #
 # Three controllers: both arms alone; both alone with Λ = 26 in the place of 6, as stiff as what comes next;
-# and synchronized, with β = 20 and K_ε = 2000.
+# and synchronized, with $\beta = 20$ and $K_\epsilon = 2000$.
 
 
 # %%
@@ -201,7 +201,7 @@ for name, run in (("without", without), ("with", waiting)):
 # ## Exercises
 #
 # 1. In the first task double the push. Is the bead twice as bad?
-# 2. Which of Λ, β and K_ε matters for the speed along the edge, on which the thickness depends?
+# 2. Which of Λ, β and $K_\epsilon$ matters for the speed along the edge, on which the thickness depends?
 # 3. In the second task let the *second* arm be pushed. Are `gap` and `phase` as good as before?
 # 4. Lay the bead on a path of your own: [assembly](../docs/assembly.md) has `Path` and `AlongPath`.
 #

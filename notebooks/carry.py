@@ -77,8 +77,8 @@ scene_of(alone)
 # %% [markdown]
 # ## What synchronization does where the geometry is exact
 #
-# With β and K_ε the arms agree on where the box is, as far as the fixtures give. The force inside goes down
-# faster than under independent control, and further.
+# With β and $K_\epsilon$ the arms agree on where the box is, as far as the fixtures give. The force inside
+# goes down faster than under independent control, and further.
 
 # %%
 together = carried()
@@ -131,7 +131,7 @@ display(overlay(object_error_curves, runs))
 # is: the first one's idea of it is taken over, right or wrong, so a constant error vanishes from ε. With an
 # *admittance* each arm feels the wrench inside and gives way to it, as a mass in honey would, so the force
 # goes to zero whatever the arms believe; the leak comes with it. And once nothing is left in ε that cannot
-# vanish, K_ε may be high.
+# vanish, $K_\epsilon$ may be high.
 
 # %%
 STIFF = GAINS.replace(K_eps=[2e4] * 3 + [200.0] * 3)  # N/m and N·m/rad

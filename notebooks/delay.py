@@ -116,9 +116,9 @@ display(overlay(epsilon, {"Γ = 0": late["1.4 times the margin"], "adapting": ad
 # %% [markdown]
 # ## The theorem
 #
-# If K_r - a/(4Λ) Jᵀ cᵀ K_ε c J is positive definite for every robot, with a the largest entry of the
-# diagonal of SᵀS, then *every* constant delay is tolerated. One eigenvalue for each robot is all that has
-# to be looked at. Both cells of the paper have it.
+# If $K_r - \frac{a}{4\Lambda} J^T c^T K_\epsilon c J$ is positive definite for every robot, with a the
+# largest entry of the diagonal of SᵀS, then *every* constant delay is tolerated. One eigenvalue for each
+# robot is all that has to be looked at. Both cells of the paper have it.
 
 # %%
 cells = {"four planar arms": planar_four(), "two A460": a460_pair(friction=False), "two UR5": arms}
@@ -158,9 +158,9 @@ display(delay_map_figure(maps))
 # %% [markdown]
 # ## The cure
 #
-# The theorem says it: more K_r for the joint that swings, less K_ε, or just the damping that is missing.
-# `SunMills(injection=True)` adds a/(4Λ) Jᵀ cᵀ K_ε r to the torque, and any constant delay is tolerated
-# again.
+# The theorem says it: more $K_r$ for the joint that swings, less $K_\epsilon$, or just the damping that is
+# missing. `SunMills(injection=True)` adds $\frac{a}{4\Lambda} J^T c^T K_\epsilon r$ to the torque, and any
+# constant delay is tolerated again.
 
 # %%
 cured = run(Network(delay=longer), gains=fixed, law=SunMills(injection=True))

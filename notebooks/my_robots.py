@@ -237,7 +237,7 @@ advise(cell, gains)
 # ## A run
 #
 # After one second somebody leans on crane 1: 12 N·m at its post for 0.3 s. `independent()` is the same
-# controller without synchronization, β = K_ε = 0: that is what we compare with.
+# controller without synchronization, $\beta = K_\epsilon = 0$: that is what we compare with.
 
 # %%
 push = Disturbance(robot=0, torque=(12.0, 0.0, 0.0), start=1.0, stop=1.3)
@@ -288,9 +288,9 @@ print(certify(together))
 #
 # The suggestion is a good beginning. What is best depends on what you want, and goals are at odds. Whoever
 # holds hands together pulls all three along with the one that is pushed: a smaller synchronization error ε,
-# or a smaller tracking error e? `tune` searches β and multiples of K_ε and Γ, with the same push, and gives
-# the *front*: all runs to which no other one is preferable in both. Runs that are too fast for their step
-# do not count.
+# or a smaller tracking error e? `tune` searches β and multiples of $K_\epsilon$ and Γ, with the same push,
+# and gives the *front*: all runs to which no other one is preferable in both. Runs that are too fast for
+# their step do not count.
 
 # %%
 GENERATIONS = 6
@@ -338,10 +338,10 @@ for name, chosen in (("suggested", gains), ("tuned", found.gains)):
     print(f"{name}: {delay_margin(cell, chosen)}")
 
 # %% [markdown]
-# The suggested K_ε is one with which a theorem tolerates every constant delay. The tuned one is larger: now
-# the roots of the linearized cell decide, and what they say holds for small errors. The stiffer the
-# coupling against the damping K_r, the less delay arms take, see [delays](delay.ipynb); where messages are
-# late, add `maximize="delay_margin"` to the search.
+# The suggested $K_\epsilon$ is one with which a theorem tolerates every constant delay. The tuned one is
+# larger: now the roots of the linearized cell decide, and what they say holds for small errors. The stiffer
+# the coupling against the damping $K_r$, the less delay arms take, see [delays](delay.ipynb); where
+# messages are late, add `maximize="delay_margin"` to the search.
 #
 # ## In motion
 #
@@ -373,7 +373,7 @@ for path in (*sorted(Path("out").glob("tuned.*")), page):
 #    does to the largest ε, then try it.
 # 3. Let the push be ten times as strong. When does a motor saturate, and what does the certificate say
 #    then?
-# 4. Ask for `bandwidth=20`, and for `bandwidth=20, period=4e-3`. What changes in K_r, and why?
+# 4. Ask for `bandwidth=20`, and for `bandwidth=20, period=4e-3`. What changes in $K_r$, and why?
 # 5. Give the tray a second motion, down again within two seconds, with a further entry in `breaks`.
 #
 # ## Further

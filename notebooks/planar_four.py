@@ -58,8 +58,8 @@ cell_layout(together)
 # %% [markdown]
 # ## With and without synchronization
 #
-# Independent control is the same controller with β = K_ε = 0. Each tip tracks about as well as before. What
-# differs is the synchronization error.
+# Independent control is the same controller with $\beta = K_\epsilon = 0$. Each tip tracks about as well as
+# before. What differs is the synchronization error.
 
 # %%
 alone = planar_four(synchronized=False).simulate(DURATION)

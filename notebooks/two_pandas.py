@@ -143,8 +143,8 @@ scene_of(runs["Natural(5)"])
 # 1. Let go of the bar again, with `stop=` of `Payload`. Which way to learn is quickest to forget it?
 # 2. Give both arms the same share of the load. What is left of the synchronization error, and why?
 # 3. Raise the rate of `Natural` threefold, and again. Where does it end, and what does the run warn of?
-# 4. With β = K_ε = 0, `gains.independent()`: how much of what holds the arms in step is learning, and how
-#    much is synchronization?
+# 4. With $\beta = K_\epsilon = 0$, `gains.independent()`: how much of what holds the arms in step is
+#    learning, and how much is synchronization?
 #
 # ## Further
 #

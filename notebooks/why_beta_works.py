@@ -70,8 +70,8 @@ figure
 # %% [markdown]
 # ## The two arms
 #
-# The same controller, with β and without; K_ε goes with it, but is in none of the gains. Friction near rest
-# is faster than the step, of which runs warn; see the notebook about the two arms.
+# The same controller, with β and without; $K_\epsilon$ goes with it, but is in none of the gains. Friction
+# near rest is faster than the step, of which runs warn; see the notebook about the two arms.
 
 # %%
 together = a460_pair().simulate(DURATION, log_dt=1e-2)

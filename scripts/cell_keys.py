@@ -16,8 +16,8 @@ HEAD = """\
 
 Every table of a [cell file](cell_files.md), with its keys; `scripts/cell_keys.py` makes this page from the
 schema. In italics is what a value is where no default is said. `(n,)` is a list of n numbers, `(n, m)` a list
-of n such lists, with n robots, m task coordinates, nv joints and P parameters. An angle is a number in rad, or
-a text such as `"90 deg"`.
+of n such lists, with n robots, m task coordinates, nv joints and P parameters. An angle is a number in rad,
+or a text such as `"90 deg"`.
 """
 #: tables by what they are for; the first have names that are not those of kinds
 GROUPS: dict[str, Sequence[Any]] = {

@@ -43,9 +43,8 @@ SECTIONS = {
 THUMBNAIL, SCREEN = (360, 240), (960, 640)
 #: in a row of thumbnails
 COLUMNS = 3
-#: share of an animation after which it is photographed; nothing but the scene is left in the picture
-BARE = """document.querySelectorAll(".words, .dg").forEach(each => each.style.display = "none");
-viewer.animator.pause(); viewer.animator.seek(0.6 * viewer.animator.duration);"""
+#: share of an animation after which it is photographed
+SHARE = 0.6
 
 
 class Example(NamedTuple):
@@ -101,9 +100,10 @@ def photograph(folder: Path) -> None:
     animations = folder / "animations"
     animations.mkdir(exist_ok=True)
     moved = [path.replace(animations / path.name) for path in sorted(folder.glob("*.html"))]
-    sys.path.insert(0, str(ROOT / "tests"))
+    sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "tests")]
     try:
         from browser import browser, open_page
+        from scene_pictures import freeze, joined, seen
     except ImportError:
         print("no pictures of animations: they need the extra `test`", file=sys.stderr)
         return
@@ -112,12 +112,7 @@ def photograph(folder: Path) -> None:
         return
     for path in moved:
         with open_page(path, SCREEN) as page:
-            page.wait_for("typeof viewer === 'object' && viewer.animator !== undefined")
-            if page.evaluate("viewer.animator.duration > 0"):  # a short run may have one frame
-                page.check_plays()
-            page.evaluate(BARE)
-            page.evaluate("new Promise(done => setTimeout(done, 800))")
-            page.screenshot(folder / f"{path.stem}_scene.png")
+            joined(seen(page, SHARE * freeze(page))).save(folder / f"{path.stem}_scene.png", optimize=True)
 
 
 def thumbnail(folder: Path, name: str) -> None:

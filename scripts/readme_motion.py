@@ -7,7 +7,6 @@ It needs the extras `compiled` and `test`, and Chromium, which draws the arms.
 
 from __future__ import annotations
 
-import base64
 import sys
 from collections.abc import Iterator
 from io import BytesIO
@@ -28,6 +27,7 @@ from synctrl.show.style import ACCENT, PALETTE
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from browser import open_page
+from scene_pictures import freeze, seen
 
 #: of the run, s; frames per second; and how long the last one stays, s
 DURATION, FPS, REST = 4.8, 12, 1.5
@@ -36,15 +36,6 @@ WIDTH, SCENES, CURVES, SCALE = 840, 330, 150, 2
 CAMERA = (-0.03, -0.67, 1.12), (0.05, 0.0, 0.4)
 #: colours of the palette: of large areas, and of what is rare
 COMMON, RARE = 27, 100
-#: the page draws no more by itself, and on white
-STILL = """window.requestAnimationFrame = () => 0; viewer.animator.pause();
-viewers.forEach(each => ["top_color", "bottom_color"].forEach(
-  which => each.set_property(["Background"], which, [1, 1, 1])));"""
-#: what all scenes show at a time, as addresses of PNG pictures
-SEEN = """viewers.map(each => {
-  each.animator.seek(%g); each.animator.display_progress(%g); each.render();
-  return each.renderer.domElement.toDataURL("image/png");
-})"""
 
 
 def main() -> None:
@@ -71,17 +62,9 @@ def scenes(runs: dict[str, Result], times: np.ndarray) -> Iterator[Image.Image]:
         TemporaryDirectory() as folder,
         open_page(shown.write(Path(folder, "page.html")), (SCALE * WIDTH, SCALE * SCENES)) as page,
     ):
-        page.check_plays()
-        page.evaluate(STILL)
+        freeze(page, white=True)
         for t in times:
-            panes = [decoded(address) for address in page.evaluate(SEEN % (t, t))]
-            yield row(dict(zip(runs, panes, strict=True)))
-
-
-def decoded(address: str) -> Image.Image:
-    """The picture that a data address holds."""
-    with Image.open(BytesIO(base64.b64decode(address.partition(",")[2]))) as picture:
-        return picture.convert("RGB")
+            yield row(dict(zip(runs, seen(page, t), strict=True)))
 
 
 def row(panes: dict[str, Image.Image]) -> Image.Image:
@@ -111,8 +94,8 @@ def curves(runs: dict[str, Result], times: np.ndarray) -> Iterator[Image.Image]:
         )
         for t in times:
             for name, run in runs.items():
-                seen = run.t <= t
-                lines[name].set_data(run.t[seen], errors[name][seen])
+                laid = run.t <= t
+                lines[name].set_data(run.t[laid], errors[name][laid])
             yield drawn(figure)
 
 
@@ -147,9 +130,9 @@ def write(pictures: list[Image.Image], file: Any) -> None:
 
 def palette_of(pictures: list[Image.Image]) -> Image.Image:
     """White, colours of large areas, and colours that come near all others, the rare ones too."""
-    seen = np.concatenate([np.asarray(each).reshape(-1, 3) for each in pictures])
-    kinds = 8 * np.unique(seen // 8, axis=0) + 4
-    parts = [np.full((1, 3), 255), chosen(seen[::7], COMMON), chosen(kinds, RARE)]
+    pixels = np.concatenate([np.asarray(each).reshape(-1, 3) for each in pictures])
+    kinds = 8 * np.unique(pixels // 8, axis=0) + 4
+    parts = [np.full((1, 3), 255), chosen(pixels[::7], COMMON), chosen(kinds, RARE)]
     palette = Image.new("P", (1, 1))
     palette.putpalette(np.concatenate(parts).astype(np.uint8).tobytes())
     return palette

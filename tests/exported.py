@@ -15,6 +15,7 @@ from sliders import GANTRY, SCARA, load, pair
 from synctrl import Disturbance, Network, Result, simulate
 from synctrl.errors import SimulationError
 from synctrl.experiments import a460_full_pair, bead_on_path, carry_planar, mixed_four, planar_four
+from synctrl.simulation.result import LAYOUT
 
 SHORT = {"duration": 0.02, "dt": 1e-3}
 
@@ -86,8 +87,6 @@ def arrays(run: Result) -> dict[str, np.ndarray]:
 
 def axes_of(run: Result, name: str) -> tuple[str, ...]:
     """Axes after time."""
-    from synctrl.simulation.result import LAYOUT
-
     return tuple(LAYOUT[name][0] if name in LAYOUT else run.info["outputs"][name]["axes"])[1:]
 
 

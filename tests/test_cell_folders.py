@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from refusals import refused
+from test_xacro import XMLNS, needs_xacro
 
 from synctrl import (
     Cell,
@@ -107,6 +109,26 @@ def test_a_robot_that_is_refused_is_named_with_both_files(folder: Path) -> None:
     with refused(CellFileError, "robots[0]", file=str(folder / "cell.toml")) as caught:
         read_cell(cell_with(folder, "arms/planar2r.urdf"))
     assert f"{urdf.name}:" in str(caught.value)
+
+
+@needs_xacro
+def test_a_xacro_file_takes_its_arguments_from_the_cell_file(folder: Path) -> None:
+    urdf = (folder / "arms" / "planar2r.urdf").read_text("utf-8")
+    inside = urdf.partition("<robot")[2].partition(">")[2]
+    mass = re.search(r'<mass value="([^"]*)"', inside)
+    assert mass is not None
+    body = inside.replace(mass.group(0), '<mass value="$(arg mass)"')
+    head = f'<?xml version="1.0"?>\n<robot name="arm" {XMLNS}><xacro:arg name="mass" default="1.0"/>'
+    (folder / "arm.xacro").write_text(head + body, "utf-8")
+    path = cell_with(
+        folder, "arm.xacro", STARTER.replace("known = 0.7", "known = 0.7\nxacro = { mass = 2.5 }", 1)
+    )
+    heavy, plain = read_cell(path).cell.robots[0], load_robot("planar2r")
+    changed = np.flatnonzero(heavy.inertial_parameters != plain.inertial_parameters)
+    assert heavy.inertial_parameters[0] == 2.5
+    assert changed[0] == 0
+    again = read_cell(write_cell(read_cell(path), folder / "again.toml")).cell.robots[0]
+    assert again.inertial_parameters.tobytes() == heavy.inertial_parameters.tobytes()
 
 
 @pytest.mark.parametrize("name", ["../arms/planar2r.urdf", "linked/planar2r.urdf"])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import re
 import warnings
 
 import numpy as np
@@ -13,6 +15,7 @@ from hypothesis import strategies as st
 from refusals import refused
 
 from synctrl import Gains, SynctrlError, sweep
+from synctrl.cells import schema
 from synctrl.cli import codes
 from synctrl.cli.answer import answering, code_of
 from synctrl.cli.console import readable
@@ -118,6 +121,9 @@ def test_near_names_are_said():
 def test_laws_have_the_names_of_cell_files():
     assert isinstance(named_laws(["sun-mills"], GAINS)["sun-mills"], SunMills)
     assert [*named_laws([*LAWS], GAINS)] == [*LAWS]
+    kinds = schema()["$defs"]
+    words = re.findall(r'"([a-z]+(?:-[a-z]+)+)"', json.dumps(kinds))
+    assert {*LAWS} - {"independent"} <= {*words}
     with refused(InputError, "--laws", found="chung"):
         named_laws(["chung"], GAINS)
 

@@ -46,7 +46,8 @@ def test_the_wheel_brings_the_command_with_all_that_it_does(installed):
 
 def test_a_cell_is_begun_run_and_looked_at_where_only_the_wheel_is(installed):
     synctrl(installed, "new")
-    found = json.loads(synctrl(installed, "run", "cell.toml", "--duration", "0.02", "--json", "-o", "out"))
+    words = ("run", "cell.toml", "--duration", "0.02", "--engine", "pinocchio", "--json", "-o", "out")
+    found = json.loads(synctrl(installed, *words))
     assert found["status"] == "completed" and (installed / "out" / "index.html").is_file()
 
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from refusals import refused
 
 from synctrl.errors import InputError, TrajectoryError
+from synctrl.experiments.mobile_robot import WheelPath
 from synctrl.tasks.splines import Spline
 from synctrl.tasks.swings import FigureEight, Sway, Swing
 
@@ -94,3 +95,8 @@ def test_a_free_spline_has_no_motion_outside() -> None:
 def test_what_is_no_spline_is_refused(arguments: tuple, subject: str) -> None:
     with refused(InputError, subject):
         Spline(*arguments)
+
+
+def test_there_are_two_wheels() -> None:
+    with refused(InputError, "wheel", found=2):
+        WheelPath(2)

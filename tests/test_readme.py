@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from PIL import Image, ImageChops
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text("utf-8")
@@ -52,3 +53,13 @@ def test_the_commands_that_readme_names_exist():
     makefile = (ROOT / "Makefile").read_text("utf-8")
     for target in set(re.findall(r"^ {4}make (\w+)", README, flags=re.MULTILINE)):
         assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target
+
+
+def test_the_picture_in_motion_moves_and_is_small():
+    (name,) = re.findall(r"\]\((\S+\.gif)\)", README)
+    with Image.open(ROOT / name) as picture:
+        assert picture.n_frames > 20
+        first = picture.convert("RGB")
+        picture.seek(picture.n_frames // 2)
+        assert ImageChops.difference(first, picture.convert("RGB")).getbbox()
+    assert (ROOT / name).stat().st_size < 2e6

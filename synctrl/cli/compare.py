@@ -30,8 +30,8 @@ Laws = Annotated[
     str,
     typer.Option(
         metavar="NAME,...",
-        help="What the cell's own law is compared with: independent, chung-slotine, master-slave, "
-        "computed-torque, pd-gravity, sun-mills.",
+        help="What the cell's own law is compared with: independent (slotine-li), chung-slotine, "
+        "master-slave, computed-torque, pd-gravity, sun-mills.",
         autocompletion=law_names,
     ),
 ]

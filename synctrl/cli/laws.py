@@ -27,11 +27,13 @@ def _stiffness(gains: Gains) -> float:
     return float(np.max(gains.K_r) * np.max(gains.Lambda))
 
 
-#: each with its free gain in the size of the cell's own; comparisons then solve for it
+#: as in cell files, each with its free gain in the size of the cell's own, for which comparisons then solve;
+#: "independent" is another name of the law without synchronization
 LAWS: Mapping[str, Callable[[Gains], Law]] = MappingProxyType(
     {
         "sun-mills": lambda gains: SunMills(),
         "independent": lambda gains: SlotineLi(),
+        "slotine-li": lambda gains: SlotineLi(),
         "chung-slotine": lambda gains: ChungSlotine(COUPLED * float(np.max(gains.K_r))),
         "master-slave": lambda gains: MasterSlave(),
         "computed-torque": lambda gains: ComputedTorque(),

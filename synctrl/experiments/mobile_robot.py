@@ -22,6 +22,7 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..checks import index
 from ..control.gains import Gains
 from ..coupling.cell import Cell, Member
 from ..coupling.synchronization import SynchronizationFunction
@@ -67,13 +68,16 @@ class WheelPath:
 
     Args:
         wheel: 0 (left) or 1 (right).
+
+    Raises:
+        InputError: another number.
     """
 
     dimension = 1
     breaks: tuple[float, ...] = ()
 
     def __init__(self, wheel: int):
-        self.wheel = wheel
+        self.wheel = index("wheel", wheel, 2)
 
     def __call__(self, t: ArrayLike) -> Motion:
         R, theta = radius(t, self.wheel), heading(t)

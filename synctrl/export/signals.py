@@ -99,7 +99,7 @@ def _message_type(name: str, rows: dict[str, list[str] | None]) -> Any:
         kind = f".synctrl.{kinds[tuple(columns)]}"
         _add_field(message, row, number, type=pb2.FieldDescriptorProto.TYPE_MESSAGE, type_name=kind)
     pool = pools.DescriptorPool()
-    pool.Add(file)
+    pool.AddSerializedFile(file.SerializeToString())
     return factory.GetMessageClass(pool.FindMessageTypeByName(f"synctrl.{name}"))
 
 
