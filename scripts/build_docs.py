@@ -11,6 +11,7 @@ and has not changed, is taken again. With `--short` the examples of the gallery 
 from __future__ import annotations
 
 import argparse
+import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -81,6 +82,8 @@ def build(folder: Path, short: bool = False) -> int:
     """Build the site, and give what Sphinx ends with: 0 where it had nothing to complain of."""
     work = folder.with_name(f"{folder.name}-work")
     source = gather(work, short)
+    if not (folder / "searchindex.js").is_file():
+        shutil.rmtree(work / "doctrees", ignore_errors=True)  # a build that did not end: begin anew
     for page in stale(folder, source, work / "extra"):
         page.unlink()
     places = ["-c", str(ROOT / "docs"), "-d", str(work / "doctrees"), str(source), str(folder)]

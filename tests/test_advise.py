@@ -23,6 +23,8 @@ from synctrl import (
     Member,
     Network,
     Redundancy,
+    SmoothTrajectory,
+    SynctrlError,
     load_robot,
     simulate,
 )
@@ -278,6 +280,15 @@ def test_nothing_is_said_to_diverge_that_does_not():
             assert advice.changed == advice.gains and "nothing has to be changed" in str(advice)
 
 
+def test_a_step_that_is_longer_than_usual_is_shortened_rather_than_any_gain():
+    ready = planar_four()
+    advice = advise(ready.cell, ready.gains, dt=0.02)
+    assert (advice.first.what, advice.first.found) == ("dt", 0.02)
+    assert advice.first.gains == ready.gains
+    assert fate(ready.cell, ready.gains, 0.5, dt=0.02)[0] == "diverged"
+    assert fate(ready.cell, ready.gains, 0.5, dt=round(advice.first.to, 4))[0] == "completed"
+
+
 def test_changes_one_after_another_come_to_an_end_that_converges():
     """Everything is wrong at once, and only the first change is ever made."""
     cell = CELLS["planar"]()
@@ -360,6 +371,19 @@ def test_the_table_has_a_row_for_every_joint_and_all_of_it_is_plain():
     assert str(advice) == repr(advice) and str(advice).count("UR5") >= 12
 
 
+def test_cells_with_very_many_joints_are_told_what_needs_no_poles():
+    few, many = (Cell([moving().members[0]] * n, Coupling.signed_ring(n)) for n in (4, 12))
+    gains = good(few)
+    gains = gains.replace(K_r=gains.K_r[0], Gamma=gains.Gamma[0])
+    advice, close = (advise(cell, gains, duration=1.0) for cell in (many, few))
+    assert advice.modes == () and close.modes and "so many joints" in str(advice)
+    assert advice.longest_step <= close.longest_step * (1 + 1e-9)
+    np.testing.assert_allclose(advice.torque.path[0], close.torque.path[0])
+    bad = advise(many, gains.replace(K_r=30 * gains.K_r), duration=1.0)
+    assert (bad.first.urgency, bad.first.what) == ("diverges", "K_r")
+    assert not advise(many, bad.changed, duration=1.0).diverges
+
+
 def test_the_damping_ratio_of_a_joint_alone_is_that_of_its_poles(tmp_path):
     """One joint: M s' + K s + p = 0 and p' = G s swing with the ratio K/(2 sqrt(M G))."""
     rod = load_robot(write_urdf(planar_arm([0.5], [2.0]), tmp_path / "rod.urdf"))
@@ -397,6 +421,16 @@ def test_a_path_out_of_reach_is_refused():
     member = Member(UR5, Hold([5.0, 0.0, 0.0]), q0=Q0)
     with refused(UnreachableError):
         advise(Cell([member] * 2, Coupling.pair(), CartesianSpace("xyz")), Gains(8, 4, 40, 40, 0.1))
+
+
+def test_a_motion_that_ends_before_what_is_looked_at_is_told_which_argument_says_so():
+    way = SmoothTrajectory(lambda t: Q0 + 0.1 * np.sin(t), duration=1.0)
+    cell = Cell([Member(UR5, way, theta_hat0=UR5.inertial_parameters, friction=NONE)] * 2, Coupling.pair())
+    for ask in (lambda: Gains.suggest(cell, 8.0), lambda: advise(cell, Gains(8, 4, 40, 40, 0.1))):
+        with pytest.raises(SynctrlError) as caught:
+            ask()
+        assert "`duration`" in caught.value.__notes__[0]
+    assert advise(cell, good(cell), duration=1.0).first is None
 
 
 # -- messages of runs --------------------------------------------------------------------------------------

@@ -63,11 +63,12 @@ def test_a_picture_that_is_not_on_the_site_is_refused():
         relinked("![a](../missing.png)", "docs/laws.md", PLACES, SOURCES)
 
 
-def test_the_index_is_the_table_of_contents():
+def test_the_index_is_the_table_of_contents_and_names_every_page():
     index = (ROOT / "docs" / "index.md").read_text("utf-8")
     where = places(ROOT)
     staged = relinked(index, "docs/index.md", where, {})
     sections = contents(staged)
+    assert unnamed(staged, where.values()) == {}
     assert [*sections] == ["Start", "Tutorials", "How-to", "Explanation", "Reference", "Gallery", "Project"]
     trees = with_toctrees(staged, {"Reference": ["reference/robots.rst"]})
     listed = re.findall(r"(?m)^.* <(.+)>$", trees.split("```{toctree}", 1)[1])
@@ -75,9 +76,25 @@ def test_the_index_is_the_table_of_contents():
     assert "\nreference/robots.rst\n" in trees and "\n- [](/reference/robots.rst)\n" in trees
 
 
+def test_the_example_of_the_index_runs():
+    index = (ROOT / "docs" / "index.md").read_text("utf-8")
+    (block,) = re.findall(r"```python\n(.*?)```", index, re.DOTALL)
+    names: dict = {}
+    exec(block.replace("duration=2.0", "duration=0.02"), names)
+    assert names["result"].status == "completed"
+
+
 def test_what_the_index_does_not_name_comes_last_in_its_section():
     index = "# A\n\n## Start\n\n- [Laws](laws.md)\n\n## Explanation\n"
-    pages = ["index.md", "laws.md", "theory.md", "start/install.md", "tutorials/b.ipynb", "a.png"]
+    pages = [
+        "index.md",
+        "laws.md",
+        "theory.md",
+        "theory.md",
+        "start/install.md",
+        "tutorials/b.ipynb",
+        "a.png",
+    ]
     expected = {
         "Explanation": ["theory.md"],
         "Start": ["start/install.md"],

@@ -35,6 +35,9 @@ TITLES = {
     "export": "Exports",
 }
 
+#: of a value that a table shows, characters
+LONGEST = 60
+
 
 @dataclass(frozen=True)
 class Public:
@@ -186,7 +189,8 @@ def title_of(room: str) -> str:
 def first_line(thing: Any) -> str:
     """The first sentence of a docstring that is a thing's own; of plain data its value."""
     if not (inspect.ismodule(thing) or callable(thing)):
-        return f"`{thing!r}`"
+        value = repr(thing).replace("`", "'")
+        return f"`{value if len(value) <= LONGEST else value[: LONGEST - 3] + '...'}`"
     return " ".join((inspect.getdoc(thing) or "").partition("\n\n")[0].split())
 
 

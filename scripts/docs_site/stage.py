@@ -64,7 +64,7 @@ def unnamed(index: str, pages: Iterable[str]) -> dict[str, list[str]]:
     """By section of the index, the pages that it does not name."""
     named = {path for links in contents(index).values() for _, path in links} | {"index.md"}
     found: dict[str, list[str]] = {}
-    for page in pages:
+    for page in dict.fromkeys(pages):
         if page not in named and page.endswith((".md", ".rst", ".ipynb")):
             section = ALONE.get(page) or SECTIONS.get(posixpath.dirname(page), ELSE)
             found.setdefault(section, []).append(page)

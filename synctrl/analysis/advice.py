@@ -28,7 +28,7 @@ class Advice(InWords):
         dt, control_period: step, and period of sampled control or None, s.
         longest_step, longest_period: up to which small errors fall, with RK4 and with held torque, s.
         modes: of small errors where the cell starts, the slowest first; none of cells with very many joints.
-        delay: how much delay between robots it takes, frozen where it starts.
+        delay: how much delay between robots it takes, frozen where it starts; None where that takes too long.
         torque: the largest torque that is expected.
         learning: how many times as fast as the damping can follow the estimates move, (n,); 0 where nothing
             learns by `gains.Gamma`.
@@ -44,7 +44,7 @@ class Advice(InWords):
     longest_step: float
     longest_period: float
     modes: tuple[Mode, ...]
-    delay: DelayMargin
+    delay: DelayMargin | None
     torque: ExpectedTorque
     learning: np.ndarray
     inertia: np.ndarray
@@ -100,7 +100,7 @@ class Advice(InWords):
             "control_period": self.control_period,
             "longest_step": plain(self.longest_step),
             "longest_period": plain(self.longest_period),
-            "delay_margin": plain(self.delay.delay),
+            "delay_margin": None if self.delay is None else plain(self.delay.delay),
             "learning": self.learning.tolist(),
             "joints": self.rows,
             "modes": [mode.as_dict() for mode in self.modes],
@@ -134,12 +134,12 @@ def _margins(advice: Advice) -> list[str]:
         step += f"; it is {advice.dt:g} s"
     else:
         held += f"; it is {advice.control_period:g} s"
-    return [step, held, f"delay between robots: {advice.delay}"]
+    return [step, held, f"delay between robots: {advice.delay or 'ask delay_margin, it takes long'}"]
 
 
 def _modes(advice: Advice) -> list[str]:
     if not advice.modes:
-        return ["poles: too many joints, look at a smaller cell of the same robots"]
+        return ["poles: not of so many joints, look at a smaller cell of the same robots"]
     moving = [mode for mode in advice.modes if mode.gain != "Gamma"]
     shown = {
         "slowest": min(moving, key=lambda mode: mode.rate),

@@ -6,8 +6,9 @@ that of the path and of the errors of the start, see `expected_torque`; changes 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,16 +23,16 @@ from ..simulation.simulate import Experiment
 from .advice import Advice
 from .delay_margin import DelayMargin, delay_margin
 from .equipped import equipment
-from .expected_torque import ExpectedTorque, existing, expected_torque, on_path
+from .expected_torque import ExpectedTorque, existing, expected_torque, on_path, rough_torque
 from .gain_case import Case, Change, longest_by_rates
 from .gain_rules import Rule, changes, slow, swinging, too_fast, too_strong
 from .late_rules import too_lagged, too_late
-from .linear_loop import Linearized, LinearLoop, Place, modes_of
+from .linear_loop import Linearized, Mode, Place, modes_of
 
 #: places of the path at which the loop is held, beside its start
 PLACES = 4
 #: states of small errors from which on their poles take too long, and rates alone are told
-LARGE = 600
+LARGE = 250
 
 
 def advise(
@@ -67,23 +68,12 @@ def advise_run(experiment: Experiment, dt: float = 1e-3, control_period: float |
     if control_period is not None:
         positive_number("control_period", control_period)
     loop = experiment.closed_loop()
-    whole = at_rest(loop)
-    small = whole.size <= LARGE
-    times, states = on_path(loop.cell, experiment.duration)
-    case = make_case(loop, excursion(loop.cell, experiment.duration), dt, control_period)
-    held = [whole, *(_held(loop, times, states) if small else ())]
-    longest = _longest(held) if small else longest_by_rates(loop)
-    modes = modes_of(whole) if small else []
-
-    def torque(gains: Gains) -> ExpectedTorque:
-        other = replace(experiment, gains=gains).closed_loop()
-        return expected_torque(other, at_rest(other).loop(), times, states)
-
-    found = tuple(changes(case, _rules(case, longest, experiment, torque)))
-    delay = _delay(experiment, control_period)
+    kind = Look if at_rest(loop).size <= LARGE else RoughLook
+    look = kind(experiment, loop, dt, control_period)
+    case = look.case
     return Advice(
-        loop.cell, case.gains, dt, control_period, *longest, tuple(modes), delay, torque(case.gains),
-        case.shares, *_joints(case, held), found,
+        loop.cell, case.gains, dt, control_period, *look.longest, tuple(look.modes), look.delay,
+        look.torque(case.gains), case.shares, *look.joints, tuple(changes(case, look.rules)),
     )  # fmt: skip
 
 
@@ -110,62 +100,119 @@ def make_case(loop: ClosedLoop, states: Excursion, dt: float, control_period: fl
     return Case(loop, loop.controller.gains, arms, dt, control_period)
 
 
-def _held(loop: ClosedLoop, times: np.ndarray, states: Excursion) -> Iterator[Linearized]:
-    """The loop held at some places of its path."""
-    for k in np.linspace(0, len(times) - 1, PLACES).astype(int):
-        place = Place(float(times[k]), states.q[k], states.v[k], states.a[k])
-        yield Linearized(loop, place, loop.plant.viscous)
-
-
 def _longest(held: Sequence[Linearized]) -> tuple[float, float]:
     """Longest step and longest period with which no place is lost, s."""
     loops = [each.loop() for each in held]
     return min(each.longest_step for each in loops), min(each.longest_period for each in loops)
 
 
-def _rules(
-    case: Case,
-    longest: tuple[float, float],
-    experiment: Experiment,
-    torque: Callable[[Gains], ExpectedTorque],
-) -> list[Rule]:
-    """The rules, the most urgent first."""
-    whole = at_rest(case.loop)
+class RoughLook:
+    """What is found of cells with very many joints: rates, robot by robot, and torque of path and start.
 
-    def damping(gains: Gains) -> float:
-        modes = modes_of(whole, gains) if whole.size <= LARGE else []
+    Args:
+        experiment, loop: the cell under control.
+        dt, period: step, and period of sampled control or None, s.
+    """
+
+    def __init__(self, experiment: Experiment, loop: ClosedLoop, dt: float, period: float | None):
+        self.experiment, self.loop, self.period = experiment, loop, period
+        self.times, self.states = on_path(loop.cell, experiment.duration)
+        self.case = make_case(loop, excursion(loop.cell, experiment.duration), dt, period)
+        self.whole = at_rest(loop)
+
+    @cached_property
+    def held(self) -> list[Linearized]:
+        """Places at which the loop is held."""
+        return [self.whole]
+
+    @cached_property
+    def longest(self) -> tuple[float, float]:
+        """Longest step and longest period, s."""
+        return longest_by_rates(self.loop)
+
+    @cached_property
+    def modes(self) -> list[Mode]:
+        """Modes where the cell starts."""
+        return []
+
+    @cached_property
+    def delay(self) -> DelayMargin | None:
+        """How much delay between robots it takes, if the theorem says so."""
+        return None
+
+    @property
+    def joints(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """M_jj, K_r and the spring of learning of every joint, (n, nv); in task space of J^T K_r J."""
+        cell, case = self.loop.cell, self.case
+        inertia, damping, spring = np.zeros((3, *cell.q0.shape))
+        for i, (arm, K) in enumerate(zip(case.arms, case.K_r, strict=True)):
+            k, J = arm.robot.nv, arm.weighted[0]
+            inertia[i, :k] = np.einsum("kjj->kj", arm.M).mean(axis=0)
+            damping[i, :k] = K if case.in_joints else (J * K[:, None] * J).sum(axis=0)
+        spring[existing(cell)] = np.max([np.diag(each.G) for each in self.held], axis=0)
+        return inertia, damping, spring
+
+    def again(self, gains: Gains) -> ClosedLoop:
+        """The closed loop with other gains."""
+        return replace(self.experiment, gains=gains).closed_loop()
+
+    def torque(self, gains: Gains) -> ExpectedTorque:
+        """What some gains take."""
+        return rough_torque(self.again(gains), self.times, self.states)
+
+    @property
+    def rules(self) -> list[Rule]:
+        """The rules, the most urgent first."""
+        used = self.longest[self.period is not None]
+        return [lambda case: too_fast(case, used), lambda case: too_strong(case, self.torque), slow]
+
+
+class Look(RoughLook):
+    """What is found of other cells: poles where they start and on their paths, and what follows."""
+
+    @cached_property
+    def held(self) -> list[Linearized]:
+        places = [
+            Place(float(self.times[k]), *(part[k] for part in self.states[:3]))
+            for k in np.linspace(0, len(self.times) - 1, PLACES).astype(int)
+        ]
+        return [self.whole, *(Linearized(self.loop, place, self.loop.plant.viscous) for place in places)]
+
+    @cached_property
+    def longest(self) -> tuple[float, float]:
+        return _longest(self.held)
+
+    @cached_property
+    def modes(self) -> list[Mode]:
+        return modes_of(self.whole)
+
+    @cached_property
+    def delay(self) -> DelayMargin:
+        """How much delay between robots it takes, with the devices in its loop."""
+        made = self.experiment
+        return delay_margin(
+            made.cell, made.gains, k_r_space=made.k_r_space, sensors=made.sensors, actuators=made.actuators,
+            control_period=self.period,
+        )  # fmt: skip
+
+    def torque(self, gains: Gains) -> ExpectedTorque:
+        other = self.again(gains)
+        return expected_torque(other, at_rest(other).loop(), self.times, self.states)
+
+    def damping(self, gains: Gains) -> float:
+        """The least damping ratio of what is learned."""
+        modes = modes_of(self.whole, gains)
         return min((mode.damping for mode in modes if mode.gain == "Gamma"), default=1.0)
 
-    used = longest[case.period is not None]
-    lags = equipment(experiment.sensors, experiment.actuators, case.period)
-
-    def linear(gains: Gains) -> LinearLoop:
-        return at_rest(replace(experiment, gains=gains).closed_loop()).loop()
-
-    return [
-        lambda case: too_fast(case, used),
-        lambda case: too_lagged(case, lags, linear),
-        lambda case: too_late(case, experiment.network),
-        lambda case: too_strong(case, torque),
-        lambda case: swinging(case, damping),
-        lambda case: iter(()) if experiment.sensors or experiment.actuators else slow(case),
-    ]
-
-
-def _joints(case: Case, held: Sequence[Linearized]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """M_jj, K_r and the spring of learning of every joint, (n, nv); in task space of J^T K_r J."""
-    cell = case.loop.cell
-    inertia, damping, spring = np.zeros((3, *cell.q0.shape))
-    for i, (arm, K) in enumerate(zip(case.arms, case.K_r, strict=True)):
-        k, J = arm.robot.nv, arm.weighted[0]
-        inertia[i, :k] = np.einsum("kjj->kj", arm.M).mean(axis=0)
-        damping[i, :k] = K if case.in_joints else (J * K[:, None] * J).sum(axis=0)
-    spring[existing(cell)] = np.max([np.diag(each.G) for each in held], axis=0)
-    return inertia, damping, spring
-
-
-def _delay(experiment: Experiment, control_period: float | None) -> DelayMargin:
-    """How much delay between robots it takes, with the devices in its loop."""
-    devices = {"sensors": experiment.sensors, "actuators": experiment.actuators}
-    held = {"control_period": control_period, **devices, "k_r_space": experiment.k_r_space}
-    return delay_margin(experiment.cell, experiment.gains, **held)  # type: ignore[arg-type]
+    @property
+    def rules(self) -> list[Rule]:
+        made, (fast, strong, slow_one) = self.experiment, super().rules
+        lags = equipment(made.sensors, made.actuators, self.period)
+        return [
+            fast,
+            lambda case: too_lagged(case, lags, lambda gains: at_rest(self.again(gains)).loop()),
+            lambda case: too_late(case, made.network),
+            strong,
+            lambda case: swinging(case, self.damping),
+            *(() if made.sensors or made.actuators else (slow_one,)),
+        ]

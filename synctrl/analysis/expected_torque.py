@@ -10,7 +10,7 @@ with y''_c the part of y'' that torque gives. At t = 0 it is the torque of the c
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -72,16 +72,25 @@ def expected_torque(
         times, states: of the path.
     """
     along, gravity = path_torque(loop, times, states)
-    first, x0 = first_errors(loop, linear)
-    there = existing(loop.cell)
-    later, added = _added(linear, x0, float(times[-1]))
+    rough, there = _without_errors(loop, along, gravity), existing(loop.cell)
+    later, added = _added(linear, first_errors(loop, linear), float(times[-1]))
     on = np.stack([np.interp(later, times, row) for row in along[:, there].T], axis=-1)
-    peak = np.abs(first)
+    peak = rough.peak.copy()
     peak[there] = np.maximum(peak[there], np.abs(on + added).max(axis=0))
-    peak = np.maximum(peak, np.abs(along).max(axis=0))
-    limit = torque_limits(loop.cell)
-    most, held = np.abs(along).max(axis=0), np.abs(gravity).max(axis=0)
-    return ExpectedTorque(most, np.abs(first), peak, held, limit, _stretch(along, gravity, limit))
+    return replace(rough, peak=peak)
+
+
+def rough_torque(loop: ClosedLoop, times: np.ndarray, states: Excursion) -> ExpectedTorque:
+    """The same without what errors add after t = 0, for cells with very many joints."""
+    return _without_errors(loop, *path_torque(loop, times, states))
+
+
+def _without_errors(loop: ClosedLoop, along: np.ndarray, gravity: np.ndarray) -> ExpectedTorque:
+    reference = loop.cell.references(np.zeros(1))[0]
+    first = np.abs(loop.look(reference, loop.state(loop.initial_state())).tau)
+    most, held, limit = np.abs(along).max(axis=0), np.abs(gravity).max(axis=0), torque_limits(loop.cell)
+    stretch = _stretch(along, gravity, limit)
+    return ExpectedTorque(most, first, np.maximum(first, most), held, limit, stretch)
 
 
 def _stretch(along: np.ndarray, gravity: np.ndarray, limit: np.ndarray) -> float:
@@ -112,8 +121,8 @@ def path_torque(loop: ClosedLoop, times: np.ndarray, states: Excursion) -> tuple
     return torque, gravity
 
 
-def first_errors(loop: ClosedLoop, linear: LinearLoop) -> tuple[np.ndarray, np.ndarray]:
-    """Torque that the controller asks for at t = 0, (n, nv), and x at the start, (X,)."""
+def first_errors(loop: ClosedLoop, linear: LinearLoop) -> np.ndarray:
+    """x at the start, (X,)."""
     cell = loop.cell
     reference, still = cell.references(np.zeros(1))[0], np.zeros((cell.n, cell.m))
     signals = loop.look(reference, loop.state(loop.initial_state()))
@@ -124,7 +133,7 @@ def first_errors(loop: ClosedLoop, linear: LinearLoop) -> tuple[np.ndarray, np.n
     x = np.zeros(len(linear.A))
     for part, row in zip(linear.parts[1:], (y, y_dot, lacking), strict=True):
         x[part] = row[there]
-    return signals.tau, x
+    return x
 
 
 def _added(linear: LinearLoop, x: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray]:

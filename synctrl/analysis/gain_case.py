@@ -17,7 +17,7 @@ from ..simulation.rates import HELD, HELD_SPRING, RUNGE_KUTTA, SWING, LoopRate, 
 
 #: how urgent a change is, the worst first, and what that means
 URGENCIES = {
-    "diverges": "the run will diverge",
+    "diverges": "small errors grow, and the run may diverge",
     "late": "errors grow, for messages come too late",
     "torque": "it takes more torque than there is",
     "swings": "what is learned swings",

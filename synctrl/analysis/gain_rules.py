@@ -14,6 +14,7 @@ import numpy as np
 from ..control.gains import Gains
 from ..control.suggest import Arm, cut, learning, stiffness, wished
 from ..robots.model import unit_for
+from ..simulation.diagnosis import SHORT, USUAL
 from .expected_torque import ExpectedTorque
 from .gain_case import Case, Change
 
@@ -42,7 +43,8 @@ def changes(case: Case, rules: Sequence[Rule]) -> Iterator[Change]:
     for rule in rules:
         for change in rule(case):
             yield change
-            case = replace(case, gains=change.gains)
+            dt = change.to if change.what == "dt" else case.dt
+            case = replace(case, gains=change.gains, dt=dt)
 
 
 # -- what diverges -----------------------------------------------------------------------------------------
@@ -51,11 +53,16 @@ def changes(case: Case, rules: Sequence[Rule]) -> Iterator[Change]:
 def too_fast(case: Case, longest: float) -> Iterator[Change]:
     """Gains beyond what step or period allow, the farthest first; or a shorter step, if none is to blame.
 
+    A step that is longer than usual is shortened, if that is enough; a period is what a robot's driver has.
+
     Args:
         case: the gains as they are.
         longest: step, or period, up to which small errors fall, s.
     """
     if case.used <= MARGIN * longest:
+        return
+    if case.period is None and case.dt > USUAL and longest >= SHORT:
+        yield _shorter(case, longest, "and a shorter one will do")
         return
     given, ratios = case, {"K_r": case.mode / case.rates.room, **case.springs}
     ratios |= {"Lambda": 4 * case.rates.Lambda / case.top, "beta": 4 * case.rates.synchronized / case.top}
@@ -65,7 +72,7 @@ def too_fast(case: Case, longest: float) -> Iterator[Change]:
             yield change
             case = replace(case, gains=change.gains)
     if case is given:
-        yield _shorter(case, longest)
+        yield _shorter(case, longest, "and no gain alone is to blame")
 
 
 def _lowered(case: Case, name: str) -> Change | None:
@@ -103,10 +110,10 @@ def coupled(case: Case, urgency: str, why: str) -> Change | None:
     return Change(urgency, "K_eps", None, None, float(gain[at]), float(most[at]), "", why, gains)
 
 
-def _shorter(case: Case, longest: float) -> Change:
-    """A shorter step or period, where no gain alone is to blame."""
+def _shorter(case: Case, longest: float, because: str) -> Change:
+    """A shorter step or period."""
     what = "dt" if case.period is None else "control_period"
-    why = f"small errors grow from {longest:.3g} s on, and no gain alone is to blame"
+    why = f"small errors grow from {longest:.3g} s on, {because}"
     return Change("diverges", what, None, None, case.used, SHORTENED * longest, "s", why, case.gains)
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..coupling.cell import Cell, Reference
-from ..errors import InputError
+from ..errors import InputError, SynctrlError
 from ..tasks.inverse_kinematics import reach
 
 #: instants of the path, states around it, and how far these are from it, rad (or m)
@@ -39,7 +39,7 @@ def excursion(cell: Cell, duration: float) -> Excursion:
         InputError: a space that does not say which joint positions are on a path.
         UnreachableError: there are none.
     """
-    table = cell.reference_table(np.linspace(0.0, duration, POINTS))
+    table = _told(cell, np.linspace(0.0, duration, POINTS))
     at = np.arange(POINTS + AROUND) % POINTS
     on = _on_path(cell, table)
     return _weigh(cell, on.q[at] + _shifts(cell), on.v[at], on.a[at], table, at)
@@ -47,7 +47,7 @@ def excursion(cell: Cell, duration: float) -> Excursion:
 
 def path(cell: Cell, times: np.ndarray) -> Excursion:
     """States on the desired motions of a cell at ascending times, (K,), s; raises what `excursion` does."""
-    table = cell.reference_table(times)
+    table = _told(cell, times)
     return _weigh(cell, *_on_path(cell, table), table, np.arange(len(times)))
 
 
@@ -56,6 +56,15 @@ def at_start(cell: Cell) -> Excursion:
     table, q = cell.reference_table(np.zeros(1)), cell.q0[None]
     v, a = _joint_motion(cell, cell.q0, table.desired[0])
     return _weigh(cell, q, v[None], a[None], table, np.zeros(1, int))
+
+
+def _told(cell: Cell, times: np.ndarray) -> Reference:
+    """What is desired at the times; who has no motion that late is told which argument says how late."""
+    try:
+        return cell.reference_table(times)
+    except SynctrlError as error:
+        error.add_note(f"`duration` says how much of the motions is looked at; here {times[-1]:g} s")
+        raise
 
 
 class _OnPath(NamedTuple):
