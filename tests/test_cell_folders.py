@@ -168,7 +168,8 @@ def test_samples_are_a_motion_through_all_of_them(head: str, folder: Path) -> No
 
 
 @pytest.mark.parametrize(
-    "text", ["", "0,1,2\n1,2", "t,x\n0,a\n", "0,O,0\n1,1,1\n2,2,2\n", "0,1\n0,1\n", "0;1\n", "0\n1\n", b"\xff\xfe"]
+    "text",
+    ["", "0,1,2\n1,2", "t,x\n0,a\n", "0,O,0\n1,1,1\n2,2,2\n", "0,1\n0,1\n", "0;1\n", "0\n1\n", b"\xff\xfe"],
 )
 def test_samples_that_are_none_are_refused(text: str | bytes, folder: Path) -> None:
     (folder / "way.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
@@ -187,7 +188,9 @@ def test_samples_that_are_none_are_refused(text: str | bytes, folder: Path) -> N
 # -- files that are none -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("content", ["a = ", "a = 1\na = 2", "[[a]\n", 'x = "\n', "[" * 5000, "a = " + "1" * 5000, b"\xff"])
+@pytest.mark.parametrize(
+    "content", ["a = ", "a = 1\na = 2", "[[a]\n", 'x = "\n', "[" * 5000, "a = " + "1" * 5000, b"\xff"]
+)
 def test_a_file_that_is_no_toml_is_refused_with_its_line(content: str | bytes, tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())

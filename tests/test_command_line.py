@@ -238,7 +238,14 @@ def test_a_sweep_has_the_rows_of_the_library_and_goes_on_where_it_was(folder, ex
 
 
 def test_a_sweep_of_which_no_run_comes_to_its_end_says_why(folder, tmp_path):
-    words = ("sweep", folder / "cell.toml", "--vary", "model_error[robot=9]=uniform(0,1)", "-o", tmp_path / "out")
+    words = (
+        "sweep",
+        folder / "cell.toml",
+        "--vary",
+        "model_error[robot=9]=uniform(0,1)",
+        "-o",
+        tmp_path / "out",
+    )
     printed = ended(*words, "--samples", 2, "--backend", "serial", *QUICK, code=codes.FOUND_WANTING).stdout
     rows = [json.loads(line) for line in (tmp_path / "out" / "runs.jsonl").read_text("utf-8").splitlines()]
     columns = json.loads((tmp_path / "out" / "sweep.json").read_text("utf-8"))["columns"]
