@@ -111,8 +111,13 @@ def photograph(folder: Path) -> None:
         print("no pictures of animations: there is no Chromium", file=sys.stderr)
         return
     for path in moved:
-        with open_page(path, SCREEN) as page:
-            joined(seen(page, SHARE * freeze(page))).save(folder / f"{path.stem}_scene.png", optimize=True)
+        try:
+            with open_page(path, SCREEN) as page:
+                picture = joined(seen(page, SHARE * freeze(page)))
+        except AssertionError as error:  # its thumbnail is the figure then
+            print(f"no picture of {path.name}: {error}", file=sys.stderr)
+            continue
+        picture.save(folder / f"{path.stem}_scene.png", optimize=True)
 
 
 def thumbnail(folder: Path, name: str) -> None:
