@@ -51,7 +51,7 @@ def test_every_option_that_the_page_names_is_one():
         for each in command.params
         for word in (*each.opts, *each.secondary_opts)
     }
-    known |= {"--help", "--install-completion"}
+    known |= {"--help", "--install-completion", "--spec", "--from"}  # the last two are of pipx and uvx
     assert {*re.findall(r"(?<![\w-])--[a-z][\w-]*", PAGE)} <= known
 
 
