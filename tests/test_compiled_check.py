@@ -200,7 +200,7 @@ def test_robots_that_nobody_chose_pass_the_check(seed):
 GAMMA = row("Gamma", "P")
 #: faults of the driver and of the lists before it: a text, and what stands in its place
 FAULTS = {
-    "a sign of S is lost": ("sum += c->sign[t] * fetch(", "sum += fetch("),
+    "a sign of S is lost": ("add(c, sum, c->sign[t], rows", "add(c, sum, splat(1), rows"),
     "a share takes another pair": ("c->incident + t * LANES", "c->incident"),
     "a share's sign is lost": ("vec sign = c->incident_sign[t]", "vec sign = splat(1)"),
     "the place of the base": row("base", "12"),

@@ -147,7 +147,7 @@ def test_other_masses_and_dampings_and_none_need_no_new_code():
 #: faults of the lists before the driver and of the driver: a text, and what stands in its place
 FAULTS = {
     "another hand's share": row("share", "gives*36"),
-    "forces of a moment ago": ("    if (c->o) { turn(c, a); feel(c, a); }\n", ""),
+    "forces of a moment ago": ("    if (c->o) feel(c, a);\n    command(", "    command("),
     "another robot's force": row("felt", "gives*6"),
 }
 

@@ -16,7 +16,7 @@ from synctrl.compiled.compiler import compiler
 HIDDEN = """
 import concurrent.futures.process, ctypes, multiprocessing.connection, multiprocessing.popen_spawn_posix
 import asyncio, os, shutil, subprocess, sys, tempfile
-import matplotlib.pyplot, numpy, pinocchio, scipy.optimize, trimesh
+import matplotlib.pyplot, numpy, pinocchio, rich.console, scipy.optimize, trimesh, typer
 
 for name in ("fcntl", "grp", "pwd", "resource", "termios"):
     sys.modules[name] = None
