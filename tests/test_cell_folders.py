@@ -210,7 +210,7 @@ def test_no_file_is_refused(tmp_path: Path) -> None:
 
 
 def test_all_that_is_wrong_is_said_at_once(tmp_path: Path) -> None:
-    text = STARTER.replace("duration = 4.0", "duratoin = 4.0").replace("Gamma = 2.0", 'Gamma = "2"')
+    text = STARTER.replace("duration = 6.0", "duratoin = 4.0").replace("Gamma = 2.0", 'Gamma = "2"')
     (tmp_path / "cell.toml").write_text(text, "utf-8")
     with refused(CellFileError, "duratoin", line=line_of("duration")) as caught:
         read_cell(tmp_path / "cell.toml")

@@ -84,9 +84,9 @@ def test_the_keys_of_motions_are_those_of_the_page() -> None:
 def test_the_starter_shows_what_synchronization_is_for(tmp_path: Path) -> None:
     """The arms stay together although one is pushed: without coupling they come apart much farther."""
     apart = []
-    for beta, K_eps in ((20.0, 20.0), (0.0, 0.0)):
-        text = STARTER.replace("beta = 20.0", f"beta = {beta}").replace("K_eps = 20.0", f"K_eps = {K_eps}")
-        (tmp_path / "cell.toml").write_text(text.replace("duration = 4.0", "duration = 2.5"), "utf-8")
+    for beta, K_eps in ((10.0, 20.0), (0.0, 0.0)):
+        text = STARTER.replace("beta = 10.0", f"beta = {beta}").replace("K_eps = 20.0", f"K_eps = {K_eps}")
+        (tmp_path / "cell.toml").write_text(text.replace("duration = 6.0", "duration = 2.5"), "utf-8")
         experiment, run = read_cell_file(tmp_path / "cell.toml")
         apart.append(abs(experiment.simulate(**run).sync_error).max())
     together, alone = apart

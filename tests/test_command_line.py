@@ -138,7 +138,7 @@ def test_without_its_cell_a_saved_run_has_numbers_and_no_certificate(made, folde
 
 
 def test_a_run_that_has_to_stop_is_written_as_far_as_it_came(folder, tmp_path):
-    text = (folder / "cell.toml").read_text("utf-8").replace("K_r = 0.5", "K_r = 5e4")
+    text = (folder / "cell.toml").read_text("utf-8").replace("K_r = 5.0", "K_r = 5e4")
     (tmp_path / "stiff.toml").write_text(text, "utf-8")
     words = ("run", tmp_path / "stiff.toml", "-o", tmp_path / "out", "--no-page", *QUICK)
     found = answer(*words, code=codes.STOPPED)
@@ -166,7 +166,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_run(folder):
 
 
 def test_advice_is_that_of_the_library_and_changes_the_gains_in_a_file(folder, experiment, tmp_path):
-    text = (folder / "cell.toml").read_text("utf-8").replace("K_r = 0.5", "K_r = 5e4")
+    text = (folder / "cell.toml").read_text("utf-8").replace("K_r = 5.0", "K_r = 5e4")
     (tmp_path / "stiff.toml").write_text(text, "utf-8")
     words = ("advise", tmp_path / "stiff.toml", "--write", tmp_path / "advised.toml")
     found = answer(*words, code=codes.FOUND_WANTING)

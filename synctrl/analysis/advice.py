@@ -134,7 +134,21 @@ def _margins(advice: Advice) -> list[str]:
         step += f"; it is {advice.dt:g} s"
     else:
         held += f"; it is {advice.control_period:g} s"
-    return [step, held, f"delay between robots: {advice.delay or 'ask delay_margin, it takes long'}"]
+    late = f"delay between robots: {advice.delay or 'ask delay_margin, it takes long'}"
+    return [step, held, late, *_resting(advice.cell)]
+
+
+def _resting(cell: Cell) -> list[str]:
+    """Who rests where its path begins with a speed, which costs torque at the start."""
+    speeds = np.abs(cell.reference_table(np.zeros(1)).desired[0, 1]).max(axis=1)
+    rest = [
+        name for name, v0, speed in zip(cell.names, cell.v0, speeds, strict=True) if speed and not v0.any()
+    ]
+    if not rest:
+        return []
+    return [
+        f'at rest where the path begins with a speed: {", ".join(rest)}; v0 = "path" starts as fast as it'
+    ]
 
 
 def _modes(advice: Advice) -> list[str]:

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from . import controls, couplings, holding, motions, plants, robots
 from .kinds import Kind, make_table
-from .values import ANGLES, NUMBER, NUMBERS, TEXT, TRUTH, VECTOR, by_name, choice, list_of
+from .values import ANGLES, NUMBER, NUMBERS, TEXT, TRUTH, VECTOR, VELOCITIES, by_name, choice, list_of
 
 #: version of the form of these files
 FORM = "1"
@@ -39,7 +39,9 @@ MEMBER: dict[str, Any] = {
     "motion": _optional(motions.MOTION, "desired motion in the cell's space, unless it `holds` an object"),
     "holds": _optional(holding.HOLDS.model, "its share of the object in [plant] that it carries with others"),
     "q0": _optional(ANGLES, "joint positions at t = 0, rad; by default on the path"),
-    "v0": _optional(ANGLES, "joint velocities at t = 0, rad/s; by default at rest"),
+    "v0": _optional(
+        VELOCITIES, 'joint velocities at t = 0, rad/s, or "path", as fast as it; by default at rest'
+    ),
     "parameters": _optional(robots.PARAMETERS, 'what is adapted; by default "full"'),
     "known": _optional(NUMBER, "share of the true parameters with which the estimate begins"),
     "estimate": _optional(VECTOR, "the estimate at t = 0, in the place of `known`; by default zeros"),

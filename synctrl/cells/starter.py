@@ -8,7 +8,7 @@ STARTER = """\
 # Run it:  synctrl run cell.toml -o out/          What may stand here: docs/cell_files.md
 
 name = "my first cell"
-duration = 4.0                                    # s
+duration = 6.0                                    # s
 
 # Where the task is given: "joint", "pose", or positions of the tips along some axes.
 space = { kind = "cartesian", axes = "xy" }
@@ -22,6 +22,7 @@ base = { xyz = [-0.35, 0.0, 0.0] }                # where it stands; rpy = [0.0,
 known = 0.7                                       # how much of its masses the controller knows at the start
 friction = { viscous = 0.02, coulomb = 0.02 }     # which the controller does not know
 motion = { kind = "circle", center = [-0.15, 0.35], radius = 0.08, speed = "90 deg" }
+v0 = "path"                                       # it starts as fast as its path; without this line, at rest
 
 [[robots]]
 name = "right"
@@ -30,6 +31,7 @@ base = { xyz = [0.35, 0.0, 0.0] }
 known = 0.7
 friction = { viscous = 0.02, coulomb = 0.02 }
 motion = { kind = "circle", center = [0.15, 0.35], radius = 0.08, speed = "90 deg" }
+v0 = "path"
 
 # ---- control ---------------------------------------------------------------------------------------------
 
@@ -37,9 +39,9 @@ motion = { kind = "circle", center = [0.15, 0.35], radius = 0.08, speed = "90 de
 kind = "pair"
 
 [gains]
-Lambda = 10.0                                     # how fast errors vanish, 1/s
-beta = 20.0                                       # weight of the synchronization errors, 1/s; 0 is without
-K_r = 0.5                                         # damping of the joints, N·m·s/rad
+Lambda = 5.0                                      # how fast errors vanish, 1/s
+beta = 10.0                                       # weight of the synchronization errors, 1/s; 0 is without
+K_r = 5.0                                         # damping of the joints, N·m·s/rad
 K_eps = 20.0                                      # stiffness between the robots
 Gamma = 2.0                                       # how fast the controller learns
 

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import PlainValidator, WithJsonSchema
 
+from ..coupling.starts import ON_PATH
 from ..errors import near
 from ..robots.catalog import is_path
 from ..robots.urdf.document import Pose
@@ -18,6 +19,8 @@ from ..robots.urdf.document import Pose
 #: what arrays of some depth are called
 DEPTHS = ("a number", "a list of numbers", "a list of lists of numbers", "a list of matrices")
 _DEGREES = re.compile(r" *([-+]?[0-9]+(?:\.[0-9]+)?) *(?:deg|°) *", re.ASCII)
+#: a number, or a text such as "90 deg", as editors are told
+_ANGLE = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": f"^{_DEGREES.pattern}$"}]}
 PLAIN = (bool, int, float, str)
 #: how deep arrays go
 DEEPEST = len(DEPTHS)
@@ -139,8 +142,7 @@ def numbers(*depths: int) -> Any:
 
 def angles(*depths: int) -> Any:
     """Numbers in lists that are that deep, which may be angles in degrees, "90 deg"."""
-    number = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": f"^{_DEGREES.pattern}$"}]}
-    return kept(partial(_angles, depths), _any_of([_schema(depth, number) for depth in depths]))
+    return kept(partial(_angles, depths), _any_of([_schema(depth, _ANGLE) for depth in depths]))
 
 
 def _of(kind: type, words: str, value: Any) -> Any:
@@ -180,6 +182,15 @@ def _rotation(value: Any) -> Any:
     return Pose(rpy=(read[0], read[1], read[2])).se3.rotation.tolist()
 
 
+def _velocities(value: Any) -> Any:
+    """Joint velocities, which may be in degrees per second, or the word for those of the path."""
+    if value == ON_PATH:
+        return ON_PATH
+    if isinstance(value, str):
+        raise misfit(f'{DEPTHS[1]} or "{ON_PATH}"', shown(value))
+    return _angles((1,), value)
+
+
 def _text_of(kind: Callable[[str], Any], words: str, value: Any) -> Any:
     return kind(_of(str, words, value))
 
@@ -215,6 +226,8 @@ TRUTH = kept(partial(_of, bool, "true or false"), {"type": "boolean"})
 #: (3, 3), or its diagonal, (3,)
 INERTIA = numbers(1, 2)
 ANGLE, ANGLES, ANGLE_ROWS = angles(0), angles(1), angles(2)
+#: joint velocities, or the word for those of the path
+VELOCITIES = kept(_velocities, _any_of([_schema(1, _ANGLE), {"enum": [ON_PATH]}]))
 ROTATION = kept(_rotation, {"type": "array", "minItems": 3, "maxItems": 3})
 ROBOT = kept(_robot, {"type": ["string", "integer"]})
 SOURCE = kept(_source, {"type": "string"})

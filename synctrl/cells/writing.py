@@ -169,7 +169,7 @@ class Writer:
             "name": member.name,
             **self.arm(member.robot, place, member.name),
             "q0": plain(member.q0) if member.q0 is None else np.asarray(member.q0, float).tolist(),
-            "v0": None if member.v0 is None else np.asarray(member.v0, float).tolist(),
+            "v0": member.v0 if isinstance(member.v0, str | None) else np.asarray(member.v0, float).tolist(),
             "parameters": self._parameters(member, (*place, "parameters")),
             **_estimate(member),
             "friction": self._friction(member, (*place, "friction")),

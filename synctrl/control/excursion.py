@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..coupling.cell import Cell, Reference
+from ..coupling.starts import joint_motion
 from ..errors import InputError, SynctrlError
 from ..tasks.inverse_kinematics import reach
 
@@ -54,7 +55,7 @@ def path(cell: Cell, times: np.ndarray) -> Excursion:
 def at_start(cell: Cell) -> Excursion:
     """The one state in which a cell starts, with the velocities and accelerations that are desired there."""
     table, q = cell.reference_table(np.zeros(1)), cell.q0[None]
-    v, a = _joint_motion(cell, cell.q0, table.desired[0])
+    v, a = joint_motion(cell, cell.q0, table.desired[0])
     return _weigh(cell, q, v[None], a[None], table, np.zeros(1, int))
 
 
@@ -76,7 +77,7 @@ class _OnPath(NamedTuple):
 def _on_path(cell: Cell, table: Reference) -> _OnPath:
     """Joint positions of what is desired, and velocities and accelerations there, (T, n, nv)."""
     q = _follow(cell, table.xd)
-    motion = np.array([_joint_motion(cell, *row) for row in zip(q, table.desired, strict=True)])
+    motion = np.array([joint_motion(cell, *row) for row in zip(q, table.desired, strict=True)])
     return _OnPath(q, motion[:, 0], motion[:, 1])
 
 
@@ -105,14 +106,6 @@ def _place(cell: Cell, i: int, x: np.ndarray, q: np.ndarray) -> np.ndarray:
     if hasattr(cell.space, "start"):
         return np.asarray(cell.space.start(cell.robots[i], x), dtype=float)
     raise InputError.expected("one with `miss` or `start`", cell.space, "space")
-
-
-def _joint_motion(cell: Cell, q: np.ndarray, desired: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Velocities and accelerations, (n, nv), with which robots at q move as is desired, (3, n, m)."""
-    task = cell.task.measure(np.stack((q, np.zeros_like(q))), desired)
-    v, _ = cell.task.to_joints(task, *task.rates)
-    task = cell.task.measure(np.stack((q, v)), desired)
-    return cell.task.to_joints(task, *task.rates)
 
 
 def _shifts(cell: Cell) -> np.ndarray:

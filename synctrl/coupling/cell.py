@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array, instance, offers, per_joint
-from ..errors import InputError, UnreachableError
+from ..errors import InputError
 from ..robots.friction import Friction
 from ..robots.model import joined
 from ..robots.parameters import Parameters
 from ..robots.robot import Robot
 from ..tasks.algebra import padded
-from ..tasks.inverse_kinematics import start_in
 from ..tasks.spaces import JointSpace, Space, units_of
 from ..tasks.trajectories import Motion, Trajectory
 from .coupling import Coupling
@@ -33,6 +32,7 @@ from .member_checks import (
     with_urdf_friction,
 )
 from .reference import Reference as Reference
+from .starts import on_paths, start_positions, start_velocities
 from .together import asked_together
 from .weights import StillWeights, Weights
 
@@ -47,7 +47,7 @@ class Member:
         q0: joint positions at t = 0, (nv,), rad; by default on the path: in joint space that is said by the
             path itself, in others found by inverse kinematics, within the robot's limits and close to the
             space's posture if it has one.
-        v0: joint velocities at t = 0, (nv,), rad/s; by default at rest.
+        v0: joint velocities at t = 0, (nv,), rad/s; by default at rest; "path" is as fast as the path asks.
         parameters: what is adapted, or its name: "full", all inertial parameters, by default; "base", the
             fewest that give the same torques. Their true values have to be those of this robot, as it is
             placed, and of this friction.
@@ -62,7 +62,7 @@ class Member:
     robot: Robot
     trajectory: Trajectory
     q0: ArrayLike | None = None
-    v0: ArrayLike | None = None
+    v0: ArrayLike | str | None = None
     parameters: Parameters | str | None = None
     theta_hat0: ArrayLike | None = None
     friction: Any = None
@@ -259,31 +259,15 @@ class Cell:
             check_trajectory(name, member.trajectory, self.labels)
             check_friction(name, member.friction, member.robot)
             parameters.append(member_parameters(name, member.robot, member.friction, member.parameters))
-            source, start = self._start(i)
+            source, start = start_positions(self, i)
             starts.append(source)
             q0.append(finite_array(f"{name}, q0", start, (nv,)))
-            v0.append(finite_array(f"{name}, v0", np.zeros(nv) if member.v0 is None else member.v0, (nv,)))
+            v0.append(start_velocities(name, member.v0, nv))
             theta_hat0.append(first_estimates(name, parameters[-1], member.theta_hat0))
         self.starts = tuple(starts)
         self.parameters, self.theta = tuple(parameters), padded([p.theta for p in parameters])
-        self.q0, self.v0, self.theta_hat0 = padded(q0), padded(v0), padded(theta_hat0)
-
-    def _start(self, i: int) -> tuple[str, ArrayLike]:
-        """Where q0 of a robot comes from, and q0."""
-        member, robot = self.members[i], self.robots[i]
-        if member.q0 is not None:
-            return "given", member.q0
-        x = member.trajectory(0.0).x
-        if hasattr(self.space, "start"):
-            return "path", self.space.start(robot, x)
-        if hasattr(self.space, "miss"):
-            preferred = getattr(self.space, "redundancy", None)
-            posture = None if preferred is None else preferred.of(self.robots, i)
-            try:
-                return "inverse kinematics", start_in(robot, x, self.space, posture)  # type: ignore[arg-type]
-            except UnreachableError as error:
-                raise UnreachableError(f"{error}", subject=f"{self.names[i]}, trajectory") from None
-        raise InputError("expected joint positions to start from, found none", subject=f"{self.names[i]}, q0")
+        self.q0, self.theta_hat0 = padded(q0), padded(theta_hat0)
+        self.v0 = on_paths(self, padded(v0))
 
     def __reduce__(self) -> tuple:
         """Copies and other processes bind the space anew: arrays that share memory would come apart."""

@@ -1,0 +1,138 @@
+"""Robots that start as fast as their paths: no error of velocity at t = 0, in every space and engine."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from refusals import refused
+
+from synctrl import (
+    CartesianSpace,
+    Cell,
+    Circle,
+    Coupling,
+    Experiment,
+    Gains,
+    Hold,
+    Member,
+    experiments,
+    load_robot,
+)
+from synctrl.analysis.advise import advise_run
+from synctrl.cells import STARTER, CellFileError, read_cell, write_cell
+from synctrl.errors import InputError
+
+READY = (
+    "planar_four",
+    "a460_pair",
+    "panda_four",
+    "mixed_four",
+    "ur5_payload",
+    "carry_planar",
+    "mobile_robot",
+)
+
+
+def moving(cell: Cell) -> Cell:
+    """The cell with robots that start as fast as their paths."""
+    members = [replace(member, v0="path") for member in cell.members]
+    return Cell(members, cell.coupling, cell.space, cell.name, cell.clocks)
+
+
+def velocity_error(cell: Cell) -> np.ndarray:
+    """e' of every robot at t = 0, (n, m)."""
+    table = cell.reference_table(np.zeros(1))
+    return cell.task.measure(np.stack((cell.q0, cell.v0)), table.desired[0]).e_dot
+
+
+def circles(radius: float, speed: float, phase: float = 0.0, **start: object) -> Cell:
+    robot = load_robot("planar2r")
+    members = [
+        Member(robot.placed((x, 0, 0)), Circle((x, 0.35), radius, speed, phase), **start) for x in (0.0, 1.0)
+    ]
+    return Cell(members, Coupling.pair(), CartesianSpace("xy"))
+
+
+@pytest.mark.parametrize("name", READY)
+def test_ready_cells_start_without_an_error_of_velocity(name):
+    cell = moving(getattr(experiments, name)().cell)
+    np.testing.assert_allclose(velocity_error(cell), 0, atol=1e-9)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.02, 0.1), st.floats(-6, 6), st.floats(-3, 3))
+def test_circles_of_any_speed_start_without_an_error_of_velocity(radius, speed, phase):
+    at_rest, cell = circles(radius, speed, phase), circles(radius, speed, phase, v0="path")
+    np.testing.assert_allclose(velocity_error(cell), 0, atol=1e-9)
+    np.testing.assert_allclose(
+        np.linalg.norm(velocity_error(at_rest), axis=1), radius * abs(speed), atol=1e-9
+    )
+
+
+def test_a_robot_that_is_not_asked_to_stays_at_rest():
+    members = circles(0.05, 2.0).members
+    cell = Cell([replace(members[0], v0="path"), members[1]], Coupling.pair(), CartesianSpace("xy"))
+    assert cell.v0[0].any() and not cell.v0[1].any()
+
+
+def test_a_cell_that_knows_its_masses_stays_on_the_path_from_the_first_step():
+    """With exact estimates no error comes up but that of inverse kinematics; at rest there is one at once."""
+    gains, peaks = Gains(Lambda=5, beta=5, K_r=1, K_eps=1, Gamma=0), []
+    for start in ({}, {"v0": "path"}):
+        cell = circles(0.05, 2.0, **start)
+        known = [replace(m, theta_hat0=theta) for m, theta in zip(cell.members, cell.theta, strict=True)]
+        cell = Cell(known, cell.coupling, cell.space)
+        result = Experiment(cell, gains, 0.5).simulate()
+        peaks.append(float(np.abs(result.tracking_error).max()))
+    assert peaks[1] < 1e-5 < 1e-3 < peaks[0]
+
+
+def test_what_was_asked_for_is_kept_by_copies_and_files(tmp_path):
+    cell = circles(0.05, 2.0, v0="path")
+    again = pickle.loads(pickle.dumps(cell))
+    assert again.members[0].v0 == "path"
+    assert (again.v0 == cell.v0).all()
+    experiment = Experiment(cell, Gains(Lambda=5, beta=5, K_r=1, K_eps=1, Gamma=0), 0.01)
+    write_cell(experiment, tmp_path / "cell.toml")
+    assert (tmp_path / "cell.toml").read_text().count('v0 = "path"') == 2
+    assert (read_cell(tmp_path / "cell.toml").cell.v0 == cell.v0).all()
+
+
+def test_other_words_are_refused():
+    with refused(InputError, "robot 1, v0"):
+        circles(0.05, 2.0, v0="fast")
+
+
+def test_other_words_in_a_file_are_refused_with_their_line(tmp_path):
+    file = tmp_path / "cell.toml"
+    file.write_text(STARTER.replace('v0 = "path"', 'v0 = "fast"', 1))
+    with pytest.raises(CellFileError, match='expected a list of numbers or "path"'):
+        read_cell(file)
+
+
+def test_a_robot_that_cannot_move_along_its_path_is_refused():
+    """Stretched out, and the path goes on outwards: no joint velocities do that."""
+    robot = load_robot("planar2r")
+    out = robot.tip_position(np.zeros(2))[:2]
+    members = [
+        Member(robot, Circle(out - [0, 0.05], 0.05, 1.0, np.pi / 2), np.zeros(2), v0="path"),
+        Member(robot, Hold(out)),
+    ]
+    with refused(InputError, "robot 1, v0"):
+        Cell(members, Coupling.pair(), CartesianSpace("xy"))
+
+
+def test_the_starter_needs_no_other_gains(tmp_path):
+    """Nothing is found wanting, and robots that rest are told of when they do."""
+    file = tmp_path / "cell.toml"
+    file.write_text(STARTER)
+    found = advise_run(read_cell(file))
+    assert not found.changes
+    assert "at rest where" not in str(found)
+    file.write_text(STARTER.replace('v0 = "path"', "", 1))
+    assert 'at rest where the path begins with a speed: left; v0 = "path"' in str(advise_run(read_cell(file)))
