@@ -8,6 +8,7 @@ import pytest
 from refusals import refused
 
 from synctrl.cells import STARTER, CellFileError, read_cell
+from synctrl.cells.reading import OTHER_NAMES
 
 CIRCLE = '{ kind = "circle", center = [0.15, 0.35], radius = 0.08, speed = "90 deg" }'
 #: what is changed in the starter, and the key and a text of the line at which the error then is
@@ -51,6 +52,8 @@ WRONG = [
     ("[[disturbances]]", "[disturbances]", "disturbances", "[disturbances]"),
     ("[[disturbances]]", '[[sensors]]\nkind = "bias"\nq = [1.0]\n[[disturbances]]', "sensors[0].q", "q ="),
     ("[[disturbances]]", '[[loads]]\nrobot = 0\nmass = -1\n[[disturbances]]', "loads[0].mass", "mass = -1"),
+    ("[coupling]", "[run]\ndt = 0.0\n[coupling]", "run.dt", "dt = 0.0"),
+    ('"circle", center', '"line", center', "robots[1].motion.kind", '"line"'),
     (CIRCLE, '"circle"', "robots[1].motion", '"circle"'),
     ("known = 0.7\nfriction", "known = 0.7\nestimate = [1.0]\nfriction", "robots[1].estimate", "estimate"),
 ]  # fmt: skip
@@ -74,3 +77,10 @@ def test_a_wrong_value_is_refused_with_its_line_and_key(old, new, key, line, tmp
     assert error.subject == key
     assert line in lines[error.line - 1]
     assert str(error).startswith(f"{path}:{error.line}: {key}: ")
+
+
+@pytest.mark.parametrize(("kind", "meant"), OTHER_NAMES.items())
+def test_what_is_called_otherwise_elsewhere_is_known_by_its_name_here(kind, meant, tmp_path):
+    path = changed(tmp_path, '"circle", center', f'"{kind}", center')
+    with pytest.raises(CellFileError, match=f"did you mean '{meant}'"):
+        read_cell(path)

@@ -9,7 +9,19 @@ from pydantic import Field
 
 from . import controls, couplings, holding, motions, plants, robots
 from .kinds import Kind, make_table
-from .values import ANGLES, NUMBER, NUMBERS, TEXT, TRUTH, VECTOR, VELOCITIES, by_name, choice, list_of
+from .values import (
+    ANGLES,
+    NUMBER,
+    NUMBERS,
+    POSITIVE,
+    TEXT,
+    TRUTH,
+    VECTOR,
+    VELOCITIES,
+    by_name,
+    choice,
+    list_of,
+)
 
 #: version of the form of these files
 FORM = "1"
@@ -51,15 +63,15 @@ MEMBER: dict[str, Any] = {
 }
 #: arguments of `Experiment.simulate`
 RUN: dict[str, Any] = {
-    "dt": _key(NUMBER, 'step of "rk4", s', 1e-3),
+    "dt": _key(POSITIVE, 'step of "rk4", s', 1e-3),
     "integrator": _key(TEXT, '"rk4", or one of SciPy\'s methods', "rk4"),
     "engine": _key(choice("pinocchio", "compiled"), "what computes the run", "pinocchio"),
     "plant": _key(choice("pinocchio", "mujoco"), "library that computes the plant", "pinocchio"),
-    "control_period": _optional(NUMBER, "how long torque is held, s; by default control is continuous"),
-    "log_dt": _optional(NUMBER, "interval of the log, s; by default dt"),
+    "control_period": _optional(POSITIVE, "how long torque is held, s; by default control is continuous"),
+    "log_dt": _optional(POSITIVE, "interval of the log, s; by default dt"),
     "log_dtype": _key(choice("float64", "float32"), "of the numbers of the log", "float64"),
-    "rtol": _key(NUMBER, "relative tolerance of SciPy's methods", 1e-9),
-    "atol": _key(NUMBER, "absolute tolerance of SciPy's methods", 1e-11),
+    "rtol": _key(POSITIVE, "relative tolerance of SciPy's methods", 1e-9),
+    "atol": _key(POSITIVE, "absolute tolerance of SciPy's methods", 1e-11),
 }
 
 

@@ -24,6 +24,13 @@ from .values import shown
 #: bytes of a cell file, at most
 LARGEST = 16 * 2**20
 
+#: what kinds are called elsewhere
+OTHER_NAMES = {
+    "line": "cubic", "straight": "cubic", "linear": "cubic", "point-to-point": "cubic", "waypoints": "spline",
+    "points": "spline", "csv": "samples", "lemniscate": "figure-eight", "fixed": "hold", "still": "hold",
+    "sine": "swing",
+}  # fmt: skip
+
 
 class CellFile(NamedTuple):
     """What a cell file says.
@@ -161,8 +168,14 @@ def _unknown_kind(place: Place, found: Any, known: list[str]) -> tuple[Place, st
     if "kind" not in found:
         return (*place, "kind"), f"expected a value, {listed}, found none", None
     kind = found["kind"]
-    said = f"{shown(kind)}{near(kind, known) if isinstance(kind, str) else ''}"
+    said = f"{shown(kind)}{_like(kind, known) if isinstance(kind, str) else ''}"
     return (*place, "kind"), f"expected {listed}, found {said}", kind
+
+
+def _like(kind: str, known: list[str]) -> str:
+    """What a kind of another name may have meant."""
+    meant = [name for name in (OTHER_NAMES.get(kind),) if name in known]
+    return f" (did you mean {meant[0]!r}?)" if meant else near(kind, known)
 
 
 def _place(loc: tuple[str | int, ...], data: Any, missing: bool) -> Place:

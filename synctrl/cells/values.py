@@ -191,6 +191,13 @@ def _velocities(value: Any) -> Any:
     return _angles((1,), value)
 
 
+def _positive(value: Any) -> float:
+    number = _numbers((0,), value)
+    if not 0 < number < np.inf:
+        raise misfit("a positive number", shown(value))
+    return number
+
+
 def _text_of(kind: Callable[[str], Any], words: str, value: Any) -> Any:
     return kind(_of(str, words, value))
 
@@ -220,6 +227,8 @@ def scalar() -> Any:
 NUMBER, VECTOR, MATRIX = numbers(0), numbers(1), numbers(2)
 #: one for all, or one for each
 NUMBERS, ANY_NUMBERS = numbers(0, 1), numbers(0, 1, 2, 3)
+#: step, period or tolerance
+POSITIVE = kept(_positive, {"type": "number", "exclusiveMinimum": 0})
 INTEGER = kept(partial(_of, int, "a whole number"), {"type": "integer"})
 TEXT = kept(partial(_of, str, "a text"), {"type": "string"})
 TRUTH = kept(partial(_of, bool, "true or false"), {"type": "boolean"})

@@ -38,13 +38,14 @@ def advise(
         from ..analysis.advise import advise_run
         from ..cells import write_cell
 
-        experiment, how = planned(answer, cell, engine="pinocchio", dt=dt, control_period=control_period)
+        experiment, how, _ = base = planned(
+            answer, cell, engine="pinocchio", dt=dt, control_period=control_period
+        )
         found = advise_run(experiment, how.get("dt", 1e-3), how.get("control_period"))
         answer.data |= found.to_dict()
         answer.show(f"{experiment.title or experiment.cell.name}", "", str(found))
         if write is not None:
             changed = replace(experiment, gains=found.changed)
-            run = {name: value for name, value in how.items() if name != "engine"}
-            answer.data["written"] = [write_cell(changed, write, run=run)]
+            answer.data["written"] = [write_cell(changed, write, run=base.kept)]
             answer.show("", f"Written: {write}")
         answer.code = codes.FOUND_WANTING if found.diverges else codes.DONE

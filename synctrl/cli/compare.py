@@ -68,7 +68,7 @@ def compare(
         from .laws import named_laws
 
         asked = {"duration": duration, "dt": dt, "engine": engine}
-        experiment, how = planned(answer, cell, **asked)
+        experiment, how, _ = planned(answer, cell, **asked)
         rules = [_rule(word) for word in equal] or [*RULES]
         others = named_laws(_others(laws, experiment), experiment.gains)
         with waiting(f"comparing {len(others)} laws with that of the cell, {len(rules)} rows each"):

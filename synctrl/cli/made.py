@@ -18,15 +18,25 @@ SHARED = ("duration", "dt", "engine", "control_period")
 
 
 class Planned(NamedTuple):
-    """A cell, and how its runs are made: arguments of `Experiment.simulate`, the engine among them."""
+    """A cell, and how its runs are made: arguments of `Experiment.simulate`, the engine among them.
+
+    `said` are those of them that the file itself says.
+    """
 
     experiment: Experiment
     how: dict[str, Any]
+    said: dict[str, Any]
 
     @property
     def shared(self) -> dict[str, Any]:
         """What of it all runs of a sweep may share."""
         return {name: value for name, value in self.how.items() if name in SHARED}
+
+    @property
+    def kept(self) -> dict[str, Any]:
+        """What of it a file keeps: all but what was chosen for this machine, or for the search."""
+        chosen = {name: value for name, value in self.how.items() if name not in ("engine", "duration")}
+        return chosen | {name: value for name, value in self.said.items() if name == "engine"}
 
 
 def planned(answer: Answer, cell: Path, **asked: Any) -> Planned:
@@ -51,7 +61,7 @@ def planned(answer: Answer, cell: Path, **asked: Any) -> Planned:
     answer.data |= {"engine": how["engine"], "engine_remark": remark}
     if remark:
         answer.show(f"By the reference engine, which is slower: {remark}", "")
-    return Planned(experiment, how)
+    return Planned(experiment, how, dict(said))
 
 
 def make_run(answer: Answer, experiment: Experiment, how: Mapping[str, Any]) -> Result:

@@ -44,7 +44,7 @@ def run(
     with answering(as_json) as answer:
         check_exports(export_to)
         asked = {"duration": duration, "dt": dt, "engine": engine, "control_period": control_period}
-        experiment, how = planned(answer, cell, **asked, log_dt=log_dt, plant=plant)
+        experiment, how, _ = planned(answer, cell, **asked, log_dt=log_dt, plant=plant)
         prepare_folder(out, cell)
         result = make_run(answer, experiment, how)
         certificate = certified(answer, result, experiment)

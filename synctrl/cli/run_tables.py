@@ -21,7 +21,7 @@ SIZES = {"peak": "peak", "RMS": "rms", "at the end": "final"}
 
 def run_tables(result: Result, found: Metrics) -> list[Any]:
     """Tables of tracking errors with torques, and of synchronization errors."""
-    return [_robots(result, found), "", _pairs(result, found)]
+    return [_robots(result, found), *_beyond(result, found), "", _pairs(result, found)]
 
 
 def _robots(result: Result, found: Metrics) -> Any:
@@ -65,11 +65,32 @@ def _torque(result: Result, found: Metrics, robot: int) -> list[str | Text]:
     peaks = found.peak_torque[robot, : len(about["joints"])]
     units = result.units("tau")[robot]
     worst = int(np.argmax(peaks))
-    limits = np.array([x if x else np.inf for x in about.get("torque_limits") or [None] * len(peaks)], float)
-    share = float((peaks / limits).max())
-    words = f"{number(100 * share, 2)} %" if share else "no limit"
+    share = float(_shares(about, peaks).max())
+    words = f"{number(100 * share)} %" if share else "no limit"
     beyond = share > NEAR
     return [f"{number(peaks[worst])} {units[worst]}", Text(words, style=BAD) if beyond else words]
+
+
+def _shares(about: dict[str, Any], peaks: np.ndarray) -> np.ndarray:
+    """Peak torques over their limits, 0 where there is none, (nv,)."""
+    limits = [limit if limit else np.inf for limit in about.get("torque_limits") or [None] * len(peaks)]
+    return peaks / np.array(limits, float)
+
+
+def _beyond(result: Result, found: Metrics) -> list[Text]:
+    """What to make of torques that no robot has."""
+    asked = []
+    for about, peaks in zip(result.info["robots"], found.peak_torque, strict=True):
+        shares = _shares(about, peaks[: len(about["joints"])])
+        worst = int(np.argmax(shares))
+        if shares[worst] > NEAR:
+            asked.append(f"{about['name']}, {about['joints'][worst]}: {number(100 * shares[worst])} %")
+    if not asked:
+        return []
+    words = (
+        "more torque than there is, which the run took for granted; `saturate = true` in the file cuts it off"
+    )
+    return [Text(f"{words}, `synctrl advise` says what to change: {'; '.join(asked)}", style=BAD)]
 
 
 def certificate_lines(certificate: Certificate) -> Text:

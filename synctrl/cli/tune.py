@@ -44,9 +44,6 @@ File = Annotated[
     ),
 ]
 
-#: how runs of the search were made, and not how the cell is to be run
-OF_SEARCH = ("engine", "duration")
-
 
 def tune(
     cell: CellFile,
@@ -76,7 +73,7 @@ def tune(
         from .values import read_factor
 
         asked = {"duration": duration, "dt": dt, "engine": engine, "control_period": control_period}
-        experiment, _ = base = planned(answer, cell, **asked)
+        experiment, *_ = base = planned(answer, cell, **asked)
         factors = [read_factor("--search", text, experiment.gains) for text in search]
         goals = {"minimize": minimize or ([] if maximize else ["sync_rms"]), "maximize": maximize}
         amount = {"generations": generations, "population": population, "seed": seed}
@@ -86,7 +83,7 @@ def tune(
             found = find(experiment, factors, limits=_limits(limit), **options)
         _tell(answer, found)
         _write(answer, found, out)
-        _write_cell(answer, found, tuned or out / "tuned.toml", base.how)
+        _write_cell(answer, found, tuned or out / "tuned.toml", base.kept)
 
 
 @contextmanager
@@ -148,12 +145,12 @@ def _write(answer: Answer, found: Tuned, folder: Path) -> None:
     answer.show("", f"Written: {', '.join(map(str, written))}")
 
 
-def _write_cell(answer: Answer, found: Tuned, file: Path, how: dict[str, Any]) -> None:
+def _write_cell(answer: Answer, found: Tuned, file: Path, run: dict[str, Any]) -> None:
     """The cell with the values of the chosen run; one that no file can say is no failure of the search."""
     from ..cells import write_cell
 
     try:
-        write_cell(found.experiment, file, run={name: x for name, x in how.items() if name not in OF_SEARCH})
+        write_cell(found.experiment, file, run=run)
     except SynctrlError as error:
         answer.data["not_written"] = str(error)
         answer.show(f"Not written as a cell file: {error}")
