@@ -19,6 +19,7 @@ NEEDS = {
     "compare_laws": ("casadi",),
     "faster": ("casadi",),
     "resume_sweep": ("casadi", "joblib", "pandas"),
+    "own_law": ("casadi",),
     "trust": ("casadi", "mujoco"),
     "export": ("h5netcdf", "mcap", "pandas", "xarray"),
 }

@@ -160,7 +160,9 @@ def _modes(advice: Advice) -> list[str]:
         "fastest": max(moving, key=lambda mode: abs(mode.pole)),
         "least damped": min(advice.modes, key=lambda mode: mode.damping),
     }
-    return [f"{name} mode: {_mode(mode, advice)}" for name, mode in shown.items()]
+    lines = [f"{name} mode: {_mode(mode, advice)}" for name, mode in shown.items()]
+    rate = shown["slowest"].rate
+    return [*lines, *([f"errors of the start fall to 5 % in {3 / rate:.2g} s"] if rate > 0 else [])]
 
 
 def _mode(mode: Mode, advice: Advice) -> str:

@@ -136,8 +136,9 @@ def _learning(case: Case, urgency: str) -> Change | None:
     at = _pulls_most(case.arms[worst], Gamma[worst])
     why = (
         f"estimates move {case.shares[worst]:.3g} times as fast as the damping can follow, "
-        f"{case.loop.cell.parameters[worst].names[at]} most of all; in the metric of the bodies each has a "
-        "rate of its own, see docs/gains.md"
+        f"{case.loop.cell.parameters[worst].names[at]} most of all, of which these are the rates; in the "
+        "metric of the bodies each has one of its own, see docs/gains.md: `Advice.changed` and "
+        "`synctrl advise --write` have them all"
     )
     found, to = float(Gamma[worst][at]), float(new[worst][at])
     return Change(urgency, "Gamma", worst, None, found, to, "", why, case.changed(Gamma=new).gains)
