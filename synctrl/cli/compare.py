@@ -101,7 +101,8 @@ def _renamed(row: Row) -> Row:
 
 def _tell(answer: Answer, found: Comparison) -> None:
     answer.data |= found.as_dict()
-    answer.show(f"{found.title}, {found.duration:g} s of every run", "")
+    told = "RMS is over all robots and coordinates, where `synctrl run` has a row for each robot"
+    answer.show(f"{found.title}, {found.duration:g} s of every run; {told}", "")
     for situation in found.situations:
         answer.show(_table(found, situation), "")
     remarks = [f"{row.law}, {row.rule}: {row.remark}" for row in found.rows if row.remark]
