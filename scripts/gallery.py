@@ -103,7 +103,7 @@ def photograph(folder: Path) -> None:
     sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "tests")]
     try:
         from browser import browser, open_page
-        from scene_pictures import freeze, joined, seen
+        from scene_pictures import freeze_short, joined, seen
     except ImportError:
         print("no pictures of animations: they need the extra `test`", file=sys.stderr)
         return
@@ -113,7 +113,7 @@ def photograph(folder: Path) -> None:
     for path in moved:
         try:
             with open_page(path, SCREEN) as page:
-                picture = joined(seen(page, SHARE * freeze(page)))
+                picture = joined(seen(page, SHARE * freeze_short(page)))
         except AssertionError as error:  # its thumbnail is the figure then
             print(f"no picture of {path.name}: {error}", file=sys.stderr)
             continue

@@ -119,6 +119,14 @@ FORMULAS = """(window.MathJax ? MathJax.startup.promise : Promise.resolve()).the
 }))"""
 
 
+def test_scenes_of_the_gallery_have_pictures():
+    """A browser that is slow may miss some of them, and these show their figure; it must not miss most."""
+    scenes = {path.stem for path in (SITE / "gallery" / "animations").glob("*.html")}
+    pictured = {path.name.removesuffix("_scene.png") for path in (SITE / "_images").glob("*_scene.png")}
+    assert len(scenes) > 8
+    assert len(scenes & pictured) > 0.7 * len(scenes)
+
+
 def test_formulas_are_on_the_page_about_the_theory(browser):
     browser.go(SITE / "theory.html")
     assert browser.evaluate(FORMULAS)["shown"] > 100

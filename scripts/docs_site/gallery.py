@@ -53,4 +53,5 @@ def _run(folder: Path, options: list[str]) -> None:
     )
     if done.returncode:
         raise SystemExit(f"The gallery failed:\n{done.stdout}{done.stderr}")
+    print(done.stderr, end="", file=sys.stderr)  # scenes of which there is no picture
     part.rename(folder)
