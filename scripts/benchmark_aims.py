@@ -31,8 +31,8 @@ REASONS: dict[str, str] = {
     "arms have two rows of lanes to share what a step needs beside them",
     "sweep of 10,000 runs of 2 s in steps of 2 ms, two cores": "five seconds of processor time on two cores "
     "leave half a second for all else",
-    "64 to 10,000 planar arms, the least gain": "it is the least of five sizes, and all but the smallest do "
-    "not fit into the cache, so that other work on the machine takes from them",
+    "64 to 10,000 planar arms, the least gain": "it is the least of five sizes, and the largest is bound by "
+    "memory, and so by what else the machine does",
     "10,000 planar arms in one ring, to the first step": "version 0.1 takes 47 s on this machine, not 80",
     "`certify` of 5 s of four planar arms": "two thirds are Pinocchio's regressors, mass matrices and "
     "kinematics at 5,001 instants, and version 0.1 takes 0.8 s on this machine, not 1.1",
