@@ -88,6 +88,14 @@ def rotation_matrix(name: str, value: ArrayLike) -> np.ndarray:
     return R
 
 
+def same_size(name: str, value: ArrayLike, m: int) -> np.ndarray:
+    """An axis of as many numbers as the center has that it belongs to, (m,)."""
+    axis = finite_array(name, value, (None,))
+    if axis.size != m:
+        raise InputError.expected(f"as many numbers as the center has, {m}", axis.size, name)
+    return axis
+
+
 def finite_number(name: str, value: object) -> float:
     """`value` as a finite float.
 

@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, finite_number, instance, positive_number
+from ..checks import finite_array, finite_number, instance, positive_number, same_size
 from ..errors import InputError, TrajectoryError
 from .chebyshev import Function, NotSmoothError, fit_smooth
 
@@ -154,8 +154,8 @@ class Circle:
         self.radius = positive_number("radius", radius)
         self.speed = finite_number("speed", speed)
         self.phase = finite_number("phase", phase)
-        self.first = _axis("first", np.eye(m)[0] if first is None else first, m)
-        self.second = _axis("second", np.eye(m)[1] if second is None else second, m)
+        self.first = same_size("first", np.eye(m)[0] if first is None else first, m)
+        self.second = same_size("second", np.eye(m)[1] if second is None else second, m)
         axes = np.array([self.first, self.second])
         if not np.allclose(axes @ axes.T, np.eye(2), atol=1e-9):
             raise TrajectoryError.expected("orthonormal axes", axes, "first, second")
@@ -166,14 +166,6 @@ class Circle:
         outward = self.radius * (_times(np.cos(angle), self.first) + _times(np.sin(angle), self.second))
         along = self.radius * (_times(np.cos(angle), self.second) - _times(np.sin(angle), self.first))
         return Motion(self.center + outward, w * along, -w * w * outward)
-
-
-def _axis(name: str, given: ArrayLike, m: int) -> np.ndarray:
-    """An axis of a circle, (m,)."""
-    axis = finite_array(name, given, (None,))
-    if axis.size != m:
-        raise InputError.expected(f"as many numbers as the center has, {m}", axis.size, name)
-    return axis
 
 
 class FunctionTrajectory:
