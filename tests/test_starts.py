@@ -20,12 +20,15 @@ from synctrl import (
     Gains,
     Hold,
     Member,
+    SmoothTrajectory,
     experiments,
     load_robot,
 )
+from synctrl.analysis.advice import resting
 from synctrl.analysis.advise import advise_run
 from synctrl.cells import STARTER, CellFileError, read_cell, write_cell
 from synctrl.errors import InputError
+from synctrl.sweep import Grid, Sweep, initial_positions, load
 
 READY = (
     "planar_four",
@@ -136,3 +139,48 @@ def test_the_starter_needs_no_other_gains(tmp_path):
     assert "at rest where" not in str(found)
     file.write_text(STARTER.replace('v0 = "path"', "", 1))
     assert 'at rest where the path begins with a speed: left; v0 = "path"' in str(advise_run(read_cell(file)))
+
+
+def test_clocks_move_no_robot():
+    """Who is told of another time starts where its path begins, and as fast as it is there."""
+    cell = circles(0.05, 2.0, v0="path")
+    ahead = cell.with_clocks([0.0, 0.5])
+    assert (ahead.q0 == cell.q0).all()
+    assert (ahead.v0 == cell.v0).all()
+
+
+def test_a_start_near_a_singularity_is_refused():
+    robot = load_robot("planar2r")
+    q0 = np.array([0.5, 1e-6])
+    at = robot.tip_position(q0)[:2]
+    members = [Member(robot, Circle(at - [0.05, 0], 0.05, 1.0), q0, v0="path"), Member(robot, Hold(at))]
+    with refused(InputError, "robot 1, v0"):
+        Cell(members, Coupling.pair(), CartesianSpace("xy"))
+
+
+def test_runs_with_moved_starts_are_the_same_one_by_one_and_side_by_side(tmp_path):
+    """What is added to q0 is added to q0 alone."""
+    for package in ("casadi", "joblib", "pandas"):
+        pytest.importorskip(package)
+    gains = Gains(Lambda=5, beta=5, K_r=1, K_eps=1, Gamma=0.1)
+    experiment = Experiment(circles(0.05, 2.0, v0="path"), gains, 0.05)
+    factors = [initial_positions(Grid([0.1, 0.3]))]
+    measured = []
+    for engine in ("pinocchio", "compiled"):
+        Sweep(experiment, factors, dt=1e-3, engine=engine).run(tmp_path / engine, workers=1)
+        measured.append(np.array(load(tmp_path / engine)["tracking_rms"], float))
+    assert np.ptp(measured[0]) > 1e-3
+    np.testing.assert_allclose(measured[0], measured[1], rtol=1e-9)
+
+
+def test_a_path_that_begins_at_rest_is_not_told_of_for_rounding():
+    robot = load_robot("planar2r")
+
+    def place(t):
+        return [0.1 - 0.05 * np.cos(np.pi * t / 3), 0.35]
+
+    way = SmoothTrajectory(place, duration=6.0)
+    cell = Cell([Member(robot, way), Member(robot, way)], Coupling.pair(), CartesianSpace("xy"))
+    assert 0 < np.abs(way(0.0).x_dot).max() < 1e-9
+    assert not resting(cell)
+    assert resting(circles(0.05, 2.0)) == ["robot 1", "robot 2"]

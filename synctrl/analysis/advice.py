@@ -17,6 +17,8 @@ from .linear_loop import Mode
 
 #: columns of the table, letters
 WIDE, NARROW = 24, 10
+#: speed of a path that rests, m/s or rad/s: derivatives of functions that are fitted are not quite 0
+STILL = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -101,6 +103,7 @@ class Advice(InWords):
             "longest_step": plain(self.longest_step),
             "longest_period": plain(self.longest_period),
             "delay_margin": None if self.delay is None else plain(self.delay.delay),
+            "resting": resting(self.cell),
             "learning": self.learning.tolist(),
             "joints": self.rows,
             "modes": [mode.as_dict() for mode in self.modes],
@@ -135,20 +138,16 @@ def _margins(advice: Advice) -> list[str]:
     else:
         held += f"; it is {advice.control_period:g} s"
     late = f"delay between robots: {advice.delay or 'ask delay_margin, it takes long'}"
-    return [step, held, late, *_resting(advice.cell)]
+    names = ", ".join(resting(advice.cell))
+    told = f'at rest where the path begins with a speed: {names}; v0 = "path" starts as fast as it'
+    return [step, held, late, *([told] if names else [])]
 
 
-def _resting(cell: Cell) -> list[str]:
+def resting(cell: Cell) -> list[str]:
     """Who rests where its path begins with a speed, which costs torque at the start."""
     speeds = np.abs(cell.reference_table(np.zeros(1)).desired[0, 1]).max(axis=1)
-    rest = [
-        name for name, v0, speed in zip(cell.names, cell.v0, speeds, strict=True) if speed and not v0.any()
-    ]
-    if not rest:
-        return []
-    return [
-        f'at rest where the path begins with a speed: {", ".join(rest)}; v0 = "path" starts as fast as it'
-    ]
+    rows = zip(cell.names, cell.v0, speeds, strict=True)
+    return [name for name, v0, speed in rows if speed > STILL and not v0.any()]
 
 
 def _modes(advice: Advice) -> list[str]:
@@ -162,7 +161,14 @@ def _modes(advice: Advice) -> list[str]:
     }
     lines = [f"{name} mode: {_mode(mode, advice)}" for name, mode in shown.items()]
     rate = shown["slowest"].rate
-    return [*lines, *([f"errors of the start fall to 5 % in {3 / rate:.2g} s"] if rate > 0 else [])]
+    return [
+        *lines,
+        *(
+            [f"errors of the start fall to 5 % in {3 / rate:.2g} s"]
+            if rate > 0 and not advice.diverges
+            else []
+        ),
+    ]
 
 
 def _mode(mode: Mode, advice: Advice) -> str:

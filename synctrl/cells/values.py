@@ -186,7 +186,7 @@ def _velocities(value: Any) -> Any:
     """Joint velocities, which may be in degrees per second, or the word for those of the path."""
     if value == ON_PATH:
         return ON_PATH
-    if isinstance(value, str):
+    if not isinstance(value, list):
         raise misfit(f'{DEPTHS[1]} or "{ON_PATH}"', shown(value))
     return _angles((1,), value)
 
@@ -194,7 +194,7 @@ def _velocities(value: Any) -> Any:
 def _positive(value: Any) -> float:
     number = _numbers((0,), value)
     if not 0 < number < np.inf:
-        raise misfit("a positive number", shown(value))
+        raise misfit("a positive, finite number", shown(value))
     return number
 
 

@@ -79,7 +79,9 @@ def _shares(about: dict[str, Any], peaks: np.ndarray) -> np.ndarray:
 
 def _beyond(result: Result, found: Metrics) -> list[Text]:
     """What to make of torques that no robot has."""
-    asked = []
+    asked: list[str] = []
+    if result.info.get("saturation"):  # it was cut off, and the run says so
+        return []
     for about, peaks in zip(result.info["robots"], found.peak_torque, strict=True):
         shares = _shares(about, peaks[: len(about["joints"])])
         worst = int(np.argmax(shares))

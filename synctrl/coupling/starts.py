@@ -10,9 +10,12 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array
 from ..errors import InputError, UnreachableError
 from ..tasks.inverse_kinematics import start_in
+from .desired import desired_motion, further_rows
 
 #: joint velocities of a robot that starts as fast as its path
 ON_PATH = "path"
+#: joint velocity, rad/s or m/s, beyond which a start is none of a robot
+FASTEST = 200.0
 
 
 def start_positions(cell: Any, i: int) -> tuple[str, ArrayLike]:
@@ -60,12 +63,26 @@ def on_paths(cell: Any, v0: np.ndarray) -> np.ndarray:
     asked = [isinstance(member.v0, str) for member in cell.members]
     if not any(asked):
         return v0
-    v, _ = joint_motion(cell, cell.q0, cell.reference_table(np.zeros(1)).desired[0])
+    v, _ = joint_motion(cell, cell.q0, _first_desired(cell))
     for i in np.flatnonzero(asked):
-        if not np.isfinite(v[i]).all():
-            words = "joint velocities along the path; from where it starts there are none"
-            raise InputError.expected(words, v[i], f"{cell.names[i]}, v0")
+        fastest = np.abs(v[i]).max()
+        if not fastest <= FASTEST:
+            found = f"{fastest:.3g}" if np.isfinite(fastest) else "none"
+            words = (
+                f"expected joint velocities along the path of at most {FASTEST:g} rad/s (m/s), found {found}"
+            )
+            cause = "it starts near a singularity; start elsewhere, or give numbers"
+            raise InputError(f"{words}: {cause}", subject=f"{cell.names[i]}, v0", found=found)
     return np.where(np.array(asked)[:, None], v, v0)
+
+
+def _first_desired(cell: Any) -> np.ndarray:
+    """What is desired where paths begin, (3 or more, n, m): clocks move no robot."""
+    rows, at = [], np.zeros(1)
+    for i, (name, member) in enumerate(zip(cell.names, cell.members, strict=True)):
+        further = further_rows(name, i, cell.space, member.trajectory, at)
+        rows.append(np.concatenate((desired_motion(name, i, member.trajectory, at), further))[:, 0])
+    return np.stack(rows, axis=1)
 
 
 def joint_motion(cell: Any, q: np.ndarray, desired: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

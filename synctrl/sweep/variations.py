@@ -80,7 +80,9 @@ def with_moved_start(
     def change(i: int, member: Member) -> Member:
         start = getattr(cell, quantity)[i, : member.robot.nv].copy()
         start[slice_of("joint", joint, len(start))] += value
-        return replace(member, **{quantity: start})
+        # who starts as fast as its path keeps that velocity, wherever it starts
+        kept = {"v0": cell.v0[i, : member.robot.nv]} if isinstance(member.v0, str) else {}
+        return replace(member, **{**kept, quantity: start})
 
     return _with_members(experiment, change, robot)
 
