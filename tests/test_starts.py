@@ -26,7 +26,10 @@ from synctrl import (
 )
 from synctrl.analysis.advice import resting
 from synctrl.analysis.advise import advise_run
+from synctrl.analysis.metrics import metrics
 from synctrl.cells import STARTER, CellFileError, read_cell, write_cell
+from synctrl.cli.made import Planned
+from synctrl.cli.run_tables import run_tables
 from synctrl.errors import InputError
 from synctrl.sweep import Grid, Sweep, initial_positions, load
 
@@ -171,6 +174,22 @@ def test_runs_with_moved_starts_are_the_same_one_by_one_and_side_by_side(tmp_pat
         measured.append(np.array(load(tmp_path / engine)["tracking_rms"], float))
     assert np.ptp(measured[0]) > 1e-3
     np.testing.assert_allclose(measured[0], measured[1], rtol=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore::synctrl.errors.SaturationWarning")
+def test_torque_beyond_a_limit_is_told_of_unless_it_was_cut_off():
+    experiment = Experiment(circles(0.05, 2.0), Gains(Lambda=5, beta=5, K_r=600.0, K_eps=1, Gamma=0), 0.01)
+    told = [
+        run_tables(run, metrics(run))
+        for run in (experiment.simulate(dt=1e-5), replace(experiment, saturate=True).simulate(dt=1e-5))
+    ]
+    assert ["more torque than there is" in " ".join(map(str, each)) for each in told] == [True, False]
+
+
+@pytest.mark.parametrize(("said", "kept"), [({}, {}), ({"engine": "compiled"}, {"engine": "compiled"})])
+def test_a_file_keeps_the_engine_that_it_names_and_no_other(said, kept):
+    how = {"engine": "pinocchio", "duration": 1.0, "dt": 1e-4}
+    assert Planned(None, how, said).kept == {"dt": 1e-4, **kept}
 
 
 def test_a_path_that_begins_at_rest_is_not_told_of_for_rounding():

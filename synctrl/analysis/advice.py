@@ -161,14 +161,9 @@ def _modes(advice: Advice) -> list[str]:
     }
     lines = [f"{name} mode: {_mode(mode, advice)}" for name, mode in shown.items()]
     rate = shown["slowest"].rate
-    return [
-        *lines,
-        *(
-            [f"errors of the start fall to 5 % in {3 / rate:.2g} s"]
-            if rate > 0 and not advice.diverges
-            else []
-        ),
-    ]
+    if rate > 0 and not advice.diverges:
+        lines.append(f"errors of the start fall to 5 % in {3 / rate:.2g} s")
+    return lines
 
 
 def _mode(mode: Mode, advice: Advice) -> str:

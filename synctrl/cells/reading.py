@@ -174,8 +174,8 @@ def _unknown_kind(place: Place, found: Any, known: list[str]) -> tuple[Place, st
 
 def _like(kind: str, known: list[str]) -> str:
     """What a kind of another name may have meant."""
-    meant = [name for name in (OTHER_NAMES.get(kind),) if name in known]
-    return f" (did you mean {meant[0]!r}?)" if meant else near(kind, known)
+    meant = OTHER_NAMES.get(kind)
+    return f" (did you mean {meant!r}?)" if meant in known else near(kind, known)
 
 
 def _place(loc: tuple[str | int, ...], data: Any, missing: bool) -> Place:

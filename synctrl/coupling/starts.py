@@ -14,7 +14,7 @@ from .desired import desired_motion, further_rows
 
 #: joint velocities of a robot that starts as fast as its path
 ON_PATH = "path"
-#: joint velocity, rad/s or m/s, beyond which a start is none of a robot
+#: velocity at the start that no step follows: 0.2 rad in a millisecond, rad/s (m/s)
 FASTEST = 200.0
 
 

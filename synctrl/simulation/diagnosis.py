@@ -15,6 +15,7 @@ from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
+from ..coupling.starts import FASTEST
 from ..errors import NonFiniteError, OrientationError, SimulationError, SingularJacobianError
 from ..robots.model import joined, unit_for
 from .closed_loop import ClosedLoop
@@ -25,8 +26,6 @@ from .stop import Excess, Push, Stop
 ABSURD = 2e5
 #: one that is suspect where nothing else explains the stop, rad/s^2
 STRONG = 2e3
-#: velocity at the start that no step follows: 0.2 rad in a millisecond, rad/s
-FASTEST_START = 200.0
 #: a step or period is to blame where it is longer than a usual one and a short one would do, s
 USUAL, SHORT = 1e-3, 5e-4
 #: condition number from which on a Jacobian is nearly singular
@@ -156,7 +155,7 @@ def _pushed(stop: Stop, push: Push) -> Cause:
 
 def _fast_start(stop: Stop) -> Cause | None:
     v0 = np.abs(stop.loop.cell.v0)
-    if not v0.max() > FASTEST_START:
+    if not v0.max() > FASTEST:
         return None
     robot, joint = (int(k) for k in np.unravel_index(v0.argmax(), v0.shape))
     speed = f"{v0.max():.3g} {stop.unit('rad/s', robot, joint)}"
